@@ -1,0 +1,97 @@
+"""What every engine promises: many (model, driver) pairs in, as many sensor logs out, each independent of the others."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ee_dist.engines.drivers import Driver
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array, SensorLog, State
+
+
+class EngineError(RuntimeError):
+    """A rollout that an engine cannot run, said in one line."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """One run to be simulated: a model, what drives it, for how many steps (rows of the log).
+
+    ``seed`` feeds the noise of the sensors, if they have any. ``pose`` asks for body pose, joint positions and torques
+    at every row. ``supply_v`` (steps,) is the measured supply voltage.
+    """
+
+    model: Robot
+    driver: Driver
+    steps: int
+    seed: int | None = None
+    start: State | None = None
+    supply_v: Array | None = None
+    pose: bool = False
+
+    @property
+    def key(self) -> str:
+        """Content address of all that decides the result, for the cache."""
+        noisy = any(s.noise or s.dropout for s in self.model.sensors)
+        parts = [self.model.digest, self.driver.key, str(self.steps), str(self.seed if noisy else None), str(self.pose)]
+        for a in (self.supply_v, *_arrays(self.start)):
+            parts.append("-" if a is None else hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest())
+        return "|".join(parts)
+
+
+def _arrays(start: State | None) -> tuple[Array | None, ...]:
+    return () if start is None else (start.joints, start.speeds, start.base_pose, start.base_twist)
+
+
+@dataclass
+class Truth:
+    """The true state of B bodies: joints, speeds (B, M); touch (B, touch sensors) as booleans; base pose (B, 7), twist (B, 6).
+
+    Base pose is the frame of the root part; twist is linear then angular velocity in the frame of the floor.
+    """
+
+    joints: Array
+    speeds: Array
+    touch: NDArray[np.bool_] | None = None
+    base_pose: Array | None = None
+    base_twist: Array | None = None
+
+
+class Bodies(Protocol):
+    """B bodies in an engine, all at their start. The only part of a rollout that an engine writes itself."""
+
+    def read(self, touch: bool, pose: bool, twist: bool) -> Truth: ...
+
+    def step(self, torques: Array, force: Array | None) -> None:
+        """Advance by one time step under joint torques (B, M) and a force (B, 3) on the root part, floor frame."""
+
+    def close(self) -> None:
+        """The batch is over; what it held may be used again."""
+
+
+class Engine(Protocol):
+    """A physics engine. ``name`` and its settings are part of every cache key."""
+
+    name: str
+
+    def rollout(self, rollouts: Sequence[Rollout]) -> list[SensorLog]:
+        """Logs in the order asked. Bit for bit the same whatever else is in the list and whatever ran before."""
+        ...
+
+    def close(self) -> None: ...
+
+
+@dataclass
+class Counters:
+    """What an engine simulated."""
+
+    rollouts: int = 0
+    steps: int = 0
+    seconds: float = 0.0
+    by_part: dict[str, float] = field(default_factory=dict)

@@ -1,0 +1,202 @@
+"""The one rollout path: sense, command, drive, step, for a batch of robots of the same shape."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ee_dist.engines.contract import Bodies, Rollout, Truth
+from ee_dist.engines.drive import DrivePath
+from ee_dist.engines.drivers import Controllers, scaling
+from ee_dist.engines.sensing import LIFTED, TOUCHING, SensingPath
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array, SensorLog
+
+POSE_KINDS = frozenset({"height", "roll", "pitch", "x", "y"})
+TWIST_KINDS = frozenset({"speed_x", "turn_rate"})
+
+
+def shape_of(rollout: Rollout) -> tuple[object, ...]:
+    """Rollouts of one shape can share a batch."""
+    robot = rollout.model
+    kinds = tuple((s.kind, s.target) for s in robot.sensors)
+    return (
+        robot.motor_names,
+        kinds,
+        robot.time_step_s,
+        rollout.steps,
+        rollout.pose,
+        robot.free_base,
+        rollout.supply_v is None,
+    )
+
+
+def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
+    """Logs of a batch of one shape, whose ``bodies`` stand at their start.
+
+    A model whose motion leaves the finite numbers gives a log that says so (``SensorLog.finite``), and harms no other.
+    """
+    robots = [r.model for r in rollouts]
+    first, steps, pose = robots[0], rollouts[0].steps, rollouts[0].pose
+    dt = first.time_step_s
+    kinds = {s.kind for s in first.sensors}
+    drive = DrivePath(robots, dt)
+    sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
+    scales = [scaling(r) for r in robots]
+    control = Controllers(robots, [r.driver for r in rollouts], scales, steps)
+    truth_to_channels = _Channels(robots, scales)
+    force = _Force(robots)
+    supply = None if rollouts[0].supply_v is None else np.stack([_held(r.supply_v, steps) for r in rollouts])
+    touch, twist = "touch" in kinds, force.needs_twist or bool(kinds & TWIST_KINDS)
+    always_pose = pose or bool(kinds & POSE_KINDS)
+
+    count, motors, channels = len(robots), len(first.drives), len(first.sensors)
+    sensors = np.empty((steps, count, channels))
+    commands = np.empty((steps, count, motors))
+    poses = np.empty((steps, count, 7)) if pose else None
+    joints = np.empty((steps, count, motors)) if pose else None
+    torques = np.empty((steps, count, motors)) if pose else None
+    begin: Array | None = None
+    torque = np.zeros((count, motors))
+    for step in range(steps):
+        last = step == steps - 1
+        truth = bodies.read(touch, always_pose or step == 0 or last, twist)
+        if begin is None:
+            begin = truth.base_pose
+        reported = sensing.step(step, truth_to_channels(truth, torque))
+        command = control.step(step, step * dt, reported)
+        torque = drive.step(
+            step * dt, command, truth.joints, truth.speeds, None if supply is None else supply[:, step : step + 1]
+        )
+        sensors[step], commands[step] = reported, command
+        if poses is not None and joints is not None and torques is not None and truth.base_pose is not None:
+            poses[step], joints[step], torques[step] = truth.base_pose, truth.joints, torque
+        if not last:
+            bodies.step(torque, force(step, truth))
+    assert begin is not None and truth.base_pose is not None
+    travel = truth.base_pose[:, 0] - begin[:, 0]
+    times = np.arange(steps) * dt
+    units = tuple(s.unit for s in first.sensors)
+    return [
+        SensorLog(
+            times_s=times.copy(),
+            sensors=sensors[:, i].copy(),
+            commands=commands[:, i].copy(),
+            sensor_names=first.sensor_names,
+            sensor_units=units,
+            motor_names=first.motor_names,
+            base_pose=None if poses is None else poses[:, i].copy(),
+            joints=None if joints is None else joints[:, i].copy(),
+            torques=None if torques is None else torques[:, i].copy(),
+            supply_v=None if supply is None else supply[i].copy(),
+            travel_m=float(travel[i]),
+        )
+        for i in range(count)
+    ]
+
+
+def in_batches(
+    rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]], Bodies], largest: int = 256
+) -> list[SensorLog]:
+    """Sort rollouts into batches of one shape, run each, and return the logs in the order asked."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for i, r in enumerate(rollouts):
+        groups.setdefault(shape_of(r), []).append(i)
+    logs: dict[int, SensorLog] = {}
+    for members in groups.values():
+        for k in range(0, len(members), largest):
+            part = members[k : k + largest]
+            batch = [rollouts[i] for i in part]
+            bodies = place(batch)
+            try:
+                found = run(batch, bodies)
+            finally:
+                bodies.close()
+            logs.update(zip(part, found, strict=True))
+    return [logs[i] for i in range(len(rollouts))]
+
+
+class _Channels:
+    """True values of the channels (B, S) from the true state."""
+
+    def __init__(self, robots: Sequence[Robot], scales: Sequence[tuple[Array, Array]]) -> None:
+        first = robots[0]
+        motor = {name: k for k, name in enumerate(first.motor_names)}
+        self.shape = (len(robots), len(first.sensors))
+        self.by_kind: dict[str, tuple[list[int], list[int]]] = {}
+        touches = 0
+        for k, sensor in enumerate(first.sensors):
+            columns, sources = self.by_kind.setdefault(sensor.kind, ([], []))
+            columns.append(k)
+            if sensor.kind == "touch":
+                sources.append(touches)
+                touches += 1
+            else:
+                sources.append(motor.get(sensor.target, 0))
+        self.middle = np.array([s[0] for s in scales])
+        self.half = np.array([s[1] for s in scales])
+        self.present = np.array([[n in {j.name for j in r.present_joints} for n in first.motor_names] for r in robots])
+
+    def __call__(self, truth: Truth, torque: Array) -> Array:
+        out = np.empty(self.shape)
+        for kind, (columns, sources) in self.by_kind.items():
+            if kind == "touch":
+                assert truth.touch is not None
+                out[:, columns] = np.where(truth.touch[:, sources], TOUCHING, LIFTED)
+            elif kind == "angle":
+                out[:, columns] = ((truth.joints - self.middle) / self.half)[:, sources]
+            elif kind == "position":
+                out[:, columns] = truth.joints[:, sources]
+            elif kind == "velocity":
+                out[:, columns] = truth.speeds[:, sources]
+            elif kind == "torque":
+                out[:, columns] = torque[:, sources]
+            else:
+                out[:, columns] = _of_base(kind, truth)[:, None]
+        return out
+
+
+def _of_base(kind: str, truth: Truth) -> Array:
+    if kind in TWIST_KINDS:
+        assert truth.base_twist is not None
+        return truth.base_twist[:, 0 if kind == "speed_x" else 5]
+    assert truth.base_pose is not None
+    x, y, z, w = truth.base_pose[:, 3:].T
+    if kind == "roll":
+        return np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    if kind == "pitch":
+        return np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    return truth.base_pose[:, {"x": 0, "y": 1, "height": 2}[kind]]
+
+
+class _Force:
+    """Force of the surroundings on the root part: a constant push and drag."""
+
+    def __init__(self, robots: Sequence[Robot]) -> None:
+        self.push = np.array([(r.world.push_x_n, r.world.push_y_n, 0.0) for r in robots])
+        self.drag = np.array([[r.world.drag_n_s_m] for r in robots])
+        self.needs_twist = bool(self.drag.any())
+        self.silent = not self.push.any() and not self.needs_twist
+
+    def __call__(self, step: int, truth: Truth) -> Array | None:
+        if self.silent:
+            return None
+        if not self.needs_twist:
+            return self.push
+        assert truth.base_twist is not None
+        return self.push - self.drag * truth.base_twist[:, :3]
+
+
+def gravity_vector(robot: Robot) -> tuple[float, float, float]:
+    """Gravity in the frame of the floor: floor turned by tilt_x about x, then by tilt_y about y."""
+    g, a, b = robot.world.gravity_m_s2, robot.world.tilt_x_rad, robot.world.tilt_y_rad
+    if a == 0.0 and b == 0.0:
+        return (0.0, 0.0, -g)
+    return (g * math.sin(b) * math.cos(a), -g * math.sin(a), -g * math.cos(b) * math.cos(a))
+
+
+def _held(values: Array | None, steps: int) -> Array:
+    assert values is not None
+    return np.asarray(values)[np.minimum(np.arange(steps), len(values) - 1)]

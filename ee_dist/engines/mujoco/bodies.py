@@ -1,0 +1,210 @@
+"""The bodies of a batch: live arrays over the states that MuJoCo steps, read and written without a loop over robots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mujoco import batch as native
+from numpy.typing import NDArray
+
+from ee_dist.engines.contract import Rollout, Truth
+from ee_dist.engines.mujoco.contact import LEAST_FRICTION, contact
+from ee_dist.engines.mujoco.model import OWN, Model, scalar_first
+from ee_dist.trials.log import Array
+
+Index = slice | NDArray[np.intp]
+
+
+class Group:
+    """Robots of one structure, at their start. Rows are those of ``members``."""
+
+    def __init__(self, model: Model, members: Sequence[Rollout], threads: int) -> None:
+        self.model = model
+        self.free_base = members[0].model.free_base
+        self.com = np.array([r.model.root.com_m for r in members]) + 0.0
+        # A warm start is part of a robot's own state, and zero at first: nothing that ran before can be felt.
+        self.batch = self._fill(members, threads)
+        bind = self.batch.bind
+        self.positions: Array = bind("qpos")
+        self.speeds: Array = bind("qvel")
+        self.torques: Array = bind("qfrc_applied")
+        self.force: Array = bind("xfrc_applied")[:, model.root, :3]
+        self.pressed: Array = bind("sensordata")
+        self.motors, self.qpos, self.dof = _index(model.motors), _index(model.qpos), _index(model.dof)
+        self.touches = _index(model.touches)
+        self.pose: Array = np.empty((len(members), 7))
+        self._stand(members)
+
+    def _fill(self, members: Sequence[Rollout], threads: int) -> native.Batch:
+        """A batch with each robot's own numbers; a field that is the same for all is held once."""
+        model = self.model
+        robots = {id(r.model): r.model for r in members}
+        place = {key: k for k, key in enumerate(robots)}
+        own = [model.numbers(robot) for robot in robots.values()]
+        model.fill(own[0])
+        batch = native.Batch(model.compiled, len(members), min(threads, len(members)))
+        which = [place[id(r.model)] for r in members]
+        derived = False
+        for k, name in enumerate(OWN):
+            values = np.array([numbers[k] for numbers in own])
+            if (values != values[0]).any():
+                batch.expand(name)[:] = values[which]
+                derived = derived or name != "opt.gravity"
+        if derived:
+            batch.set_const()
+        if len(model.pair_body):
+            self._touch_floor(batch, members)
+        return batch
+
+    def _touch_floor(self, batch: native.Batch, members: Sequence[Rollout]) -> None:
+        shared = self.model.compiled.body_invweight0
+        weights = batch.expanded("body_invweight0")
+        if weights is None:
+            weights = np.broadcast_to(shared, (len(members), *shared.shape))
+        worlds = [r.model.world for r in members]
+        give = np.array([w.compliance_m_n for w in worlds])
+        found = contact(members[0].model.time_step_s, give, weights[:, self.model.pair_body, 0])
+        batch.expand("pair_solref")[:] = found.normal
+        batch.expand("pair_solreffriction")[:] = found.sliding
+        batch.expand("pair_solimp")[:] = found.impedance
+        ratio = batch.expand("opt.impratio")
+        ratio[:] = found.ratio.reshape(ratio.shape)
+        friction = np.array([max(w.friction, LEAST_FRICTION) for w in worlds])
+        batch.expand("pair_friction")[:, :, :2] = friction[:, None, None]
+
+    def _stand(self, members: Sequence[Rollout]) -> None:
+        """Put each robot at its start: the robot's own, or the state that the rollout asks for."""
+        model = self.model
+        for i, r in enumerate(members):
+            start = r.start
+            self.pose[i] = (*r.model.start_position_m, *r.model.start_rotation)
+            if start is not None:
+                self.positions[i, model.qpos] = np.asarray(start.joints, dtype=float)[model.motors]
+                self.speeds[i, model.dof] = np.asarray(start.speeds, dtype=float)[model.motors]
+                if self.free_base and start.base_pose is not None:
+                    self.pose[i] = start.base_pose
+                    if start.base_twist is not None:
+                        self.speeds[i, :6] = start.base_twist
+        self.pose[:, 3:] /= np.sqrt((self.pose[:, 3:] ** 2).sum(axis=1, keepdims=True))
+        self.pose += 0.0
+        if self.free_base:
+            self.positions[:, :3] = self.pose[:, :3]
+            self.positions[:, 3:7] = scalar_first(self.pose[:, 3:])
+            turn, spin = self.positions[:, 3:7], self.speeds[:, 3:6].copy()
+            self.speeds[:, :3] -= _cross(spin, _turned(turn, self.com))
+            self.speeds[:, 3:6] = _turned(turn * (1.0, -1.0, -1.0, -1.0), spin)
+
+    # -- a step ------------------------------------------------------------------------------------------------------
+
+    def base_pose(self) -> Array:
+        """(n, 7), scalar last."""
+        if self.free_base:
+            self.pose[:, :3] = self.positions[:, :3]
+            self.pose[:, 3:6] = self.positions[:, 4:7]
+            self.pose[:, 6] = self.positions[:, 3]
+        return self.pose
+
+    def base_twist(self) -> Array:
+        """(n, 6) of the root's centre of mass in the frame of the floor. MuJoCo's own spin is in the frame of the root."""
+        twist = np.zeros((len(self.pose), 6))
+        if self.free_base:
+            turn = self.positions[:, 3:7]
+            twist[:, 3:] = _turned(turn, self.speeds[:, 3:6])
+            twist[:, :3] = self.speeds[:, :3] + _cross(twist[:, 3:], _turned(turn, self.com))
+        return twist
+
+    def step(self, torques: Array, force: Array | None) -> None:
+        self.torques[:, self.dof] = torques[:, self.motors]
+        if force is not None:
+            self.force[:] = force
+        try:
+            self.batch.step()
+        except native.SimulationError as error:
+            # The others have moved on; a robot that MuJoCo gave up on must not stand there as if it were at rest.
+            self.positions[error.ids] = np.nan
+
+
+class MuJoCoBodies:
+    """The bodies of one batch. Implements ``ee_dist.engines.contract.Bodies``."""
+
+    def __init__(self, placed: Sequence[tuple[list[int], Group]], batch: Sequence[Rollout]) -> None:
+        self.shape = (len(batch), len(batch[0].model.drives))
+        self.touches = sum(s.kind == "touch" for s in batch[0].model.sensors)
+        self.groups = [(_index(rows), group) for rows, group in placed]
+        # The usual batch: one structure with every joint present needs no arrays but the copies that leave here.
+        only = placed[0][1]
+        self.only = only if len(placed) == 1 and len(only.model.motors) == self.shape[1] else None
+
+    def read(self, touch: bool, pose: bool, twist: bool) -> Truth:
+        if self.only is not None:
+            only = self.only
+            return Truth(
+                only.positions[:, only.qpos].copy(),
+                only.speeds[:, only.dof].copy(),
+                only.pressed > 0 if touch and len(only.model.touches) == self.touches else self._touch(touch),
+                only.base_pose().copy() if pose else None,
+                only.base_twist() if twist else None,
+            )
+        truth = Truth(np.zeros(self.shape), np.zeros(self.shape), self._touch(touch))
+        for rows, group in self.groups:
+            _put(truth.joints, rows, group.motors, group.positions[:, group.qpos])
+            _put(truth.speeds, rows, group.motors, group.speeds[:, group.dof])
+        if pose:
+            truth.base_pose = np.empty((self.shape[0], 7))
+            for rows, group in self.groups:
+                truth.base_pose[rows] = group.base_pose()
+        if twist:
+            truth.base_twist = np.empty((self.shape[0], 6))
+            for rows, group in self.groups:
+                truth.base_twist[rows] = group.base_twist()
+        return truth
+
+    def _touch(self, wanted: bool) -> NDArray[np.bool_] | None:
+        if not wanted:
+            return None
+        down = np.zeros((self.shape[0], self.touches), dtype=bool)
+        for rows, group in self.groups:
+            _put(down, rows, group.touches, group.pressed > 0)
+        return down
+
+    def step(self, torques: Array, force: Array | None) -> None:
+        for rows, group in self.groups:
+            group.step(torques[rows], None if force is None else force[rows])
+
+    def close(self) -> None:
+        self.groups = []
+        self.only = None
+
+
+def _index(places: Sequence[int]) -> Index:
+    """A slice where the places follow one another: NumPy then only looks, and copies nothing."""
+    if places and list(places) == list(range(places[0], places[-1] + 1)):
+        return slice(places[0], places[-1] + 1)
+    return np.array(places, dtype=np.intp)
+
+
+def _put(into: NDArray, rows: Index, columns: Index, values: NDArray) -> None:  # type: ignore[type-arg]
+    """into[rows, columns] = values for any mix of slices and lists."""
+    if isinstance(rows, np.ndarray) and isinstance(columns, np.ndarray):
+        into[rows[:, None], columns] = values
+    else:
+        into[rows, columns] = values
+
+
+def _turned(turn: Array, vector: Array) -> Array:
+    """Vectors (n, 3) turned by unit quaternions (n, 4), scalar first."""
+    axis = turn[:, 1:]
+    twice = 2.0 * _cross(axis, vector)
+    return vector + turn[:, :1] * twice + _cross(axis, twice)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.stack(
+        [
+            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
+            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
+            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
+        ],
+        axis=1,
+    )

@@ -1,0 +1,166 @@
+"""PyBullet behind the engine contract: a pool of worlds with a robot each, stepped side by side."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+import pybullet as p
+from numpy.typing import NDArray
+
+from ee_dist.engines.contract import Rollout, Truth
+from ee_dist.engines.loop import gravity_vector, in_batches
+from ee_dist.engines.pybullet.world import World, structure_key
+from ee_dist.trials.log import Array, SensorLog
+
+WORLD_SIZES = (8, 4, 2, 1)
+"""Robots a world. Eight share the cost of a call well; more cost Bullet's collision pairs."""
+POOL = 64
+"""Worlds kept for reuse (some 35 MB each), beyond which the longest unused are closed."""
+
+
+class PyBulletEngine:
+    """Implements ``ee_dist.engines.contract.Engine``."""
+
+    name = "pybullet"
+
+    def __init__(self, largest_batch: int = 128) -> None:
+        self.largest_batch = largest_batch
+        self._idle: OrderedDict[tuple[str, int], list[World]] = OrderedDict()
+
+    def rollout(self, rollouts: Sequence[Rollout]) -> list[SensorLog]:
+        return in_batches(rollouts, self._place, self.largest_batch)
+
+    def close(self) -> None:
+        for worlds in self._idle.values():
+            for world in worlds:
+                world.close()
+        self._idle.clear()
+
+    def _place(self, batch: Sequence[Rollout]) -> BulletBodies:
+        keys: dict[int, str] = {}
+        groups: dict[tuple[str, tuple[float, float, float]], list[int]] = {}
+        for i, r in enumerate(batch):
+            if id(r.model) not in keys:
+                keys[id(r.model)] = structure_key(r.model)
+            groups.setdefault((keys[id(r.model)], gravity_vector(r.model)), []).append(i)
+        placed: list[tuple[World, list[int]]] = []
+        for (structure, _), members in groups.items():
+            for size in WORLD_SIZES:
+                while len(members) >= size:
+                    rows, members = members[:size], members[size:]
+                    idle = self._idle.get((structure, size))
+                    world = idle.pop() if idle else World(batch[rows[0]].model, size)
+                    world.prepare([batch[i].model for i in rows], [batch[i].start for i in rows])
+                    placed.append((world, rows))
+        return BulletBodies(self, placed, batch)
+
+    def give_back(self, worlds: Sequence[World]) -> None:
+        """Take worlds back after a batch; close those unused for longest."""
+        for world in worlds:
+            key = (world.structure, world.size)
+            self._idle.setdefault(key, []).append(world)
+            self._idle.move_to_end(key)
+        excess = sum(map(len, self._idle.values())) - POOL
+        while excess > 0:
+            key, stack = next(iter(self._idle.items()))
+            if stack:
+                stack.pop(0).close()
+                excess -= 1
+            else:
+                del self._idle[key]
+
+
+class BulletBodies:
+    """The bodies of one batch. Implements ``ee_dist.engines.contract.Bodies``; worlds go back after the batch."""
+
+    def __init__(self, engine: PyBulletEngine, placed: list[tuple[World, list[int]]], batch: Sequence[Rollout]) -> None:
+        self.engine = engine
+        self.worlds = [world for world, _ in placed]
+        count, motors = len(batch), len(batch[0].model.drives)
+        self.joints, self.speeds = np.zeros((count, motors)), np.zeros((count, motors))
+        self.touches = len(placed[0][0].touch_links)
+        self.robots = []
+        self.feet = []
+        self.frame_in_com: dict[int, tuple[tuple[float, ...], tuple[float, ...]] | None] = {}
+        for world, rows in placed:
+            columns = [k for k, link in enumerate(world.links) if link >= 0]
+            links = [world.links[k] for k in columns]
+            feet = {}
+            for row, body in zip(rows, world.bodies, strict=True):
+                self.robots.append(
+                    (row, world.client, body, links, None if links and len(links) == motors else columns)
+                )
+                feet.update({(body, link): (row, k) for k, link in enumerate(world.touch_links)})
+                root = batch[row].model.root
+                self.frame_in_com[row] = _inverse(root.com_m, world.frames[root.name][1])
+            self.feet.append((world.client, world.floor, feet))
+
+    def read(self, touch: bool, pose: bool, twist: bool) -> Truth:
+        states = p.getJointStates
+        joints, speeds = self.joints, self.speeds
+        for row, client, body, links, columns in self.robots:
+            if columns is None:
+                positions, rates, _, _ = zip(*states(body, links, client), strict=True)
+                joints[row] = positions
+                speeds[row] = rates
+            elif links:
+                positions, rates, _, _ = zip(*states(body, links, client), strict=True)
+                joints[row, columns] = positions
+                speeds[row, columns] = rates
+        truth = Truth(joints.copy(), speeds.copy())
+        if touch:
+            truth.touch = self._touch()
+        if pose:
+            truth.base_pose = self._poses()
+        if twist:
+            truth.base_twist = np.empty((len(self.robots), 6))
+            for row, client, body, _, _ in self.robots:
+                truth.base_twist[row] = np.concatenate(p.getBaseVelocity(body, physicsClientId=client))
+        return truth
+
+    def _touch(self) -> NDArray[np.bool_]:
+        down = np.zeros((len(self.robots), self.touches), dtype=bool)
+        for client, floor, feet in self.feet:
+            for contact in p.getContactPoints(floor, physicsClientId=client):
+                if contact[9] > 0:
+                    place = feet.get((contact[2], contact[4]))
+                    if place is not None:
+                        down[place] = True
+        return down
+
+    def _poses(self) -> Array:
+        out = np.empty((len(self.robots), 7))
+        for row, client, body, _, _ in self.robots:
+            position, turn = p.getBasePositionAndOrientation(body, physicsClientId=client)
+            shift = self.frame_in_com[row]
+            if shift is not None:
+                position, turn = p.multiplyTransforms(position, turn, *shift)
+            out[row, :3] = position
+            out[row, 3:] = turn
+        return out
+
+    def step(self, torques: Array, force: Array | None) -> None:
+        send, simulate, mode = p.setJointMotorControlArray, p.stepSimulation, p.TORQUE_CONTROL
+        rows = torques.tolist()
+        for row, client, body, links, columns in self.robots:
+            values = rows[row] if columns is None else [rows[row][k] for k in columns]
+            if links:
+                send(body, links, mode, forces=values, physicsClientId=client)
+            if force is not None and force[row].any():
+                position, _ = p.getBasePositionAndOrientation(body, physicsClientId=client)
+                p.applyExternalForce(body, -1, force[row].tolist(), position, p.WORLD_FRAME, physicsClientId=client)
+        for world in self.worlds:
+            simulate(world.client)
+
+    def close(self) -> None:
+        self.engine.give_back(self.worlds)
+        self.worlds = []
+
+
+def _inverse(com: tuple[float, ...], turn: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    """Pose of the root's own frame in the frame of its centre of mass; None where they are the same."""
+    if not any(com) and tuple(turn) == (0.0, 0.0, 0.0, 1.0):
+        return None
+    return p.invertTransform(com, turn)

@@ -1,0 +1,91 @@
+"""The sensing path: from true values to what the channels report, for a whole batch at once and the same for every engine.
+
+    true value -> missed touch -> gain, bias -> delay -> noise -> dropout -> quantisation -> stuck
+
+Random draws come from the rollout's own seed, one stream a row, so that they do not depend on the batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from ee_dist.robots.model import Robot, Sensor
+from ee_dist.trials.log import Array
+
+TOUCHING, LIFTED = 1.0, -1.0
+
+
+class SensingPath:
+    """State and arithmetic of the S channels of B robots."""
+
+    def __init__(self, robots: Sequence[Robot], time_step_s: float, steps: int, seeds: Sequence[int | None]) -> None:
+        names = [f.name for f in fields(Sensor) if isinstance(f.default, float)]
+        table = np.array([[[getattr(s, n) for n in names] for s in r.sensors] for r in robots], dtype=float)
+        table = table.reshape(len(robots), len(robots[0].sensors), len(names))
+        self.p = {n: np.ascontiguousarray(table[:, :, i]) for i, n in enumerate(names)}
+        neutral = {f.name: f.default for f in fields(Sensor)}
+        self.uses = {n: bool(np.any(self.p[n] != neutral[n])) for n in names}
+        self.plain = not any(self.uses.values())
+        shape = table.shape[:2]
+        self.kinds = [s.kind for s in robots[0].sensors]
+        self.touch = np.array([k == "touch" for k in self.kinds])
+        if self.uses["missed_touch"]:
+            self.pressed_s = np.zeros(shape)
+        self.dt = time_step_s
+        if self.uses["delay_s"]:
+            ticks = self.p["delay_s"] / time_step_s
+            self.whole = np.floor(ticks + 1e-9).astype(int)
+            self.rest = np.clip(ticks - self.whole, 0.0, 1.0)
+            self.past: Array = np.zeros((int(self.whole.max()) + 2, *shape))
+            self.filled = False
+            self.rows, self.columns = np.indices(shape)
+        if self.uses["noise"] or self.uses["dropout"]:
+            self.normal = np.zeros((steps, *shape))
+            self.uniform = np.ones((steps, *shape))
+            for i, seed in enumerate(seeds):
+                if seed is None and not (self.p["noise"][i].any() or self.p["dropout"][i].any()):
+                    continue
+                rng = np.random.default_rng(0 if seed is None else seed)
+                self.normal[:, i] = rng.standard_normal((steps, shape[1]))
+                self.uniform[:, i] = rng.random((steps, shape[1]))
+            self.held: Array | None = None
+
+    def step(self, step: int, true: Array) -> Array:
+        """Reported values (B, S) at this step from true ones."""
+        if self.plain:
+            return true
+        p, value = self.p, true
+        if self.uses["missed_touch"]:
+            # A worn switch closes only after it was pressed for a while.
+            down = self.touch & (value > 0)
+            self.pressed_s = np.where(down, self.pressed_s + self.dt, 0.0)
+            value = np.where(down & (self.pressed_s <= p["missed_touch"]), LIFTED, value)
+        if self.uses["gain"]:
+            value = value * p["gain"]
+        if self.uses["bias"]:
+            value = value + p["bias"]
+        if self.uses["delay_s"]:
+            if not self.filled:
+                self.past[:] = value
+                self.filled = True
+            self.past = np.roll(self.past, 1, axis=0)
+            self.past[0] = value
+            near = self.past[self.whole, self.rows, self.columns]
+            far = self.past[self.whole + 1, self.rows, self.columns]
+            value = np.where(self.rest > 0, near * (1 - self.rest) + far * self.rest, near)
+        if self.uses["noise"]:
+            value = value + p["noise"] * self.normal[step]
+        if self.uses["dropout"]:
+            if self.held is not None:
+                value = np.where(self.uniform[step] < p["dropout"], self.held, value)
+            self.held = value
+        if self.uses["quantum"]:
+            q = np.where(p["quantum"] > 0, p["quantum"], 1.0)
+            value = np.where(p["quantum"] > 0, np.round(value / q) * q, value)
+        if self.uses["stuck"]:
+            # stuck = 1: the channel reports only zero; between, it reports that share less of its true movement.
+            value = np.where(p["stuck"] > 0, value * (1 - p["stuck"]), value)
+        return value

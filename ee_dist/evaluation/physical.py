@@ -1,0 +1,59 @@
+"""The simulated physical robot: hardware whose change is hidden from whoever tries it.
+
+Only tasks build one (the import rules forbid it to the searches). The hidden hypothesis lives in a closure, not in an
+attribute, and comes out through ``reveal`` alone, which tasks call after the search is over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.engines.contract import Engine, EngineError, Rollout
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import SensorLog
+
+
+class PhysicalRobot:
+    """Implements ``ee_dist.trials.hardware.Hardware``. ``noise`` is the standard deviation of each channel's noise,
+    as a share of the channel's range (touch and angle channels: of 2)."""
+
+    __slots__ = ("_run", "reveal", "trials")
+
+    def __init__(
+        self, engine: Engine, robot: Robot, hidden: Hypothesis, seed: np.random.SeedSequence, noise: float = 0.0
+    ) -> None:
+        changed = apply(robot, hidden)
+        if noise:
+            changed = _noisy(changed, noise)
+        self.trials = 0
+        self._run: Callable[[Any, int, int], SensorLog] = _runner(engine, changed, seed)
+        self.reveal: Callable[[], Hypothesis] = lambda: hidden
+
+    def trial(self, driver: Any, steps: int) -> SensorLog:
+        log = self._run(driver, steps, self.trials)
+        self.trials += 1
+        return log
+
+
+def _runner(engine: Engine, robot: Robot, seed: np.random.SeedSequence) -> Callable[[Any, int, int], SensorLog]:
+    def run(driver: Any, steps: int, index: int) -> SensorLog:
+        stream = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, index))
+        number = int(stream.generate_state(1, np.uint64)[0])
+        (log,) = engine.rollout([Rollout(robot, driver, steps, seed=number, pose=True)])
+        if not log.finite:
+            raise EngineError(f"the hidden change makes {robot.name} unstable in {engine.name}: no trial came back")
+        return log
+
+    return run
+
+
+def _noisy(robot: Robot, noise: float) -> Robot:
+    span = {"touch": 2.0, "angle": 2.0}
+    return replace(
+        robot, sensors=tuple(replace(s, noise=s.noise + noise * span.get(s.kind, 1.0)) for s in robot.sensors)
+    )

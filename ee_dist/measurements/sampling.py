@@ -1,0 +1,115 @@
+"""Time as it was recorded, and signals brought onto an even grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import signal
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.trials.log import Array
+
+EVEN = 0.02
+"""Steps that differ by less than this share of their median count as even."""
+GAP = 5.0
+"""Steps longer than this many medians are gaps."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What a time column looks like: median step (s), shortest and longest, gaps as (row, length in s)."""
+
+    median_s: float
+    shortest_s: float
+    longest_s: float
+    gaps: tuple[tuple[int, float], ...]
+
+    @property
+    def even(self) -> bool:
+        return max(self.longest_s - self.median_s, self.median_s - self.shortest_s) <= EVEN * self.median_s
+
+
+def check_times(times_s: Array, path: Path, column: str, first_row: int) -> Timing:
+    """Raises MeasurementError where time stands still or runs backwards, naming the row, and for a single row."""
+    if len(times_s) < 2:
+        raise MeasurementError(f"{path}: one row only; expected a series (zero length in time)")
+    steps = np.diff(times_s)
+    wrong = np.flatnonzero(steps <= 0)
+    if len(wrong):
+        row = int(wrong[0]) + 1
+        how = "runs backwards" if steps[row - 1] < 0 else "stands still"
+        raise MeasurementError(
+            f"{path}: row {row + first_row}, column {column!r}: time {how} ({times_s[row - 1]:.9g} s, then {times_s[row]:.9g} s)"
+        )
+    median = float(np.median(steps))
+    long = np.flatnonzero(steps > GAP * median)
+    gaps = tuple((int(i) + 1 + first_row, float(steps[i])) for i in long)
+    return Timing(median, float(steps.min()), float(steps.max()), gaps)
+
+
+def grid(times_s: Array, step_s: float) -> Array:
+    """Even times (T,) from 0 in steps of ``step_s`` that cover the record and do not go beyond it."""
+    count = int(np.floor((times_s[-1] - times_s[0]) / step_s + 1e-6)) + 1
+    return np.arange(count) * step_s
+
+
+def linear(at_s: Array, times_s: Array, values: Array) -> Array:
+    """Straight lines between samples: for states, which cannot jump."""
+    return np.interp(at_s, times_s - times_s[0], values)
+
+
+def held(at_s: Array, times_s: Array, values: Array, lead_s: float = 0.0) -> Array:
+    """The last sample, for what is sent and stays until the next: commands, switches.
+
+    ``lead_s`` is how long before its time stamp a value took effect, where the stamp was taken after the sending.
+    """
+    index = np.searchsorted(times_s - times_s[0] - lead_s, at_s + 1e-9, side="right") - 1
+    return values[np.clip(index, 0, len(values) - 1)]
+
+
+def smoothed(values: Array, step_s: float, window_s: float) -> Array:
+    """Centred mean over ``window_s``, ends held: for a reading noisier than what it reads (a supply voltage)."""
+    width = int(round(window_s / step_s)) | 1
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.convolve(padded, np.ones(width) / width, "valid")
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """Butterworth low-pass of ``order``, run forward and backward (no phase), with its cut-off in Hz."""
+
+    cutoff_hz: float = 50.0
+    order: int = 4
+
+    def __str__(self) -> str:
+        return f"Butterworth low-pass, order {self.order}, {self.cutoff_hz:g} Hz, forward and backward"
+
+    def __call__(self, values: Array, step_s: float) -> Array:
+        """Filtered series (T,). Raises MeasurementError for a cut-off beyond the Nyquist frequency or too short a series."""
+        share = 2 * self.cutoff_hz * step_s
+        if not 0 < share < 1:
+            raise MeasurementError(f"low-pass: cut-off {self.cutoff_hz:g} Hz must lie below half the rate, {0.5 / step_s:g} Hz")
+        b, a = signal.butter(self.order, share)
+        if len(values) <= 3 * max(len(a), len(b)):
+            raise MeasurementError(f"low-pass: {len(values)} rows are too few for a filter of order {self.order}")
+        return np.asarray(signal.filtfilt(b, a, values))
+
+    def speed(self, positions: Array, step_s: float) -> Array:
+        """Speed (T,) by central differences of the filtered positions."""
+        return np.gradient(self(positions, step_s), step_s)
+
+
+def decimated(values: Array, keep_every: int) -> Array:
+    """Every n-th sample after an anti-alias filter (Chebyshev I, order 8, 0.05 dB, at 0.8 of the new Nyquist frequency,
+    forward and backward), along the first axis; the last sample is kept when n divides the length.
+
+    This is the convention of MATLAB's ``decimate``, with which the published results on EMPS were made.
+    """
+    if keep_every <= 1:
+        return values
+    b, a = signal.cheby1(8, 0.05, 0.8 / keep_every)
+    smooth = signal.filtfilt(b, a, values, axis=0, padlen=min(len(values) - 1, 3 * 8))
+    first = keep_every - (keep_every * int(np.ceil(len(values) / keep_every)) - len(values)) - 1
+    return np.asarray(smooth[first::keep_every])

@@ -1,0 +1,103 @@
+"""What looks wrong in a channel, said before anybody fits a model to it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ee_dist.trials.log import Array
+
+CLIPPED_SHARE = 0.02
+STUCK_SHARE = 0.5
+COUNTERS = (8, 10, 12, 14, 16, 32)
+
+
+def suspicions(name: str, values: Array) -> list[str]:
+    """Sentences about one series (T,): stuck, clipped, a wrapped counter."""
+    found: list[str] = []
+    spread = float(np.ptp(values))
+    if spread == 0:
+        return [f"{name}: stuck at {values[0]:.6g} for the whole record"]
+    run, start = _longest_run(values)
+    if run > STUCK_SHARE * len(values):
+        found.append(f"{name}: does not change for {run} rows of {len(values)}, from row {start}")
+    for edge, what in ((values.max(), "highest"), (values.min(), "lowest")):
+        at = values == edge
+        share = float(np.mean(at))
+        longest = _longest_true(at)
+        # A signal at rest sits at one value too: clipping shows where many separate runs end at the very same value.
+        if share > CLIPPED_SHARE and longest >= 5 and _runs(at) >= 2 and len(np.unique(values)) > 20:
+            found.append(f"{name}: clipped? {100 * share:.0f} % of the rows are at the {what} value, {edge:.6g}")
+    jump = float(np.max(np.abs(np.diff(values))))
+    for bits in COUNTERS:
+        size = float(2**bits)
+        whole = bool(np.all(values == np.round(values)))
+        if whole and values.min() >= 0 and values.max() < size and jump > 0.9 * size:
+            found.append(
+                f"{name}: jumps by {jump:.0f}, nearly 2^{bits}: a wrapped counter? set 'signed_bits: {bits}' if it is signed"
+            )
+            break
+    turn = 2 * np.pi
+    if not any("counter" in f for f in found) and 0.9 * turn < jump < 1.1 * turn and spread < 1.2 * turn:
+        found.append(f"{name}: jumps by a whole turn: an angle that wraps; set 'unwrap: true'")
+    return found
+
+
+def time_suspicion(median_s: float, length_s: float, declared: str) -> str | None:
+    """Whether the time column looks as if its unit were another one."""
+    if median_s >= 0.5:
+        return f"time: a row every {median_s:g} s and {length_s:g} s in all: is the column in ms rather than {declared!r}?"
+    if median_s < 2e-6:
+        return f"time: a row every {median_s:g} s and {length_s:g} s in all: is the column in s rather than {declared!r}?"
+    return None
+
+
+def unit_suspicion(name: str, values: Array, low: float, high: float, unit: str) -> str | None:
+    """Whether a joint position lies far outside its range: degrees for radians, millimetres for metres."""
+    reach = max(abs(low), abs(high))
+    seen = float(np.max(np.abs(values)))
+    if np.isfinite(reach) and reach > 0 and seen > 3 * reach:
+        return f"{name}: reaches {seen:.4g} {unit}, the joint only {reach:.4g}: another unit (deg, mm)?"
+    return None
+
+
+def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> str | None:
+    """Whether a measured speed is the derivative of its position: sign and scale."""
+    derived = np.gradient(position, step_s)
+    a, b = speed - speed.mean(), derived - derived.mean()
+    power = float(b @ b)
+    if power == 0 or float(a @ a) == 0:
+        return None
+    correlation = float(a @ b / np.sqrt(power * float(a @ a)))
+    slope = float(a @ b / power)
+    if correlation < -0.5:
+        return f"{name}: runs against the change of its position (correlation {correlation:.2f}): a swapped sign?"
+    if correlation > 0.8 and not 0.5 < slope < 2.0:
+        return f"{name}: is {slope:.3g} times the change of its position: another unit?"
+    return None
+
+
+def command_suspicion(name: str, command: Array, position: Array) -> str | None:
+    """Whether a joint runs away from its commands: a swapped sign of one of the two."""
+    a, b = command - command.mean(), position - position.mean()
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    if size > 0 and float(a @ b) / size < -0.5:
+        return f"{name}: moves against its command (correlation {float(a @ b) / size:.2f}): a swapped sign?"
+    return None
+
+
+def _longest_run(values: Array) -> tuple[int, int]:
+    """Length and start of the longest stretch of equal values."""
+    edges = np.flatnonzero(np.r_[True, np.diff(values) != 0, True])
+    lengths = np.diff(edges)
+    k = int(np.argmax(lengths))
+    return int(lengths[k]), int(edges[k])
+
+
+def _longest_true(flags: np.ndarray) -> int:
+    padded = np.r_[False, flags, False].astype(int)
+    edges = np.flatnonzero(np.diff(padded))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def _runs(flags: np.ndarray) -> int:
+    return int(np.sum(np.diff(np.r_[False, flags].astype(int)) == 1))

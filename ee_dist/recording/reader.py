@@ -1,0 +1,103 @@
+"""Gives back what ``writer.py`` was given, bit for bit; of a cut file, every record that is whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from google.protobuf.message import DecodeError
+
+from ee_dist.recording import codec, schemas, topics
+from ee_dist.recording.contents import Contents, read_contents
+from ee_dist.recording.errors import RecordingError
+from ee_dist.recording.records import HARDWARE, GenerationRecord, HypothesisRecord, RunRecord, TrialRecord
+from ee_dist.robots.serial import RobotFormatError, robot_from_json
+
+Record = TrialRecord | HypothesisRecord | GenerationRecord
+
+
+def read_run(path: str | Path) -> RunRecord:
+    """The run recorded in a file, whole or cut.
+
+    ``complete`` says that the run reached its end and nothing of it is missing. A trial of which rows are missing is
+    left out. Raises RecordingError if the file is not a recording, is too new, or lacks its robot.
+    """
+    return read_with_order(Path(path))[0]
+
+
+def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
+    """The run, and its records in the order in which they were written. Raises RecordingError as ``read_run`` does."""
+    contents, metadata, status = _read(path)
+    robot = contents.attachments.pop(topics.ROBOT_FILE, None)
+    if robot is None:
+        raise RecordingError(f"{path}: cut off before its robot was recorded; nothing can be recovered")
+    try:
+        run = RunRecord(robot_from_json(robot), metadata, contents.attachments)
+    except (RobotFormatError, UnicodeError) as error:
+        raise RecordingError(f"{path}: the attachment {topics.ROBOT_FILE} is not a robot of ours: {error}") from error
+    records = list(_records(path, contents))
+    for record in records:
+        if isinstance(record, TrialRecord):
+            run.trials.append(record)
+        elif isinstance(record, HypothesisRecord):
+            run.hypotheses.append(record)
+        else:
+            run.generations.append(record)
+    run.complete = contents.intact and status.get("complete") == "true"
+    return run, records
+
+
+def read_logs(path: str | Path) -> list[TrialRecord]:
+    """The hardware trials of a recording, in the order of the file. Raises RecordingError if there is none."""
+    path = Path(path)
+    contents = _read(path)[0]
+    found = [r for r in _records(path, contents) if isinstance(r, TrialRecord) and r.source == HARDWARE]
+    if not found:
+        raise RecordingError(f"{path}: no whole hardware trial in it; expected at least one")
+    return found
+
+
+def _read(path: Path) -> tuple[Contents, dict[str, str], dict[str, str]]:
+    """The contents, the metadata of the run and its status."""
+    contents = read_contents(path)
+    merged: dict[str, dict[str, str]] = {}
+    for record in contents.metadata:
+        merged.setdefault(record.name, {}).update(record.metadata)
+    version = merged.get(topics.FORMAT_RECORD, {}).get("format")
+    if version is None:
+        raise RecordingError(f"{path}: cut off before anything was recorded")
+    if version != topics.FORMAT:
+        raise RecordingError(f"{path}: recorded in format {version}; this version reads format {topics.FORMAT}")
+    return contents, merged.get(topics.RUN_RECORD, {}), merged.get(topics.STATUS_RECORD, {})
+
+
+def _records(path: Path, contents: Contents) -> Iterator[Record]:
+    try:
+        yield from _decoded(contents.messages)
+    except (DecodeError, ValueError) as error:
+        raise RecordingError(f"{path}: a message that contradicts its schema ({error})") from error
+
+
+def _decoded(messages: Iterable[tuple[str, bytes]]) -> Iterator[Record]:
+    """Whole records. Messages of other schemas are passed over, and rows whose trial message is lost."""
+    building: dict[int, codec.TrialBuilder] = {}
+    for schema, data in messages:
+        if schema == "ee_dist.Row":
+            row = schemas.Row.FromString(data)
+            builder = building.get(row.trial_id)
+            if builder is None:
+                continue
+            builder.add(row)
+            if builder.whole:
+                yield building.pop(row.trial_id).record()
+        elif schema == "ee_dist.Trial":
+            header = schemas.Trial.FromString(data)
+            builder = codec.TrialBuilder(header)
+            if builder.whole:
+                yield builder.record()
+            else:
+                building[header.id] = builder
+        elif schema == "ee_dist.Hypothesis":
+            yield codec.hypothesis_record(schemas.Hypothesis.FromString(data))
+        elif schema == "ee_dist.Generation":
+            yield codec.generation_record(schemas.Generation.FromString(data))

@@ -1,0 +1,70 @@
+"""What a run leaves behind, as objects: the writer stores them, the reader gives them back, viewers show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.engines.drivers import Commands, Network
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import SensorLog
+
+HARDWARE, PREDICTION = "hardware", "prediction"
+REPAIR, DIAGNOSIS = "repair", "diagnosis"
+
+
+@dataclass(frozen=True, eq=False)
+class TrialRecord:
+    """One run of a controller: on hardware, or what a model predicted for the hardware trial of the same index.
+
+    ``name`` is for people ("intact", "after the change", "trial 1"). ``believed`` is the hypothesis of a prediction.
+    """
+
+    index: int
+    name: str
+    source: str
+    driver: Network | Commands
+    log: SensorLog
+    believed: Hypothesis = ()
+
+
+@dataclass(frozen=True)
+class HypothesisRecord:
+    """A hypothesis with its error (lower is better).
+
+    ``rank`` 0 is the best of its generation; ``final`` marks those of the last.
+    """
+
+    pass_index: int
+    generation: int
+    rank: int
+    terms: Hypothesis
+    error: float
+    final: bool = False
+
+
+@dataclass(frozen=True)
+class GenerationRecord:
+    """One generation of a repair pass (best: fitness, m, higher is better) or a diagnosis pass (error, lower)."""
+
+    phase: str
+    pass_index: int
+    generation: int
+    best: float
+    mean: float
+    dominants: int
+    asked: int
+    simulated: int
+
+
+@dataclass
+class RunRecord:
+    """A whole run. ``metadata`` holds short strings (task, version, seed, digests), ``attachments`` files by name."""
+
+    robot: Robot
+    metadata: dict[str, str] = field(default_factory=dict)
+    attachments: dict[str, bytes] = field(default_factory=dict)
+    trials: list[TrialRecord] = field(default_factory=list)
+    hypotheses: list[HypothesisRecord] = field(default_factory=list)
+    generations: list[GenerationRecord] = field(default_factory=list)
+    complete: bool = False

@@ -1,0 +1,100 @@
+"""The diagnosis pass: evolve a hypothesis under which the model's logs match all measured ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.engines.contract import Rollout
+from ee_dist.evaluation.jobs import Evaluator, Job, Reduction
+from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
+from ee_dist.recording.records import DIAGNOSIS, GenerationRecord, HypothesisRecord
+from ee_dist.recovery.genome import LENGTH, decode
+from ee_dist.recovery.metrics import Metric
+from ee_dist.recovery.observer import Observer
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import SensorLog
+
+FINAL_RANKS = 10
+"""How many of the last population's different hypotheses are recorded."""
+
+
+class Judge:
+    """Errors of hypotheses against the trials so far: the mean over trials of the metric, lower is better."""
+
+    def __init__(
+        self, robot: Robot, trials: Sequence[tuple[object, SensorLog]], metric: Metric, evaluator: Evaluator
+    ) -> None:
+        self.robot, self.evaluator = robot, evaluator
+        self.trials: list[tuple[object, Reduction, int]] = [
+            (driver, metric.against(log), metric.steps(len(log))) for driver, log in trials
+        ]
+        self._models: dict[Hypothesis, Robot] = {}
+
+    def model(self, hypothesis: Hypothesis) -> Robot:
+        if hypothesis not in self._models:
+            self._models[hypothesis] = apply(self.robot, hypothesis)
+        return self._models[hypothesis]
+
+    def errors(self, hypotheses: Sequence[Hypothesis]) -> NDArray[np.float64]:
+        jobs = [
+            Job(Rollout(self.model(h), driver, steps), reduction)  # type: ignore[arg-type]
+            for h in hypotheses
+            for driver, reduction, steps in self.trials
+        ]
+        found = np.array(self.evaluator.evaluate(jobs), dtype=float).reshape(len(hypotheses), len(self.trials))
+        return found.mean(axis=1)
+
+
+def diagnose(
+    judge: Judge,
+    database: Sequence[Genomes],
+    budget: Budget,
+    seed: np.random.SeedSequence,
+    observer: Observer,
+    pass_index: int,
+) -> tuple[Hypothesis, Genomes, float]:
+    """Best hypothesis found, its genome and its error. Genomes of the database join the start."""
+    robot = judge.robot
+    seeds = np.array(database, dtype=np.int16).reshape(-1, LENGTH)
+    ga = GeneticAlgorithm(LENGTH, budget, seed, seeds)
+    observer.pass_started(DIAGNOSIS, pass_index, budget.generations)
+    while not ga.done:
+        genomes = ga.ask()
+        before = judge.evaluator.counts.copy()
+        errors = judge.errors([decode(g, robot) for g in genomes])
+        ga.tell(-errors)
+        finite = ga.scores[np.isfinite(ga.scores)]
+        observer.generation(
+            GenerationRecord(
+                phase=DIAGNOSIS,
+                pass_index=pass_index,
+                generation=ga.generation - 1,
+                best=float(-ga.scores[0]),
+                mean=float(-finite.mean()) if len(finite) else math.inf,
+                dominants=ga.dominants,
+                asked=len(genomes),
+                simulated=judge.evaluator.counts.simulated - before.simulated,
+            )
+        )
+        best = decode(ga.genomes[0], robot)
+        observer.hypotheses([HypothesisRecord(pass_index, ga.generation - 1, 0, best, float(-ga.scores[0]))])
+    observer.hypotheses(_final(ga, robot, pass_index))
+    return decode(ga.genomes[0], robot), ga.genomes[0].copy(), float(-ga.scores[0])
+
+
+def _final(ga: GeneticAlgorithm, robot: Robot, pass_index: int) -> list[HypothesisRecord]:
+    different: dict[Hypothesis, float] = {}
+    for genome, score in zip(ga.genomes, ga.scores, strict=True):
+        different.setdefault(decode(genome, robot), float(-score))
+        if len(different) == FINAL_RANKS:
+            break
+    last = ga.generation - 1
+    return [
+        HypothesisRecord(pass_index, last, rank, terms, error, final=True)
+        for rank, (terms, error) in enumerate(different.items())
+    ]

@@ -1,0 +1,125 @@
+"""The estimation-exploration loop: repair, try, diagnose, repair on the corrected model, try again.
+
+It sees hardware through ``trial`` alone. What is wrong with the hardware it must find out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Network
+from ee_dist.evaluation.jobs import Evaluator, Job, Whole
+from ee_dist.evolution.ga import Budget, Genomes
+from ee_dist.recording.records import HARDWARE, PREDICTION, TrialRecord
+from ee_dist.recovery.diagnosis import Judge, diagnose
+from ee_dist.recovery.metrics import Metric
+from ee_dist.recovery.observer import Observer
+from ee_dist.recovery.repair import repair
+from ee_dist.robots.model import Robot
+from ee_dist.trials.hardware import Hardware
+from ee_dist.trials.log import SensorLog
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The budget of a run; the defaults are the paper's."""
+
+    repair: Budget = Budget()
+    diagnosis: Budget = Budget()
+    compensating_trials: int = 4
+    steps: int = 1000
+
+    def __post_init__(self) -> None:
+        if self.compensating_trials < 1:
+            raise ValueError("plan: compensating_trials must be 1 or more")
+        if self.steps < 2:
+            raise ValueError("plan: steps must be 2 or more")
+
+
+@dataclass
+class Recovery:
+    """What a run found. ``distances_m`` is of the hardware: intact, after the change, then each compensating trial."""
+
+    intact_m: float = float("nan")
+    after_m: float = float("nan")
+    trials_m: list[float] = field(default_factory=list)
+    expected_m: list[float] = field(default_factory=list)
+    hypotheses: list[Hypothesis] = field(default_factory=list)
+    errors: list[float] = field(default_factory=list)
+    controllers: list[Network] = field(default_factory=list)
+
+
+def recover(
+    robot: Robot,
+    intact: Hardware,
+    changed: Hardware,
+    metric: Metric,
+    plan: Plan,
+    evaluator: Evaluator,
+    seed: np.random.SeedSequence,
+    observer: Observer,
+) -> Recovery:
+    """Run the loop. ``intact`` is the hardware before the change, ``changed`` the same robot after it.
+
+    Seeds: one for each repair pass, then one for each diagnosis pass, spawned from ``seed``.
+    """
+    passes = plan.compensating_trials
+    streams = seed.spawn(2 * passes + 1)
+    repair_seeds, diagnosis_seeds = streams[: passes + 1], streams[passes + 1 :]
+    result = Recovery()
+
+    best, expected = repair(robot, [], evaluator, plan.repair, plan.steps, repair_seeds[0], observer, 0)
+    controllers: list[Network] = [best]
+    result.expected_m.append(expected)
+    log = intact.trial(best, plan.steps)
+    result.intact_m = log.travel_m
+    observer.trial(TrialRecord(0, "intact", HARDWARE, best, log))
+    _predict(0, "intact", robot, best, (), evaluator, plan.steps, observer)
+
+    log = changed.trial(best, plan.steps)
+    result.after_m = log.travel_m
+    observer.trial(TrialRecord(1, "after the change", HARDWARE, best, log))
+    trials: list[tuple[Network, SensorLog]] = [(best, log)]
+    believed: list[Genomes] = []
+    for k in range(passes):
+        judge = Judge(robot, trials, metric, evaluator)
+        hypothesis, genome, error = diagnose(judge, believed, plan.diagnosis, diagnosis_seeds[k], observer, k)
+        believed.append(genome)
+        result.hypotheses.append(hypothesis)
+        result.errors.append(error)
+        name = "after the change" if k == 0 else f"trial {k}"
+        _predict(k + 1, name, robot, trials[-1][0], hypothesis, evaluator, plan.steps, observer)
+
+        model = apply(robot, hypothesis)
+        best, expected = repair(
+            model, controllers, evaluator, plan.repair, plan.steps, repair_seeds[k + 1], observer, k + 1
+        )
+        controllers.append(best)
+        result.expected_m.append(expected)
+        log = changed.trial(best, plan.steps)
+        result.trials_m.append(log.travel_m)
+        observer.trial(TrialRecord(k + 2, f"trial {k + 1}", HARDWARE, best, log))
+        trials.append((best, log))
+    _predict(passes + 1, f"trial {passes}", robot, best, result.hypotheses[-1], evaluator, plan.steps, observer)
+    result.controllers = controllers
+    return result
+
+
+def _predict(
+    index: int,
+    name: str,
+    robot: Robot,
+    driver: Network,
+    hypothesis: Hypothesis,
+    evaluator: Evaluator,
+    steps: int,
+    observer: Observer,
+) -> None:
+    """Record what the model under this hypothesis does in the trial of that index."""
+    rollout = Rollout(apply(robot, hypothesis), driver, steps, pose=True)
+    (log,) = evaluator.evaluate([Job(rollout, Whole())])
+    observer.trial(TrialRecord(index, name, PREDICTION, driver, log, hypothesis))

@@ -1,0 +1,295 @@
+"""The robot as immutable data: what an engine needs to build it and what its drives and sensors do.
+
+A robot is a tree of rigid parts. As in URDF, the frame of a part is the frame of the joint that carries it;
+the frame of the root part is the robot's own. Lengths are metres, masses kilograms, angles radians, torques
+newton metres; for a sliding joint read metres for radians and newtons for newton metres.
+
+Nothing here knows an engine, an effect or a file. An effect changes a robot with the ``with_*`` methods,
+which return a new robot.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+Vec3 = tuple[float, float, float]
+Quat = tuple[float, float, float, float]
+"""Unit quaternion, scalar last (x, y, z, w)."""
+
+NO_TURN: Quat = (0.0, 0.0, 0.0, 1.0)
+ZERO3: Vec3 = (0.0, 0.0, 0.0)
+
+
+class RobotError(ValueError):
+    """A robot description that contradicts itself, or a name it does not have."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A collision shape of a part, placed in the frame of the part.
+
+    ``size`` is (half x, half y, half z) of a box, (radius,) of a sphere, (radius, length) of a capsule or cylinder
+    along its own z axis, where the length of a capsule leaves out its caps.
+    """
+
+    kind: str
+    size: tuple[float, ...]
+    position_m: Vec3 = ZERO3
+    rotation: Quat = NO_TURN
+
+
+@dataclass(frozen=True)
+class Part:
+    """A rigid part. ``inertia_kg_m2`` is (xx, yy, zz, xy, xz, yz) about the centre of mass, in the axes of the part."""
+
+    name: str
+    mass_kg: float
+    com_m: Vec3
+    inertia_kg_m2: tuple[float, float, float, float, float, float]
+    shapes: tuple[Shape, ...] = ()
+    group: str = ""
+    """The limb that the part belongs to; a part lost takes its whole subtree with it."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A hinge or slide between two parts (or a rigid bond, ``fixed``).
+
+    ``position_m`` and ``rotation`` place the child's frame in the parent's at joint position zero; ``axis`` is in the
+    child's frame. Positions are limited to [lower, upper].
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    position_m: Vec3
+    axis: Vec3
+    lower: float
+    upper: float
+    rotation: Quat = NO_TURN
+    freedom: float = 1.0
+    """Share of the range about position zero that a jam leaves; commands and sensors keep their scale."""
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """The positions that the joint can reach."""
+        return self.lower * self.freedom, self.upper * self.freedom
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Motor, gear and position controller of one joint; the fields below the line say what may be wrong with it.
+
+    Active torque = clip(kp*error + ki*integral(error) - kd*speed, +-torque_limit); a brushed motor driven by voltage
+    then loses ``torque_limit/speed_limit`` times its speed to back-EMF, so ``speed_limit`` is the speed at no load.
+    All neutral values leave the arithmetic bit for bit as if the field did not exist.
+    """
+
+    joint: str
+    kp: float
+    ki: float
+    kd: float
+    torque_limit: float
+    speed_limit: float
+    rotor_inertia: float = 0.0
+    """Reflected to the joint, kg.m^2 (kg for a slide)."""
+    supply_nominal_v: float = 0.0
+    """If positive, active torque scales with (measured supply) / (this)."""
+    # -- what may be wrong or missing (neutral values); for a slide read m for rad and N for N.m --
+    strength: float = 1.0
+    command_gain: float = 1.0
+    zero_offset: float = 0.0  # rad by which the controller's zero lies off the joint's
+    deadband: float = 0.0  # rad of error on either side that the controller leaves alone
+    delay_s: float = 0.0
+    viscous: float = 0.0  # N.m.s/rad
+    coulomb: float = 0.0  # N.m
+    stribeck: float = 0.0  # N.m on top at rest, gone as exp(-|speed| / stribeck_speed)
+    stribeck_speed: float = 0.1
+    stribeck_load: float = 0.0  # the same as a share of the torque through the gear
+    load_friction: float = 0.0
+    """Dry friction |load_friction * motor torque - backdrive_friction * external torque|: equal shares follow the
+    torque through the gear."""
+    backdrive_friction: float = 0.0
+    quadratic_friction: float = 0.0  # 1/(N.m), times the square of the torque through the gear
+    friction_asymmetry: float = 0.0  # share by which dry friction is larger moving up, and smaller moving down
+    viscous_asymmetry: float = 0.0
+    offset_torque: float = 0.0
+    backlash: float = 0.0  # rad of play between motor and joint, in all
+    compliance: float = 0.0  # rad/(N.m) by which motor and joint twist apart
+    spring: float = 0.0  # N.m/rad towards spring_rest (rad)
+    spring_rest: float = 0.0
+    brake: float = 0.0  # N.m of dry friction of a brake
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One channel. ``kind``: touch (of a part), angle (scaled to [-1, 1] by the joint's range), position, velocity,
+    torque (of a joint), height or tilt of the root part."""
+
+    name: str
+    kind: str
+    target: str
+    unit: str = "1"
+    gain: float = 1.0
+    bias: float = 0.0
+    noise: float = 0.0
+    delay_s: float = 0.0
+    quantum: float = 0.0
+    stuck: float = 0.0
+    """Share of its movement since ``stuck_from_s`` that the channel does not report; at 1 it is frozen."""
+    stuck_from_s: float = 0.0
+    dropout: float = 0.0
+    missed_touch: float = 0.0
+    """s that a touch must last before it is reported."""
+
+
+@dataclass(frozen=True)
+class World:
+    """Floor and surroundings. A tilt turns gravity, so positions stay in the frame of the floor."""
+
+    gravity_m_s2: float = 9.81
+    tilt_x_rad: float = 0.0
+    tilt_y_rad: float = 0.0
+    friction: float = 1.0
+    compliance_m_n: float = 0.0
+    push_x_n: float = 0.0
+    push_y_n: float = 0.0
+    drag_n_s_m: float = 0.0
+    supply_sag: float = 0.0
+    has_floor: bool = True
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """Between controller and drives. Motor m obeys controller output ``source[m]``; hidden neuron k is scaled."""
+
+    source: tuple[int, ...]
+    hidden_gain: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Law:
+    """A term of a user's own in the drive path: a registered function by name, its joint and its values."""
+
+    name: str
+    joint: str
+    values: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A whole robot. ``free_base`` robots move about; otherwise the root part is bolted to the world."""
+
+    name: str
+    parts: tuple[Part, ...]
+    joints: tuple[Joint, ...]
+    drives: tuple[Drive, ...]
+    sensors: tuple[Sensor, ...]
+    wiring: Wiring
+    world: World = World()
+    laws: tuple[Law, ...] = ()
+    free_base: bool = True
+    start_position_m: Vec3 = ZERO3
+    start_rotation: Quat = NO_TURN
+    time_step_s: float = 0.01
+    lost: tuple[str, ...] = ()
+    """Names of parts broken off: kept in the description, so that channels keep their places, absent in the engine."""
+
+    # -- look-ups ----------------------------------------------------------------------------------------------------
+
+    @property
+    def root(self) -> Part:
+        return self.parts[0]
+
+    @property
+    def motor_names(self) -> tuple[str, ...]:
+        return tuple(d.joint for d in self.drives)
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        return tuple(s.name for s in self.sensors)
+
+    def joint(self, name: str) -> Joint:
+        return _find(self.joints, "name", name, "joint")
+
+    def part(self, name: str) -> Part:
+        return _find(self.parts, "name", name, "part")
+
+    def joint_of(self, part: str) -> Joint:
+        """The joint that carries a part."""
+        return _find(self.joints, "child", part, "carried part")
+
+    def subtree(self, part: str) -> tuple[str, ...]:
+        """A part and everything it carries."""
+        found = [part]
+        for name in found:
+            found.extend(j.child for j in self.joints if j.parent == name)
+        return tuple(found)
+
+    @cached_property
+    def present_parts(self) -> tuple[Part, ...]:
+        return tuple(p for p in self.parts if p.name not in self.lost)
+
+    @cached_property
+    def present_joints(self) -> tuple[Joint, ...]:
+        return tuple(j for j in self.joints if j.child not in self.lost)
+
+    @cached_property
+    def digest(self) -> str:
+        """Content address: equal robots, and only they, have equal digests."""
+        return hashlib.sha256(repr(self).encode()).hexdigest()
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Cached look-ups are rebuilt where they are needed: they would double the bytes sent to a worker.
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+
+    # -- changes -----------------------------------------------------------------------------------------------------
+
+    def with_part(self, name: str, **changes: Any) -> Robot:
+        return replace(self, parts=_changed(self.parts, "name", name, "part", changes))
+
+    def with_joint(self, name: str, **changes: Any) -> Robot:
+        return replace(self, joints=_changed(self.joints, "name", name, "joint", changes))
+
+    def with_drive(self, joint: str, **changes: Any) -> Robot:
+        return replace(self, drives=_changed(self.drives, "joint", joint, "drive", changes))
+
+    def with_sensor(self, name: str, **changes: Any) -> Robot:
+        return replace(self, sensors=_changed(self.sensors, "name", name, "sensor", changes))
+
+    def with_world(self, **changes: Any) -> Robot:
+        return replace(self, world=replace(self.world, **changes))
+
+    def with_law(self, law: Law) -> Robot:
+        return replace(self, laws=(*self.laws, law))
+
+    def map_drive(self, joint: str, change: Callable[[Drive], Drive]) -> Robot:
+        _find(self.drives, "joint", joint, "drive")
+        return replace(self, drives=tuple(change(d) if d.joint == joint else d for d in self.drives))
+
+    def without(self, part: str) -> Robot:
+        """The robot after ``part`` broke off at its joint, with all that it carried."""
+        self.joint_of(part)
+        gone = set(self.lost) | set(self.subtree(part))
+        return replace(self, lost=tuple(p.name for p in self.parts if p.name in gone))
+
+
+def _find(items: tuple[Any, ...], key: str, value: str, what: str) -> Any:
+    for item in items:
+        if getattr(item, key) == value:
+            return item
+    names = ", ".join(getattr(item, key) for item in items)
+    raise RobotError(f"no {what} named {value!r}; there are: {names}")
+
+
+def _changed(items: tuple[Any, ...], key: str, value: str, what: str, changes: dict[str, Any]) -> tuple[Any, ...]:
+    _find(items, key, value, what)
+    return tuple(replace(item, **changes) if getattr(item, key) == value else item for item in items)

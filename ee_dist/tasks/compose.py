@@ -1,0 +1,81 @@
+"""From Hydra's composed tree to typed settings, and from a command line as people type it to one Hydra accepts."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, get_type_hints
+
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from ee_dist.tasks.config import Config, ConfigError, check_keys, one_of
+
+TASKS = ("recover", "view", "online", "study", "trial", "compare", "explain", "improve", "import")
+_SCENARIO = re.compile(r"^(\+{0,2}scenario)=([0-9, ]+)$")
+
+
+def quoted(arguments: list[str]) -> list[str]:
+    """Quote bare integers of the scenario override: Hydra takes a group's choice only as a string."""
+
+    def quote(argument: str) -> str:
+        match = _SCENARIO.match(argument)
+        if not match:
+            return argument
+        numbers = ",".join(f"'{n.strip()}'" for n in match.group(2).split(",") if n.strip())
+        return f"{match.group(1)}={numbers}"
+
+    return [quote(a) for a in arguments]
+
+
+def config_folder() -> Path:
+    """The folder of configs: beside the package in a checkout, inside it where it was installed."""
+    package = Path(__file__).resolve().parent.parent
+    for folder in (package.parent / "conf", package / "conf"):
+        if (folder / "config.yaml").is_file():
+            return folder
+    raise ConfigError(f"no conf/config.yaml beside {package} or in it: the installation is incomplete")
+
+
+def task_module(name: str) -> ModuleType:
+    """The module of a verb. Raises ConfigError for an unknown one."""
+    one_of("task", name, TASKS)
+    return importlib.import_module(f"ee_dist.tasks.{name}_" if name == "import" else f"ee_dist.tasks.{name}")
+
+
+def settings(composed: DictConfig) -> tuple[Config, ModuleType, Any]:
+    """Checked settings, the module of the task and its options. Raises ConfigError in one line."""
+    tree = {str(k): v for k, v in composed.items() if k != "hydra"}
+    task = tree.pop("task")
+    check_keys("", tree, Config)
+    hints = get_type_hints(Config)
+    for f in fields(Config):
+        kind = next((a for a in (hints[f.name], *getattr(hints[f.name], "__args__", ())) if is_dataclass(a)), None)
+        if kind is not None and isinstance(tree.get(f.name), DictConfig):
+            check_keys(f.name, tree[f.name], kind)  # type: ignore[arg-type]
+    module = task_module(str(task.name))
+    check_keys("task", task, module.Options)
+    config = _typed(Config, OmegaConf.create(tree), "")
+    options = _typed(module.Options, task, "task.")
+    return config, module, options
+
+
+def _typed(kind: Any, tree: Any, prefix: str) -> Any:
+    try:
+        merged = OmegaConf.merge(OmegaConf.structured(kind), tree)
+        return OmegaConf.to_object(merged)
+    except OmegaConfBaseException as error:
+        raise ConfigError(plain(error, prefix)) from None
+
+
+def plain(error: OmegaConfBaseException, prefix: str = "") -> str:
+    """OmegaConf's message in one line, with the key in front."""
+    text = str(error.msg or error).strip().splitlines()[0]
+    cause = error.__cause__
+    if isinstance(cause, ValueError) and not isinstance(cause, OmegaConfBaseException):
+        text = str(cause)
+    key = error.full_key
+    return f"{prefix}{key}: {text}" if key else text

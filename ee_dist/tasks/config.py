@@ -1,0 +1,166 @@
+"""The composed configuration as typed, validated data. Hydra composes; here it is checked, in one place, in plain words."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from ee_dist.effects.catalogue import Hypothesis, from_dict
+from ee_dist.evolution.ga import Budget
+from ee_dist.recovery.loop import Plan
+from ee_dist.recovery.metrics import Distance, Metric, RollingMean
+
+ENGINES = ("pybullet", "mujoco")
+EVALUATORS = ("ray", "serial")
+
+
+class ConfigError(ValueError):
+    """A setting that cannot be: which one, why, and what would be right."""
+
+
+def one_of(what: str, value: str, allowed: tuple[str, ...]) -> str:
+    """The value, if it is allowed. Raises ConfigError with the nearest names."""
+    if value not in allowed:
+        near = difflib.get_close_matches(str(value), allowed, n=3, cutoff=0.4)
+        hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(allowed)}"
+        raise ConfigError(f"{what}={value}: no such choice; {hint}")
+    return value
+
+
+@dataclass
+class RobotConfig:
+    name: str = "quadruped"
+    urdf: str | None = None
+    drives: str | None = None
+
+
+@dataclass
+class EngineConfig:
+    name: str = "pybullet"
+    threads: int = 0
+
+    def __post_init__(self) -> None:
+        one_of("engine", self.name, ENGINES)
+        if self.threads < 0:
+            raise ConfigError(f"engine.threads={self.threads}: must be 0 (automatic) or more")
+
+
+@dataclass
+class EvaluatorConfig:
+    name: str = "ray"
+    workers: int = 0
+    chunk: int = 0
+    cache: bool = True
+
+    def __post_init__(self) -> None:
+        one_of("evaluator", self.name, EVALUATORS)
+        for key in ("workers", "chunk"):
+            if getattr(self, key) < 0:
+                raise ConfigError(f"evaluator.{key}={getattr(self, key)}: must be 0 (automatic) or more")
+
+
+@dataclass
+class RayConfig:
+    address: str | None = None
+
+
+@dataclass
+class MetricConfig:
+    name: str = "rolling_mean"
+    header: int = 60
+    window: int = 10
+
+    def __post_init__(self) -> None:
+        one_of("metric", self.name, ("rolling_mean", "distance"))
+        self.build()
+
+    def build(self) -> Metric:
+        if self.name == "distance":
+            return Distance()
+        try:
+            return RollingMean(self.header, self.window)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+
+
+@dataclass
+class BudgetConfig:
+    name: str = "paper"
+    population: int = 200
+    generations: int = 40
+    diagnosis_population: int = 200
+    diagnosis_generations: int = 40
+    tournament: int = 3
+    mutation: float = 0.01
+    crossovers: int = 24
+    compensating_trials: int = 4
+    steps: int = 1000
+
+    def __post_init__(self) -> None:
+        self.plan()
+
+    def plan(self) -> Plan:
+        shared = (self.tournament, self.mutation, self.crossovers)
+        try:
+            return Plan(
+                repair=Budget(self.population, self.generations, *shared),
+                diagnosis=Budget(self.diagnosis_population, self.diagnosis_generations, *shared),
+                compensating_trials=self.compensating_trials,
+                steps=self.steps,
+            )
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+
+
+@dataclass
+class ScenarioConfig:
+    number: int = -1
+    title: str = ""
+    changes: list[dict[str, Any]] = field(default_factory=list)
+
+    def hidden(self) -> Hypothesis:
+        """What happens to the physical robot. Raises EffectError for an unknown effect or value."""
+        return tuple(from_dict(entry) for entry in self.changes)
+
+
+@dataclass
+class Config:
+    """Everything but the options of the chosen task, which are the task's own dataclass."""
+
+    seed: int = 0
+    noise: float = 0.0
+    plugins: list[str] = field(default_factory=list)
+    measured: Any = None
+    model: str | None = None
+    effect: Any = None
+    hidden: Any = None
+    log: str | None = None
+    robot: RobotConfig = field(default_factory=RobotConfig)
+    engine: EngineConfig = field(default_factory=EngineConfig)
+    evaluator: EvaluatorConfig = field(default_factory=EvaluatorConfig)
+    ray: RayConfig = field(default_factory=RayConfig)
+    metric: MetricConfig = field(default_factory=MetricConfig)
+    budget: BudgetConfig = field(default_factory=BudgetConfig)
+    scenario: ScenarioConfig | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.seed < 2**63:
+            raise ConfigError(f"seed={self.seed}: must be a whole number from 0 to 2^63 - 1")
+        if not 0.0 <= self.noise <= 1.0:
+            raise ConfigError(f"noise={self.noise}: must be a share of the channels' range, from 0 to 1")
+
+
+def unknown_key(owner: str, key: str, known: tuple[str, ...]) -> ConfigError:
+    near = difflib.get_close_matches(key, known, n=3, cutoff=0.6)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
+    where = f"{owner}.{key}" if owner else key
+    return ConfigError(f"{where}: no such setting; {hint}")
+
+
+def check_keys(owner: str, given: Any, kind: type) -> None:
+    """Raise ConfigError for keys that the dataclass does not have."""
+    known = tuple(f.name for f in fields(kind))
+    for key in given:
+        if str(key) not in known:
+            raise unknown_key(owner, str(key), known)

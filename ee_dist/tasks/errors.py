@@ -1,0 +1,34 @@
+"""Which errors are a user's to mend, and Hydra's messages in one line."""
+
+from __future__ import annotations
+
+import re
+
+from hydra.errors import HydraException
+
+from ee_dist.effects.catalogue import EffectError
+from ee_dist.engines.contract import EngineError
+from ee_dist.evaluation.ray_actors import EvaluatorError
+from ee_dist.recording.errors import RecordingError
+from ee_dist.robots.model import RobotError
+from ee_dist.tasks.config import ConfigError
+from ee_dist.trials.log import LogError
+
+USER_ERRORS = (ConfigError, EffectError, EngineError, EvaluatorError, LogError, RecordingError, RobotError)
+
+
+def hydra_message(error: HydraException) -> str:
+    """What was wrong with the command line, without Hydra's advice to programmers."""
+    text = str(error).strip()
+    missing = re.match(
+        r"(?s)(?:In '.*?': )?Could not find '([^']+)'\s*Available options in '([^']+)':\s*(.*?)(?:\nConfig search path|$)",
+        text,
+    )
+    if missing:
+        wanted, group, options = missing.groups()
+        names = sorted(options.split(), key=lambda n: (0, int(n), "") if n.isdigit() else (1, 0, n))
+        return f"{group}={wanted.split('/')[-1]}: no such choice; there are: {', '.join(names)}"
+    absent = re.match(r"Could not override '([^']+)'", text)
+    if absent:
+        return f"{absent.group(1)}: no such setting; 'python -m ee_dist --help' lists them"
+    return text.splitlines()[0] if text else type(error).__name__

@@ -1,0 +1,76 @@
+"""Progress of a run in the terminal: which pass, how far, how good, how long still."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from ee_dist.recording.records import HARDWARE, REPAIR, GenerationRecord, TrialRecord
+from ee_dist.recovery.observer import Observer
+
+
+class PassProgress(Observer):
+    """A bar for the pass under way and one for the run; where there is no terminal, a line for each pass and trial.
+
+    The run's bar counts robot-steps expected, since a repair pass costs many times a diagnosis pass.
+    """
+
+    def __init__(self, console: Console, passes: dict[str, int], weights: dict[str, float]) -> None:
+        self.console = console
+        self.live = console.is_terminal
+        self.weights = weights
+        self.started = time.monotonic()
+        self.done = 0.0
+        self.total = sum(count * weights[phase] for phase, count in passes.items())
+        self.passes = passes
+        self.bars = Progress(
+            TextColumn("{task.description}", justify="left"),
+            BarColumn(bar_width=28),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[best]}"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            disable=not self.live,
+        )
+        self.run_bar = self.bars.add_task("whole run (%)", total=100, best="")
+        self.pass_bar = self.bars.add_task("starting", total=1, best="")
+        self.phase, self.index, self.generations = "", 0, 1
+
+    def __enter__(self) -> PassProgress:
+        self.bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.bars.stop()
+
+    def pass_started(self, phase: str, pass_index: int, generations: int) -> None:
+        self.phase, self.index, self.generations = phase, pass_index, generations + 1
+        name = f"{phase} {pass_index + 1} of {self.passes[phase]}"
+        self.bars.reset(self.pass_bar, total=self.generations, description=name, best="")
+
+    def generation(self, record: GenerationRecord) -> None:
+        self.done += self.weights[self.phase] / self.generations
+        good = f"best {record.best:.2f} m" if record.phase == REPAIR else f"error {record.best:.4f}"
+        self.bars.update(self.pass_bar, advance=1, best=good)
+        self.bars.update(self.run_bar, completed=round(100 * self.done / self.total))
+        if record.generation == self.generations - 1:
+            self._say(f"{record.phase} pass {record.pass_index + 1}: {good}")
+
+    def trial(self, record: TrialRecord) -> None:
+        if record.source == HARDWARE:
+            self._say(f"hardware, {record.name}: {record.log.travel_m:.2f} m")
+
+    def _say(self, text: str) -> None:
+        seconds = time.monotonic() - self.started
+        left = seconds * (self.total - self.done) / self.done if self.done else float("nan")
+        self.bars.console.print(
+            f"[dim]{seconds:6.0f} s[/dim]  {text}  [dim]about {left:.0f} s left[/dim]", highlight=False
+        )

@@ -1,0 +1,161 @@
+"""task=recover, the main job: break the robot, let it find out what happened, and restore its function."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.recording.reader import read_run
+from ee_dist.recording.records import DIAGNOSIS, REPAIR
+from ee_dist.recording.writer import RunWriter
+from ee_dist.recovery.loop import Recovery, recover
+from ee_dist.recovery.observer import Observers
+from ee_dist.tasks.compose import config_folder
+from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.observers import Recorder
+from ee_dist.tasks.outcome import ResultDigest, Score, score
+from ee_dist.tasks.progress import PassProgress
+from ee_dist.tasks.summary import (
+    Stopwatch,
+    config_digest,
+    config_yaml,
+    hypothesis_list,
+    package_version,
+    write_summary,
+)
+from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
+from ee_dist.viewing.rerun_scene import write_rrd
+
+
+@dataclass
+class Options:
+    name: str = "recover"
+
+
+def run(config: Config, options: Options, out: Path) -> None:
+    """Write recovery.mcap, recovery.rrd and summary.json into ``out`` and print the result."""
+    console, watch = Console(), Stopwatch()
+    if config.scenario is None:
+        numbers = sorted(int(p.stem) for p in (config_folder() / "scenario").glob("*.yaml") if p.stem.isdigit())
+        raise ConfigError(f"which scenario? add one, such as +scenario=8; there are: {', '.join(map(str, numbers))}")
+    scenario, plan, metric = config.scenario, config.budget.plan(), config.metric.build()
+    hidden = scenario.hidden()
+    robot = build_robot(config)
+    apply(robot, hidden)  # A wrong target must be said before hours of work, not after.
+    hardware = engine_maker(config, alone=True)()
+    seeds = np.random.SeedSequence(config.seed)
+    search_seed, intact_seed, changed_seed = seeds.spawn(3)
+    intact = PhysicalRobot(hardware, robot, (), intact_seed, config.noise)
+    changed = PhysicalRobot(hardware, robot, hidden, changed_seed, config.noise)
+    metadata = {
+        "task": "recover",
+        "version": package_version(),
+        "seed": str(config.seed),
+        "engine": config.engine.name,
+        "metric": config.metric.name,
+        "budget": config.budget.name,
+        "scenario": str(scenario.number),
+        "title": scenario.title,
+        "config_digest": config_digest(config, options),
+    }
+    console.print(f"Scenario {scenario.number}: {scenario.title}. Seed {config.seed}, budget {config.budget.name}, "
+                  f"{config.engine.name}.", highlight=False)  # fmt: skip
+    path = out / "recovery.mcap"
+    digest = ResultDigest()
+    passes = {REPAIR: plan.compensating_trials + 1, DIAGNOSIS: plan.compensating_trials}
+    share = metric.steps(plan.steps) * plan.compensating_trials / 2
+    weights = {
+        REPAIR: plan.repair.population * plan.repair.generations * float(plan.steps) / 2,
+        DIAGNOSIS: plan.diagnosis.population * plan.diagnosis.generations * share / 4,
+    }
+    with (
+        evaluator_of(config) as evaluator,
+        RunWriter(path, robot, metadata, {"config.yaml": config_yaml(config, options).encode()}) as writer,
+        PassProgress(console, passes, weights) as progress,
+    ):
+        observer = Observers(Recorder(writer), digest, progress)
+        result = recover(robot, intact, changed, metric, plan, evaluator, search_seed, observer)
+        truth = changed.reveal()
+        writer.finish({"result_digest": digest.hex, "truth": json.dumps([t.as_dict() for t in truth])})
+        counts = evaluator.counts
+    hardware.close()
+    recording = out / "recovery.rrd"
+    write_rrd(read_run(path), recording)
+    final = score(result.intact_m, result.trials_m, result.hypotheses[-1], truth)
+    summary = write_summary(out, "recover", config, options, watch, digest.hex, {
+        "scenario": scenario.number,
+        "title": scenario.title,
+        "metric": config.metric.name,
+        "budget": config.budget.name,
+        "distance_m": {"intact": result.intact_m, "after": result.after_m, "trials": result.trials_m},
+        "expected_m": result.expected_m,
+        "hypotheses": [hypothesis_list(h) for h in result.hypotheses],
+        "fitness": digest.fitness,
+        "diagnosis_error": result.errors,
+        "dominants": digest.dominants,
+        "truth": hypothesis_list(truth),
+        "recovered_fraction": final.recovered_fraction,
+        "restored": final.restored,
+        "diagnosis": {"found": final.found, "true": final.true, "invented": final.invented, "right": final.right},
+        "evaluations": {"asked": counts.asked, "simulated": counts.simulated, "steps": counts.steps,
+                        "asked_steps": counts.asked_steps},
+    })  # fmt: skip
+    wall, _ = watch.read()
+    _print(console, result, truth, final)
+    saved = 1 - counts.simulated / max(counts.asked, 1)
+    console.print(
+        f"\n{counts.asked:,} evaluations asked, {counts.simulated:,} simulated ({saved:.0%} saved), "
+        f"{counts.steps / 1e6:.1f} million robot-steps, {wall:.0f} s. Digest {digest.hex[:16]}.",
+        highlight=False,
+    )
+    for label, file in (("recording", path), ("rerun", recording), ("summary", summary)):
+        console.print(f"  {label:<10}{os.path.relpath(file)}", highlight=False, soft_wrap=True)
+    console.print(
+        f"Look at it: python -m ee_dist task=view log={os.path.relpath(path)}", highlight=False, soft_wrap=True
+    )
+
+
+def _print(console: Console, result: Recovery, truth: Hypothesis, final: Score) -> None:
+    table = Table(box=SIMPLE, pad_edge=False)
+    table.add_column("trial")
+    table.add_column("distance\n(m)", justify="right")
+    table.add_column("of\nintact", justify="right")
+    table.add_column("diagnosis\nerror", justify="right")
+    table.add_column("what the robot believed", overflow="fold")
+
+    def share(m: float) -> str:
+        return f"{m / result.intact_m:.0%}" if result.intact_m > 0 else "-"
+
+    table.add_row("intact", f"{result.intact_m:.2f}", "100%", "", "nothing is wrong")
+    table.add_row("after the change", f"{result.after_m:.2f}", share(result.after_m), "", "")
+    for k, metres in enumerate(result.trials_m):
+        table.add_row(
+            f"{k + 1}", f"{metres:.2f}", share(metres), f"{result.errors[k]:.5f}", words(result.hypotheses[k])
+        )
+    table.add_section()
+    table.add_row("truth", "", "", "", words(truth))
+    console.print(table)
+    verdict = "restored" if final.restored else "not restored"
+    console.print(
+        f"Function {verdict}: best trial {final.recovered_fraction:.0%} of intact. "
+        f"Diagnosis: {final.found} of {final.true} true effects at their place, {final.invented} that are not there.",
+        highlight=False,
+    )
+
+
+def words(hypothesis: Hypothesis) -> str:
+    """A line for each term."""
+    lines = []
+    for t in hypothesis:
+        much = " ".join(f"{value:.3g}" for _, value in t.values if value)
+        lines.append(f"{t.effect} {t.target} {much}".rstrip())
+    return "\n".join(lines) or "nothing is wrong"

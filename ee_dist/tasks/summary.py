@@ -1,0 +1,96 @@
+"""summary.json, the file other programs read: documented keys, always the same, written whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import time
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from omegaconf import OmegaConf
+
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.tasks.config import Config
+
+FORMAT = 1
+
+
+def package_version() -> str:
+    try:
+        return version("ee_dist")
+    except PackageNotFoundError:
+        return "0+checkout"
+
+
+def config_yaml(config: Config, options: Any) -> str:
+    """All settings of a job as YAML."""
+    tree = OmegaConf.to_container(OmegaConf.structured(config))
+    return OmegaConf.to_yaml(OmegaConf.create({"task": OmegaConf.to_container(OmegaConf.structured(options)), **tree}))  # type: ignore[dict-item]
+
+
+def config_digest(config: Config, options: Any) -> str:
+    """Of the settings that decide the result: not of where and how it is computed."""
+    tree = OmegaConf.create(config_yaml(config, options))
+    for key in ("evaluator", "ray", "plugins"):
+        tree.pop(key, None)
+    tree.engine.pop("threads", None)
+    return hashlib.sha256(OmegaConf.to_yaml(tree, sort_keys=True).encode()).hexdigest()
+
+
+class Stopwatch:
+    """Wall and processor time (s) since it was made, children included."""
+
+    def __init__(self) -> None:
+        self.wall, self.cpu = time.monotonic(), self._cpu()
+
+    @staticmethod
+    def _cpu() -> float:
+        t = os.times()
+        return t.user + t.system + t.children_user + t.children_system
+
+    def read(self) -> tuple[float, float]:
+        return time.monotonic() - self.wall, self._cpu() - self.cpu
+
+
+def hypothesis_list(hypothesis: Hypothesis) -> list[dict[str, Any]]:
+    """[{effect, target, values}]."""
+    return [{"effect": t.effect, "target": t.target, "values": dict(t.values)} for t in hypothesis]
+
+
+def write_summary(
+    out: Path, task: str, config: Config, options: Any, watch: Stopwatch, result_digest: str, rest: Mapping[str, Any]
+) -> Path:
+    """Write ``out/summary.json``. Numbers that are not finite become null: JSON has none."""
+    wall, cpu = watch.read()
+    content = {
+        "format": FORMAT,
+        "task": task,
+        "version": package_version(),
+        "config_digest": config_digest(config, options),
+        "result_digest": result_digest,
+        "seed": config.seed,
+        "engine": config.engine.name,
+        "wall_s": round(wall, 3),
+        "cpu_s": round(cpu, 3),
+        **rest,
+    }
+    path = out / "summary.json"
+    partial = path.with_suffix(".json.part")
+    partial.write_text(json.dumps(_finite(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    partial.replace(path)
+    return path
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {str(k): _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    return value

@@ -1,0 +1,67 @@
+"""Concrete parts from settings: robot, engine, evaluator. Tasks build with these and nothing else does."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from ee_dist.effects.catalogue import load_plugin
+from ee_dist.engines.contract import Engine
+from ee_dist.evaluation.cache import CachedEvaluator
+from ee_dist.evaluation.jobs import Evaluator
+from ee_dist.evaluation.ray_actors import RayEvaluator
+from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.robots.model import Robot
+from ee_dist.robots.quadruped import quadruped
+from ee_dist.tasks.config import Config, one_of
+
+
+@dataclass(frozen=True)
+class EngineMaker:
+    """Makes an engine in whatever process it is called; picklable. Loads the user's own effects there first."""
+
+    name: str
+    threads: int = 1
+    plugins: tuple[str, ...] = ()
+
+    def __call__(self) -> Engine:
+        for path in self.plugins:
+            load_plugin(path)
+        # An engine is imported where it is used: a run with one does not wait for the other.
+        if self.name == "mujoco":
+            from ee_dist.engines.mujoco.engine import MuJoCoEngine
+
+            return MuJoCoEngine(threads=self.threads)
+        from ee_dist.engines.pybullet.engine import PyBulletEngine
+
+        return PyBulletEngine()
+
+
+def engine_maker(config: Config, alone: bool) -> EngineMaker:
+    """``alone``: whether the engine has the machine for itself, or shares its cores with other workers."""
+    threads = config.engine.threads or ((os.cpu_count() or 1) if alone else 1)
+    return EngineMaker(config.engine.name, threads, tuple(os.path.abspath(p) for p in config.plugins))
+
+
+def build_robot(config: Config) -> Robot:
+    """The robot by name. Raises ConfigError for an unknown one."""
+    one_of("robot", config.robot.name, ("quadruped",))
+    return quadruped()
+
+
+@contextmanager
+def evaluator_of(config: Config) -> Iterator[Evaluator]:
+    """The evaluator, closed at the end. Raises EvaluatorError where Ray cannot be reached."""
+    settings = config.evaluator
+    inner: Evaluator
+    if settings.name == "serial":
+        inner = SerialEvaluator(engine_maker(config, alone=True)(), settings.chunk or 256)
+    else:
+        inner = RayEvaluator(engine_maker(config, alone=False), settings.workers, settings.chunk, config.ray.address)
+    evaluator = CachedEvaluator(inner) if settings.cache else inner
+    try:
+        yield evaluator
+    finally:
+        evaluator.close()

@@ -1,0 +1,165 @@
+"""What to make a robot do so that its faults show: excitations as data, each a series of commands or a controller once it knows the robot.
+
+Amplitudes are shares of half a joint's range, so that an excitation fits any robot and stays within its limits. All
+begin at the middle of the range and rise over the first half second: a robot at rest is not kicked.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+RISE_S = 0.5
+KINDS = {
+    "rest": "no motion: what the robot does under its own weight",
+    "multisine": "all joints at once, each a sum of incommensurate slow sines: tells most in the shortest time",
+    "slow_sines": "one joint after the other: what moves is what is tested",
+    "steps": "held random poses: friction, play and drive errors at rest, and the rise between them",
+    "fast_sines": "all joints, small and quick: inertia, delay, speed limits",
+    "gait": "the network controller walks: contacts, wiring, sensors in the loop",
+}
+
+
+class ExcitationError(ValueError):
+    """An excitation that does not exist or would be unsafe; the message says what would be right."""
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """``kind`` is one of KINDS; ``amplitude`` a share of half the range in (0, 1]; ``seed`` chooses phases and poses."""
+
+    kind: str
+    seconds: float = 6.0
+    amplitude: float = 0.5
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            near = difflib.get_close_matches(self.kind, KINDS, n=2, cutoff=0.4) or list(KINDS)
+            raise ExcitationError(f"no excitation {self.kind!r}; did you mean {' or '.join(near)}?")
+        if not 0.0 < self.amplitude <= 1.0:
+            raise ExcitationError(
+                f"{self.kind}: amplitude {self.amplitude:g} must be a share of half the range, in (0, 1]"
+            )
+        if not 0.1 <= self.seconds <= 600.0:
+            raise ExcitationError(f"{self.kind}: {self.seconds:g} s must lie between 0.1 and 600 s")
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+    def __str__(self) -> str:
+        return f"{self.kind} ({self.seconds:g} s, amplitude {self.amplitude:g}, seed {self.seed})"
+
+    def steps(self, robot: Robot) -> int:
+        return max(2, round(self.seconds / robot.time_step_s))
+
+    def weights(self, robot: Robot) -> tuple[float, ...] | None:
+        """Weights of the network controller that drives a gait; None for an excitation of planned commands."""
+        return gait_weights(robot, self.amplitude, self.seed) if self.kind == "gait" else None
+
+    def commands(self, robot: Robot) -> Array:
+        """Planned positions (T, M) in rad (m for a slide), within the joints' limits. Not for a gait."""
+        t = np.arange(self.steps(robot)) * robot.time_step_s
+        limits = np.array([(robot.joint(d.joint).lower, robot.joint(d.joint).upper) for d in robot.drives])
+        middle, half = limits.mean(axis=1), (limits[:, 1] - limits[:, 0]) / 2
+        shape = _SHAPES[self.kind](t, len(middle), np.random.default_rng([self.seed, len(self.kind)]))
+        rise = np.minimum(t / RISE_S, 1.0)[:, None]
+        return middle + half * self.amplitude * np.clip(shape, -1.0, 1.0) * rise
+
+
+def parse(text: str) -> Excitation:
+    """An excitation as typed: ``multisine`` or ``steps:seconds=4,amplitude=0.3,seed=1``. Raises ExcitationError."""
+    kind, _, rest = text.partition(":")
+    values: dict[str, Any] = {}
+    for item in filter(None, rest.split(",")):
+        key, _, value = item.partition("=")
+        if key not in ("seconds", "amplitude", "seed"):
+            raise ExcitationError(f"{text}: no setting {key!r}; there are: seconds, amplitude, seed")
+        try:
+            values[key] = int(value) if key == "seed" else float(value)
+        except ValueError:
+            raise ExcitationError(f"{text}: {key} must be a number, not {value!r}") from None
+    return Excitation(kind, **values)
+
+
+def _rest(t: Array, motors: int, rng: np.random.Generator) -> Array:
+    return np.zeros((len(t), motors))
+
+
+def _multisine(t: Array, motors: int, rng: np.random.Generator) -> Array:
+    total = np.zeros((len(t), motors))
+    for base, share in ((0.23, 0.5), (0.61, 0.3), (1.37, 0.2)):
+        f = base * rng.uniform(0.85, 1.15, motors)
+        total += share * np.sin(2 * math.pi * f * t[:, None] + rng.uniform(0, 2 * math.pi, motors))
+    return total
+
+
+def _fast_sines(t: Array, motors: int, rng: np.random.Generator) -> Array:
+    f = rng.uniform(1.5, 3.0, motors)
+    return np.sin(2 * math.pi * f * t[:, None] + rng.uniform(0, 2 * math.pi, motors))
+
+
+def _slow_sines(t: Array, motors: int, rng: np.random.Generator) -> Array:
+    total = np.zeros((len(t), motors))
+    order = rng.permutation(motors)
+    each = (t[-1] + (t[1] - t[0])) / motors
+    for place, motor in enumerate(order):
+        mine = (t >= place * each) & (t < (place + 1) * each)
+        total[mine, motor] = np.sin(2 * math.pi * (t[mine] - place * each) / each)
+    return total
+
+
+def _steps(t: Array, motors: int, rng: np.random.Generator) -> Array:
+    held = rng.uniform(0.5, 0.9)
+    poses = rng.uniform(-1.0, 1.0, (int(t[-1] / held) + 2, motors))
+    return poses[(t / held).astype(int)]
+
+
+_SHAPES = {
+    "rest": _rest,
+    "multisine": _multisine,
+    "fast_sines": _fast_sines,
+    "slow_sines": _slow_sines,
+    "steps": _steps,
+}
+
+
+def gait_weights(robot: Robot, amplitude: float, seed: int) -> tuple[float, ...]:
+    """Weights of a network whose first two hidden neurons turn as an oscillator of about 1 Hz; the third, and a little of
+    all, listens to the sensors. Motors follow the oscillator with seeded phases, so that legs lift and swing in turn."""
+    rng = np.random.default_rng([seed, 77])
+    s, m = len(robot.sensors), len(robot.drives)
+    h = len(robot.wiring.hidden_gain) or 3
+    turn = 2 * math.pi * 1.0 * robot.time_step_s
+    incoming = np.zeros((h, s + 1))
+    incoming[:, :s] = rng.normal(0.0, 0.004, (h, s))
+    incoming[0, s] = 0.02
+    recurrent = np.zeros((h, h))
+    if h >= 2:
+        recurrent[:2, :2] = 1.03 * np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    if h >= 3:
+        recurrent[2, 2] = 0.95
+        incoming[2, :s] = rng.normal(0.0, 0.02, s)
+    output = np.zeros((m, h + 1))
+    phase = rng.uniform(0, 2 * math.pi, m)
+    if h >= 2:
+        output[:, 0], output[:, 1] = amplitude * np.cos(phase), amplitude * np.sin(phase)
+    if h >= 3:
+        output[:, 2] = 0.6 * amplitude * rng.choice([-1.0, 1.0], m)
+    return tuple(float(w) for w in np.concatenate([incoming.ravel(), recurrent.ravel(), output.ravel()]))
+
+
+STANDARD = (
+    Excitation("multisine", 5.0, 0.5, 1),
+    Excitation("steps", 5.0, 0.35, 2),
+    Excitation("slow_sines", 6.4, 0.6, 3),
+    Excitation("gait", 3.0, 0.35, 4),
+)
+"""What ``task=trial`` runs unless told otherwise."""

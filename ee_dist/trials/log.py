@@ -1,0 +1,105 @@
+"""What comes back from a rollout or from hardware: the sensor log. And a state from which a rollout may start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class LogError(ValueError):
+    """A sensor log whose arrays contradict one another."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorLog:
+    """One run. Row t holds what was sensed at ``times_s[t]`` and what was commanded upon it.
+
+    Shapes: times_s (T,), sensors (T, S), commands (T, M) in radians (metres for a slide). Where known: base_pose (T, 7)
+    as x, y, z, qx, qy, qz, qw in the frame of the floor; joints (T, M) joint positions; torques (T, M) of the drives;
+    supply_v (T,). Arrays are read-only.
+    """
+
+    times_s: Array
+    sensors: Array
+    commands: Array
+    sensor_names: tuple[str, ...]
+    sensor_units: tuple[str, ...]
+    motor_names: tuple[str, ...]
+    base_pose: Array | None = None
+    joints: Array | None = None
+    torques: Array | None = None
+    supply_v: Array | None = None
+    travel_m: float = float("nan")
+    """How far the body went along +x of the floor, from the start to the last row."""
+
+    def __post_init__(self) -> None:
+        steps = len(self.times_s)
+        expected = {
+            "sensors": (steps, len(self.sensor_names)),
+            "commands": (steps, len(self.motor_names)),
+            "base_pose": (steps, 7),
+            "joints": (steps, len(self.motor_names)),
+            "torques": (steps, len(self.motor_names)),
+            "supply_v": (steps,),
+        }
+        for name, shape in expected.items():
+            value = getattr(self, name)
+            if value is not None and value.shape != shape:
+                raise LogError(f"sensor log: {name} has shape {value.shape}, expected {shape}")
+        if len(self.sensor_units) != len(self.sensor_names):
+            raise LogError("sensor log: every sensor needs a unit")
+        for name in ("times_s", *expected):
+            value = getattr(self, name)
+            if value is not None:
+                value.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.times_s)
+
+    def channel(self, name: str) -> Array:
+        """The (T,) series of one sensor."""
+        return self.sensors[:, self.sensor_names.index(name)]
+
+    @property
+    def finite(self) -> bool:
+        """Whether every value is a number: a model can be too stiff for its time step."""
+        return bool(np.isfinite(self.sensors).all() and np.isfinite(self.commands).all())
+
+    def head(self, steps: int) -> SensorLog:
+        """The first ``steps`` rows."""
+        return self.part(0, steps)
+
+    def part(self, first: int, last: int) -> SensorLog:
+        """Rows first (included) to last (left out)."""
+
+        def cut(a: Array | None) -> Array | None:
+            return None if a is None else a[first:last].copy()
+
+        last = min(last, len(self))
+        return replace(
+            self,
+            times_s=self.times_s[first:last].copy(),
+            sensors=self.sensors[first:last].copy(),
+            commands=self.commands[first:last].copy(),
+            base_pose=cut(self.base_pose),
+            joints=cut(self.joints),
+            torques=cut(self.torques),
+            supply_v=cut(self.supply_v),
+            travel_m=float("nan")
+            if self.base_pose is None
+            else float(self.base_pose[last - 1, 0] - self.base_pose[first, 0]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where a rollout starts. joints, speeds: (M,) in the order of the robot's drives; base: pose (7,), twist (6,)."""
+
+    joints: Array
+    speeds: Array
+    base_pose: Array | None = None
+    base_twist: Array | None = None

@@ -1,0 +1,31 @@
+"""How wide a channel's range is, and a robot whose sensors are as noisy as their data sheet says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ee_dist.robots.model import Robot, Sensor
+
+BODY_RANGE = {"roll": 1.0, "pitch": 1.0, "height": 0.25, "x": 2.0, "y": 2.0, "speed_x": 1.0, "turn_rate": 4.0}
+"""Full range of channels of the body: rad, rad, m, m, m, m/s, rad/s. Typical of small inertial units and range finders."""
+
+
+def channel_range(robot: Robot, sensor: Sensor) -> float:
+    """Full range of a channel in its own unit: of the joint, of its drive, or of the instrument."""
+    if sensor.kind in ("touch", "angle"):
+        return 2.0
+    if sensor.kind in BODY_RANGE:
+        return BODY_RANGE[sensor.kind]
+    joint = robot.joint(sensor.target)
+    if sensor.kind == "position":
+        return joint.upper - joint.lower
+    drive = next(d for d in robot.drives if d.joint == sensor.target)
+    return 2.0 * (drive.speed_limit if sensor.kind == "velocity" else drive.torque_limit)
+
+
+def with_noise(robot: Robot, share: float) -> Robot:
+    """The robot with sensor noise of ``share`` (1 standard deviation) of each channel's range."""
+    if share == 0.0:
+        return robot
+    noisy = tuple(replace(s, noise=share * channel_range(robot, s)) for s in robot.sensors)
+    return replace(robot, sensors=noisy)

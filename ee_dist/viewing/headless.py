@@ -1,0 +1,196 @@
+"""The rerun viewer without a screen: started, driven and always ended by us."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+from rerun.experimental import ViewerClient, ViewerState
+
+START_S = 30.0
+LOAD_S = 60.0
+GREETING_S = 5.0
+"""For so long after its start the viewer lays a note over the picture that it runs without a screen."""
+
+
+class ViewerError(RuntimeError):
+    """The viewer is not installed, did not start, or did not show what it was given; said in one line."""
+
+
+def viewer_binary() -> Path:
+    """The viewer itself. The ``rerun`` command wraps it, and ending the wrapper leaves the viewer running."""
+    found = importlib.util.find_spec("rerun_cli")
+    for folder in (found.submodule_search_locations or ()) if found else ():
+        for name in ("rerun", "rerun.exe", "Rerun.app/Contents/MacOS/Rerun"):
+            binary = Path(folder) / name
+            if binary.is_file():
+                return binary
+    other = shutil.which("rerun")
+    if other:
+        return Path(other)
+    raise ViewerError("the rerun viewer is not installed: pip install rerun-sdk")
+
+
+def vulkan_devices() -> int:
+    """How many devices (a software one counts) Vulkan offers on this machine; 0 without a loader or driver."""
+    for library in ("libvulkan.so.1", "vulkan-1.dll", "libvulkan.1.dylib"):
+        try:
+            vulkan = ctypes.CDLL(library)
+            break
+        except OSError:
+            continue
+    else:
+        return 0
+    # VkInstanceCreateInfo with every field but the type left empty: no layers, no extensions.
+    info = (ctypes.c_uint64 * 8)(1)
+    instance, count = ctypes.c_void_p(), ctypes.c_uint32()
+    if vulkan.vkCreateInstance(ctypes.byref(info), None, ctypes.byref(instance)) != 0:
+        return 0
+    failed = vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None)
+    vulkan.vkDestroyInstance(instance, None)
+    return 0 if failed else count.value
+
+
+class HeadlessViewer:
+    """A viewer in the background, used in a ``with`` block, at whose end its process is gone."""
+
+    def __init__(self, size: tuple[int, int] = (1600, 1000)) -> None:
+        self.size = size
+        self._process: subprocess.Popen[bytes] | None = None
+        self._output: IO[bytes] | None = None
+        self._client: ViewerClient | None = None
+        self._started = 0.0
+
+    def __enter__(self) -> Self:
+        port = _free_port()
+        command = [
+            str(viewer_binary()),
+            "--headless",
+            "--bind",
+            "127.0.0.1",
+            "--port",
+            str(port),
+        ]
+        command += [
+            "--hide-welcome-screen",
+            "--window-size",
+            f"{self.size[0]}x{self.size[1]}",
+        ]
+        self._output = tempfile.TemporaryFile()
+        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=self._output, stderr=self._output)
+        try:
+            self._client = self._connected(f"rerun+http://127.0.0.1:{port}/proxy")
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._end()
+
+    def open(self, path: str | Path) -> None:
+        """Load a recording and wait until all of it is there. Raises ViewerError."""
+        file = Path(path).absolute()
+        if not file.is_file():
+            raise ViewerError(f"no such recording: {path}")
+        self.client.open(str(file))
+        deadline = time.monotonic() + LOAD_S
+        while time.monotonic() < deadline:
+            state = self.client.get_state()
+            if not state.loading and any(r.timelines for r in state.recordings):
+                return
+            time.sleep(0.05)
+        raise ViewerError(f"the viewer did not finish loading {path} in {LOAD_S:g} s")
+
+    @property
+    def client(self) -> ViewerClient:
+        if self._client is None:
+            raise ViewerError("the viewer is not running: use it in a with block")
+        return self._client
+
+    @property
+    def state(self) -> ViewerState:
+        return self.client.get_state()
+
+    def hide_menu(self) -> None:
+        """Take the menu and its warnings off the picture."""
+        self.client.run_command("ui.toggle_top_panel")
+
+    def go_to(self, timeline: str, time_s: float) -> None:
+        """Stop at a time of a timeline."""
+        self.client.set_time(timeline, duration=time_s, play_state="paused")
+
+    def settled_picture(self, view: str | None = None, limit_s: float = 15.0) -> bytes:
+        """A PNG of the window, or of one view, taken until two in a row agree: nothing is still loading or moving."""
+        view_id = None if view is None else self._view_id(view)
+        last = b""
+        deadline = time.monotonic() + limit_s
+        while time.monotonic() < deadline:
+            png = self.client.take_screenshot(view_id)
+            if png == last and time.monotonic() > self._started + GREETING_S:
+                return png
+            last = png
+            time.sleep(0.1)
+        raise ViewerError(f"the picture did not come to rest in {limit_s:g} s")
+
+    def _view_id(self, name: str) -> str:
+        views = self.state.views
+        for found in views:
+            if found.name == name:
+                return found.view_id
+        raise ViewerError(f"no view named {name!r}; there are: {', '.join(v.name for v in views)}")
+
+    def _connected(self, url: str) -> ViewerClient:
+        assert self._process is not None
+        deadline = time.monotonic() + START_S
+        while time.monotonic() < deadline:
+            if self._process.poll() is not None:
+                raise ViewerError(f"the viewer stopped at its start: {self._last_line()}")
+            try:
+                client = ViewerClient.connect(url)
+                client.get_state()
+            except (RuntimeError, ConnectionError, ValueError):
+                time.sleep(0.1)
+                continue
+            return client
+        raise ViewerError(f"the viewer did not answer in {START_S:g} s: {self._last_line()}")
+
+    def _last_line(self) -> str:
+        assert self._output is not None
+        self._output.seek(0)
+        lines = [line.strip() for line in self._output.read().decode(errors="replace").splitlines() if line.strip()]
+        told = [line for line in lines if "rror" in line or "panick" in line or "adapter" in line]
+        return (told or lines or ["it said nothing"])[-1]
+
+    def _end(self) -> None:
+        self._client = None
+        process, self._process = self._process, None
+        if process is not None and process.poll() is None:
+            process.terminate()
+            try:
+                process.wait(timeout=3.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        if self._output is not None:
+            self._output.close()
+            self._output = None
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,265 @@
+"""A robot in 3-D: solids that move, a track on the floor, a label, feet that light up when they touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from ee_dist.engines.loop import gravity_vector
+from ee_dist.robots.kinematics import part_poses
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array, SensorLog
+from ee_dist.viewing import drawn
+from ee_dist.viewing.palette import FOOT, GRAVITY, LIMB, MEASURED, TOUCHING, Rgb
+from ee_dist.viewing.stream import seconds_of, times
+
+Rows = NDArray[np.intp]
+POSE_HZ, TRACK_HZ, TRACK_UPDATES_HZ = 33.0, 10.0, 4.0
+FLOOR_M = 0.003
+"""Height of lines on the floor, just above it so that the two do not flicker."""
+LABEL_ABOVE_M, GRAVITY_M = 0.16, 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Appearance:
+    """One interval in which a robot is to be seen: ``model`` says which parts it still has, ``label`` floats above it.
+
+    ``aside_m`` shifts it sideways (+y), so that a prediction goes beside the robot and not through it.
+    """
+
+    start_s: float
+    model: Robot
+    log: SensorLog
+    label: str
+    aside_m: float = 0.0
+
+
+Shown = Sequence[Appearance | None]
+
+
+def send_robot(
+    stream: rr.RecordingStream,
+    path: str,
+    robot: Robot,
+    shown: Shown,
+    starts_s: Sequence[float],
+    ghost: Rgb | None,
+) -> None:
+    """Send a robot under ``path``: one appearance a trial, None where it is not to be seen.
+
+    ``ghost`` is the colour of one that is drawn see-through.
+    """
+    poses = [None if a is None else poses_of(a) for a in shown]
+    for part in robot.parts:
+        place = f"{path}/{part.name}"
+        seen = [p is not None and part.name in p[1] for p in poses]
+        moves = [
+            (a.start_s + p[0], p[1][part.name])
+            for a, p in zip(shown, poses, strict=True)
+            if a is not None and p is not None and part.name in p[1]
+        ]
+        if not moves:
+            continue
+        pose = np.concatenate([m[1] for m in moves])
+        columns = rr.Transform3D.columns(translation=pose[:, :3], quaternion=pose[:, 3:])
+        stream.send_columns(place, [times(np.concatenate([m[0] for m in moves]))], columns)
+        for solid in drawn.solids_of(robot, part):
+            own = f"{place}/{solid.name}"
+            colour = None if solid.senses else ghost or (MEASURED if part is robot.root else LIMB)
+            _send_solid(stream, own, solid, colour, ghost is not None, seen, starts_s)
+            if solid.senses:
+                _send_touch(
+                    stream,
+                    own,
+                    solid,
+                    _touch_sensor(robot, part.name),
+                    shown,
+                    seen,
+                    ghost or FOOT,
+                )
+    for a, p in zip(shown, poses, strict=True):
+        if a is not None and p is not None and robot.free_base:
+            _send_track(stream, f"{path}/track", a, p[0], p[1][robot.root.name], ghost)
+            _send_gravity(stream, f"{path}/gravity", a, p[0], p[1][robot.root.name])
+    _send_labels(stream, f"{path}/label", robot, shown, starts_s, ghost or MEASURED)
+
+
+def poses_of(a: Appearance) -> tuple[Array, dict[str, Array]]:
+    """Thinned times (K,) since the start of the trial, s, and poses (K, 7) of every part.
+
+    Rows whose numbers are not known are left out.
+    """
+    rows = _every(seconds_of(a.log), POSE_HZ)
+    base, joints = (
+        _base_poses(a.model, a.log)[rows].copy(),
+        joint_positions(a.model, a.log)[rows],
+    )
+    base[:, 1] += a.aside_m
+    known = np.isfinite(base).all(axis=1) & np.isfinite(joints).all(axis=1)
+    return seconds_of(a.log)[rows][known], part_poses(a.model, base[known], joints[known])
+
+
+def joint_positions(robot: Robot, log: SensorLog) -> Array:
+    """Joint positions (T, M) as far as a log tells: its own, else from position or angle channels, else zero."""
+    if log.joints is not None and log.motor_names == robot.motor_names:
+        return log.joints
+    found = np.zeros((len(log), len(robot.drives)))
+    column = {name: k for k, name in enumerate(robot.motor_names)}
+    for sensor in robot.sensors:
+        if sensor.target not in column or sensor.name not in log.sensor_names:
+            continue
+        if sensor.kind == "position":
+            found[:, column[sensor.target]] = log.channel(sensor.name)
+        elif sensor.kind == "angle":
+            joint = robot.joint(sensor.target)
+            middle, half = (
+                (joint.lower + joint.upper) / 2,
+                (joint.upper - joint.lower) / 2,
+            )
+            found[:, column[sensor.target]] = middle + half * log.channel(sensor.name)
+    return found
+
+
+def _base_poses(robot: Robot, log: SensorLog) -> Array:
+    """Pose (T, 7) of the root part: as logged, else where the robot starts."""
+    if log.base_pose is not None:
+        return log.base_pose
+    return np.tile(np.array([*robot.start_position_m, *robot.start_rotation]), (len(log), 1))
+
+
+def _every(seconds: Array, hz: float) -> Rows:
+    """Row numbers thinned to about ``hz``; first and last row stay."""
+    last = len(seconds) - 1
+    if last < 1:
+        return np.arange(last + 1)
+    stride = max(1, round(last / (hz * max(float(seconds[-1] - seconds[0]), 1e-9))))
+    return np.unique(np.append(np.arange(0, last, stride), last))
+
+
+def _touch_sensor(robot: Robot, part: str) -> str:
+    return next(s.name for s in robot.sensors if s.kind == "touch" and s.target == part)
+
+
+def _send_solid(
+    stream: rr.RecordingStream,
+    place: str,
+    solid: drawn.Solid,
+    colour: Rgb | None,
+    ghost: bool,
+    seen: Sequence[bool],
+    starts_s: Sequence[float],
+) -> None:
+    if all(seen):
+        stream.send_columns(place, [], drawn.columns(solid, colour, ghost, 1))
+        return
+    # Geometry that comes and goes: a row at the begin of each trial, empty where the part is not there.
+    columns = drawn.columns(solid, colour, ghost, sum(seen)).partition([int(s) for s in seen])
+    stream.send_columns(place, [times(np.array(starts_s))], columns)
+
+
+def _send_touch(
+    stream: rr.RecordingStream,
+    place: str,
+    solid: drawn.Solid,
+    sensor: str,
+    shown: Shown,
+    seen: Sequence[bool],
+    lifted: Rgb,
+) -> None:
+    """The colour of a foot, a row at each change."""
+    at: list[Array] = []
+    colours: list[Rgb] = []
+    for a, there in zip(shown, seen, strict=True):
+        if a is None or not there:
+            continue
+        told = sensor in a.log.sensor_names
+        down = a.log.channel(sensor) > 0 if told else np.zeros(len(a.log), dtype=bool)
+        rows = changes(down)
+        at.append(a.start_s + seconds_of(a.log)[rows])
+        colours += [TOUCHING if down[r] else lifted for r in rows]
+    stream.send_columns(place, [times(np.concatenate(at))], drawn.colour_columns(solid, colours))
+
+
+def changes(states: NDArray[np.bool_]) -> Rows:
+    """Numbers of the rows at which a state begins; the first row is one."""
+    return np.flatnonzero(np.append(True, states[1:] != states[:-1]))
+
+
+def _send_track(
+    stream: rr.RecordingStream,
+    place: str,
+    a: Appearance,
+    seconds: Array,
+    base: Array,
+    ghost: Rgb | None,
+) -> None:
+    """The way of the body so far, on the floor."""
+    points = base[:, :3].copy()
+    points[:, 2] = FLOOR_M
+    kept, ends = _every(seconds, TRACK_HZ), _every(seconds, TRACK_UPDATES_HZ)
+    strips = [points[np.append(kept[kept < end], end)].astype(np.float32) for end in ends]
+    colours, radii = (
+        [ghost or MEASURED] * len(ends),
+        [0.002 if ghost else 0.004] * len(ends),
+    )
+    columns = rr.LineStrips3D.columns(strips=strips, colors=colours, radii=radii)
+    stream.send_columns(place, [times(a.start_s + seconds[ends])], columns)
+
+
+def _send_gravity(stream: rr.RecordingStream, place: str, a: Appearance, seconds: Array, base: Array) -> None:
+    """An arrow where gravity pulls, on a slope only.
+
+    The floor is drawn level: a slope turns gravity, as in the engine.
+    """
+    down = np.array(gravity_vector(a.model))
+    if not down[:2].any():
+        stream.send_columns(
+            place,
+            [times(np.array([a.start_s]))],
+            rr.Arrows3D.columns(vectors=[]).partition([0]),
+        )
+        return
+    arrow, count = GRAVITY_M * down / np.linalg.norm(down), len(seconds)
+    columns = rr.Arrows3D.columns(
+        origins=base[:, :3] - 0.3 * arrow,
+        vectors=np.tile(arrow, (count, 1)),
+        colors=[GRAVITY] * count,
+        labels=["gravity"] * count,
+        radii=[0.004] * count,
+    )
+    stream.send_columns(place, [times(a.start_s + seconds)], columns)
+
+
+def _send_labels(
+    stream: rr.RecordingStream,
+    place: str,
+    robot: Robot,
+    shown: Shown,
+    starts_s: Sequence[float],
+    colour: Rgb,
+) -> None:
+    # Above a body that walks; above all of a small robot on a bench.
+    above = LABEL_ABOVE_M if robot.free_base else 1.2 * max(drawn.reach(robot, p) for p in robot.parts)
+    at: list[Array] = []
+    points: list[Array] = []
+    for a in shown:
+        if a is not None:
+            seconds, poses = poses_of(a)
+            at.append(a.start_s + seconds)
+            points.append(poses[robot.root.name][:, :3] + np.array((0.0, 0.0, above)))
+    stream.send_columns(
+        place,
+        [times(np.concatenate(at))],
+        rr.Points3D.columns(positions=np.concatenate(points)),
+    )
+    texts = rr.Points3D.columns(labels=["" if a is None else a.label for a in shown])
+    stream.send_columns(place, [times(np.array(starts_s))], texts)
+    stream.log(
+        place,
+        rr.Points3D.from_fields(colors=[colour], radii=[0.0], show_labels=True),
+        static=True,
+    )
