@@ -24,7 +24,8 @@ class Rollout:
     """One run to be simulated: a model, what drives it, for how many steps (rows of the log).
 
     ``seed`` feeds the noise of the sensors, if they have any. ``pose`` asks for body pose, joint positions and torques
-    at every row. ``supply_v`` (steps,) is the measured supply voltage.
+    at every row. ``supply_v`` (steps,) is the measured supply voltage. ``enabled`` (steps,) is 0 where the drives are
+    released: open circuit, no torque.
     """
 
     model: Robot
@@ -34,13 +35,14 @@ class Rollout:
     start: State | None = None
     supply_v: Array | None = None
     pose: bool = False
+    enabled: Array | None = None
 
     @property
     def key(self) -> str:
         """Content address of all that decides the result, for the cache."""
         noisy = any(s.noise or s.dropout for s in self.model.sensors)
         parts = [self.model.digest, self.driver.key, str(self.steps), str(self.seed if noisy else None), str(self.pose)]
-        for a in (self.supply_v, *_arrays(self.start)):
+        for a in (self.supply_v, self.enabled, *_arrays(self.start)):
             parts.append("-" if a is None else hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest())
         return "|".join(parts)
 

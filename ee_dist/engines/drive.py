@@ -1,7 +1,7 @@
 """The drive path: from commanded position to joint torque, for a whole batch at once and the same for every engine.
 
     command -> delay -> gain -> controller (deadband, zero offset) -> motor (torque limit, back-EMF, strength, supply)
-            -> transmission (backlash, compliance) -> joint (spring, offset, friction, brake, a user's own laws, stops)
+            -> transmission (backlash, compliance) -> joint (spring, offset, a user's own laws, friction, brake, stops)
 
 Each stage runs only if some row of the batch needs it, and a row at neutral values passes through it unchanged, bit
 for bit, so a result never depends on what else is in the batch.
@@ -14,32 +14,17 @@ from dataclasses import fields
 
 import numpy as np
 
-from ee_dist.robots.inertia import felt_inertia
+from ee_dist.effects.laws import LAWS, LawContext, LawFunction, drive_law, find_law
+from ee_dist.engines.friction import Friction
+from ee_dist.engines.transmission import Transmission
+from ee_dist.robots.inertia import felt_inertia, steady_inertia
 from ee_dist.robots.model import Drive, Robot
 from ee_dist.trials.log import Array
 
-LawFunction = Callable[["LawContext"], Array]
-
-
-class LawContext:
-    """What a user's own law sees: arrays over the rows (R,) that carry it, and ``memory`` that lasts for the rollout."""
-
-    def __init__(self, values: dict[str, Array], time_step_s: float) -> None:
-        self.values = values
-        self.time_step_s = time_step_s
-        self.memory: dict[str, Array] = {}
-        self.t_s = 0.0
-        self.position: Array = np.zeros(0)
-        self.speed: Array = np.zeros(0)
-        self.torque: Array = np.zeros(0)
-
-
-LAWS: dict[str, LawFunction] = {}
-"""A user's own terms of the drive path by name: each returns the torque (R,) to add at the joint."""
+__all__ = ["LAWS", "DrivePath", "LawContext", "LawFunction", "drive_law"]
 
 STOP_SHARE = 0.5
 """How much of the needed change of speed a stop makes in one step: below 1, because felt inertia is an estimate."""
-FRICTION = ("coulomb", "stribeck", "load_friction", "backdrive_friction", "brake")
 
 
 class DrivePath:
@@ -63,9 +48,9 @@ class DrivePath:
         self.integral_limit = np.divide(p["torque_limit"], p["ki"], out=np.zeros(shape), where=p["ki"] > 0) * 0.25
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
+        self.all_torque = np.maximum(p["torque_limit"].sum(axis=1, keepdims=True), 1e-300)
         self.last_active = np.zeros(shape)
         self._prepare_delay(shape)
-        self._prepare_transmission()
         self._prepare_joints(robots, shape)
         self._prepare_laws(robots)
 
@@ -81,49 +66,58 @@ class DrivePath:
         self.past_filled = False
         self.rows, self.columns = np.indices(shape)
 
-    def _prepare_transmission(self) -> None:
-        self.elastic = (self.p["compliance"] > 0) | (self.p["backlash"] > 0)
-        self.uses_elastic = bool(self.elastic.any())
-        self.motor_position: Array | None = None
-
     def _prepare_joints(self, robots: Sequence[Robot], shape: tuple[int, int]) -> None:
-        self.uses_friction = any(self.uses[n] for n in FRICTION)
-        self.uses_load = self.uses["load_friction"] or self.uses["backdrive_friction"]
         stops = np.array([[r.joint(d.joint).stops for d in r.drives] for r in robots]).reshape(*shape, 2)
         self.lower, self.upper = np.ascontiguousarray(stops[:, :, 0]), np.ascontiguousarray(stops[:, :, 1])
-        felt = {id(robot): felt_inertia(robot) for robot in {id(r): r for r in robots}.values()}
-        self.inertia = np.array([felt[id(robot)] for robot in robots]).reshape(shape)
-        self.last_speed: Array | None = None
-        self.last_total = np.zeros(shape)
+        self.inertia = _each(robots, felt_inertia).reshape(shape)
+        self.transmission: Transmission | None = None
+        if self.uses["backlash"] or self.uses["compliance"]:
+            self.transmission = Transmission(self.p, self.inertia, self.dt)
+        self.friction: Friction | None = None
+        if Friction.needed(self.uses):
+            self.friction = Friction(self.p, self.uses, _each(robots, steady_inertia).reshape(shape), self.dt)
 
     def _prepare_laws(self, robots: Sequence[Robot]) -> None:
         groups: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, tuple[float, ...]]]] = {}
         for i, robot in enumerate(robots):
             for law in robot.laws:
                 key = (law.name, tuple(n for n, _ in law.values))
-                groups.setdefault(key, []).append(
-                    (i, robot.motor_names.index(law.joint), tuple(v for _, v in law.values))
-                )
+                place = robot.motor_names.index(law.joint)
+                groups.setdefault(key, []).append((i, place, tuple(v for _, v in law.values)))
         self.laws: list[tuple[LawFunction, Array, Array, LawContext]] = []
         for (name, value_names), members in groups.items():
-            if name not in LAWS:
-                raise KeyError(f"no drive law named {name!r}; there are: {', '.join(sorted(LAWS)) or 'none'}")
             values = {n: np.array([m[2][k] for m in members]) for k, n in enumerate(value_names)}
             rows, columns = np.array([m[0] for m in members]), np.array([m[1] for m in members])
-            self.laws.append((LAWS[name], rows, columns, LawContext(values, self.dt)))
+            context = LawContext(values, self.dt, self.inertia[rows, columns])
+            self.laws.append((find_law(name), rows, columns, context))
 
     # -- one step ----------------------------------------------------------------------------------------------------
 
-    def step(self, t_s: float, command: Array, q: Array, qd: Array, supply_v: Array | None = None) -> Array:
-        """Joint torques (B, M) from commanded positions, joint positions and speeds, all (B, M); supply_v is (B, 1)."""
+    def step(
+        self,
+        t_s: float,
+        command: Array,
+        q: Array,
+        qd: Array,
+        supply_v: Array | None = None,
+        enabled: Array | None = None,
+    ) -> Array:
+        """Joint torques (B, M) from commanded positions, joint positions and speeds, all (B, M).
+
+        ``supply_v`` (B, 1) is the measured supply. ``enabled``, (B, 1) or (B, M), is 0 where the motor's circuit is
+        open: no torque and no back-EMF; what sits on the joint (friction, spring, stops) stays.
+        """
         wanted = self._command(command)
-        position, speed = (q, qd) if not self.uses_elastic else self._motor_side(q, qd)
-        active = self._motor(wanted, position, speed, supply_v)
-        torque = active if not self.uses_elastic else self._transmission(active, q, qd)
+        position, speed = (q, qd) if self.transmission is None else self.transmission.motor_side(q, qd)
+        active, stiffness, damping = self._motor(wanted, position, speed, supply_v, enabled)
+        if self.transmission is not None:
+            active = self.transmission(active, stiffness, damping, q, qd)
+        torque = active
         if self.uses["spring"]:
-            torque = torque - self.p["spring"] * (q - self.p["spring_rest"])
+            pulled = torque - self.p["spring"] * (q - self.p["spring_rest"])
+            torque = np.where(self.p["spring"] != 0, pulled, torque)
         if self.uses["offset_torque"]:
-            torque = torque + self.p["offset_torque"]
+            torque = np.where(self.p["offset_torque"] != 0, torque + self.p["offset_torque"], torque)
         for function, rows, columns, context in self.laws:
             context.t_s = t_s
             context.position, context.speed = q[rows, columns], qd[rows, columns]
@@ -131,14 +125,12 @@ class DrivePath:
             added = function(context)
             torque = torque.copy()
             np.add.at(torque, (rows, columns), added)
-        if self.uses["viscous"]:
-            viscous = self.p["viscous"]
-            if self.uses["viscous_asymmetry"]:
-                viscous = viscous * (1.0 + self.p["viscous_asymmetry"] * np.sign(qd))
-            torque = torque - viscous * qd / (1.0 + viscous * self.dt / self.inertia)
-        if self.uses_friction:
-            torque = self._friction(torque, active, qd)
-        return self._stops(torque, q, qd) * self.present
+        if self.friction is not None:
+            torque = self.friction(torque, active, qd)
+        torque = self._stops(torque, q, qd) * self.present
+        if self.friction is not None:
+            self.friction.record(torque, qd)
+        return torque
 
     def _command(self, command: Array) -> Array:
         if self.uses["delay_s"]:
@@ -154,88 +146,45 @@ class DrivePath:
             command = command * self.p["command_gain"]
         return command
 
-    def _motor(self, wanted: Array, position: Array, speed: Array, supply_v: Array | None) -> Array:
+    def _motor(
+        self, wanted: Array, position: Array, speed: Array, supply_v: Array | None, enabled: Array | None
+    ) -> tuple[Array, Array, Array]:
+        """Torque of the motor, and how it falls with its position and speed: (B, M) each, the last two for an elastic
+        transmission only."""
         p = self.p
         error = wanted - position
         if self.uses["zero_offset"]:
             error = error - p["zero_offset"]
         if self.uses["deadband"]:
-            error = error - np.clip(error, -p["deadband"], p["deadband"])
+            outside = error - np.clip(error, -p["deadband"], p["deadband"])
+            error = np.where(p["deadband"] > 0, outside, error)
         asked = p["kp"] * error - p["kd"] * speed
         if self.uses_integral:
             self.integral = np.clip(self.integral + error * self.dt, -self.integral_limit, self.integral_limit)
+            if enabled is not None:
+                self.integral = self.integral * enabled
             asked = asked + p["ki"] * self.integral
         active = np.clip(asked, -p["torque_limit"], p["torque_limit"])
+        scale: Array | float = 1.0
         if supply_v is not None:
             nominal = p["supply_nominal_v"]
-            active = active * np.where(nominal > 0, supply_v / np.where(nominal > 0, nominal, 1.0), 1.0)
+            scale = np.where(nominal > 0, supply_v / np.where(nominal > 0, nominal, 1.0), 1.0)
+            active = active * scale
+        if enabled is not None:
+            active = active * enabled
         if self.uses_sag:
-            load = np.abs(self.last_active).sum(axis=1, keepdims=True) / p["torque_limit"].sum(axis=1, keepdims=True)
+            load = np.abs(self.last_active).sum(axis=1, keepdims=True) / self.all_torque
             self.last_active = active
-            active = active * (1.0 - np.clip(self.sag * load, 0.0, 0.95))
-        active = active - self.back_emf * speed
+            left = 1.0 - np.clip(self.sag * load, 0.0, 0.95)
+            scale, active = scale * left, active * left
+        back_emf = self.back_emf if enabled is None else self.back_emf * enabled
+        active = active - back_emf * speed
         if self.uses["strength"]:
             active = active * p["strength"]
-        return active
-
-    def _motor_side(self, q: Array, qd: Array) -> tuple[Array, Array]:
-        if self.motor_position is None:
-            self.motor_position, self.motor_speed = q.copy(), qd.copy()
-        return np.where(self.elastic, self.motor_position, q), np.where(self.elastic, self.motor_speed, qd)
-
-    def _transmission(self, active: Array, q: Array, qd: Array) -> Array:
-        """Motor behind a spring with play. The rotor's own step is implicit in the spring, so that a stiff one is stable.
-
-        The spring is at most as stiff as the joint's inertia can answer within a time step.
-        """
-        assert self.motor_position is not None
-        p, dt = self.p, self.dt
-        rotor = np.maximum(p["rotor_inertia"], 0.1 * self.inertia)
-        stiffest = 0.25 * self.inertia / dt**2
-        compliance = p["compliance"]
-        stiffness = np.minimum(
-            np.divide(1.0, compliance, out=np.full_like(compliance, np.inf), where=compliance > 0), stiffest
-        )
-        damping = 0.2 * np.sqrt(stiffness * np.minimum(self.inertia, rotor))
-        play = p["backlash"] / 2
-        ahead = q + dt * qd
-        free = self.motor_position + dt * (self.motor_speed + dt * active / rotor)
-        twist = free - ahead
-        beyond = twist - np.clip(twist, -play, play)
-        touching = beyond != 0
-        k = np.where(touching, stiffness, 0.0)
-        c = np.where(touching, damping, 0.0)
-        edge = np.clip(twist, -play, play)
-        # rotor * (v' - v) / dt = active - k (x + dt v' - ahead - edge) - c (v' - qd)
-        v = (rotor * self.motor_speed / dt + active - k * (self.motor_position - ahead - edge) + c * qd) / (
-            rotor / dt + k * dt + c
-        )
-        x = self.motor_position + dt * v
-        carried = k * (x - ahead - edge) + c * (v - qd)
-        self.motor_position = np.where(self.elastic, x, q)
-        self.motor_speed = np.where(self.elastic, v, qd)
-        return np.where(self.elastic, carried, active)
-
-    def _friction(self, torque: Array, active: Array, qd: Array) -> Array:
-        """Dry friction cancels at most what would keep the joint moving in this step, so it never reverses a motion.
-
-        The load from the rest of the robot is what the last step's motion needed beyond the last torque (a disturbance
-        observer): it lets a joint at rest stay at rest under load.
-        """
-        p = self.p
-        load = 0.0 if self.last_speed is None else self.inertia * (qd - self.last_speed) / self.dt - self.last_total
-        capacity = p["coulomb"] + p["brake"]
-        if self.uses["stribeck"]:
-            capacity = capacity + p["stribeck"] * np.exp(-((qd / p["stribeck_speed"]) ** 2))
-        if self.uses_load:
-            # Driving: the motor's torque presses on the gear; back-driving: the load does.
-            capacity = capacity + p["load_friction"] * np.abs(active) + p["backdrive_friction"] * np.abs(load)
-        if self.uses["friction_asymmetry"]:
-            capacity = capacity * (1.0 + p["friction_asymmetry"] * np.sign(qd))
-        stopping = self.inertia * qd / self.dt + torque + load
-        torque = torque - np.clip(stopping, -capacity, capacity)
-        self.last_speed, self.last_total = qd, torque
-        return torque
+        if self.transmission is None:
+            return active, active, active
+        free = (np.abs(asked) < p["torque_limit"]) * scale * (1.0 if enabled is None else enabled)
+        return active, p["kp"] * free * p["strength"], (p["kd"] * free + back_emf) * p["strength"]
 
     def _stops(self, torque: Array, q: Array, qd: Array) -> Array:
         """A joint that would pass its stop in this step is slowed to reach it, or sent back if it is past it already."""
@@ -249,3 +198,9 @@ class DrivePath:
         over = np.where(past_upper, np.maximum(np.maximum(torque, 0.0) + scale * (qd - highest), 0.0), 0.0)
         under = np.where(past_lower, np.minimum(np.minimum(torque, 0.0) + scale * (qd - lowest), 0.0), 0.0)
         return torque - over - under
+
+
+def _each(robots: Sequence[Robot], facts: Callable[[Robot], Array]) -> Array:
+    """``facts`` of every robot, asked once of each."""
+    known = {id(robot): facts(robot) for robot in {id(r): r for r in robots}.values()}
+    return np.array([known[id(robot)] for robot in robots])

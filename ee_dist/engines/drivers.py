@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -152,7 +152,7 @@ class Controllers:
             if not index:
                 continue
             some = [robots[i] for i in index]
-            mine: list = [drivers[i] for i in index]
+            mine: list[Any] = [drivers[i] for i in index]
             runner: _Runner
             if kind is Network:
                 runner = _Networks(some, mine, [scales[i] for i in index])

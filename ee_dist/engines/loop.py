@@ -30,6 +30,7 @@ def shape_of(rollout: Rollout) -> tuple[object, ...]:
         rollout.pose,
         robot.free_base,
         rollout.supply_v is None,
+        rollout.enabled is None,
     )
 
 
@@ -49,6 +50,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     truth_to_channels = _Channels(robots, scales)
     force = _Force(robots)
     supply = None if rollouts[0].supply_v is None else np.stack([_held(r.supply_v, steps) for r in rollouts])
+    enabled = None if rollouts[0].enabled is None else np.stack([_switched(r.enabled, steps) for r in rollouts])
     touch, twist = "touch" in kinds, force.needs_twist or bool(kinds & TWIST_KINDS)
     always_pose = pose or bool(kinds & POSE_KINDS)
 
@@ -68,7 +70,12 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
         reported = sensing.step(step, truth_to_channels(truth, torque))
         command = control.step(step, step * dt, reported)
         torque = drive.step(
-            step * dt, command, truth.joints, truth.speeds, None if supply is None else supply[:, step : step + 1]
+            step * dt,
+            command,
+            truth.joints,
+            truth.speeds,
+            None if supply is None else supply[:, step : step + 1],
+            None if enabled is None else enabled[:, step : step + 1],
         )
         sensors[step], commands[step] = reported, command
         if poses is not None and joints is not None and torques is not None and truth.base_pose is not None:
@@ -77,7 +84,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
             bodies.step(torque, force(step, truth))
     assert begin is not None and truth.base_pose is not None
     travel = truth.base_pose[:, 0] - begin[:, 0]
-    times = np.arange(steps) * dt
+    times: Array = np.arange(steps, dtype=np.float64) * dt
     units = tuple(s.unit for s in first.sensors)
     return [
         SensorLog(
@@ -200,3 +207,7 @@ def gravity_vector(robot: Robot) -> tuple[float, float, float]:
 def _held(values: Array | None, steps: int) -> Array:
     assert values is not None
     return np.asarray(values)[np.minimum(np.arange(steps), len(values) - 1)]
+
+
+def _switched(values: Array | None, steps: int) -> Array:
+    return (_held(values, steps) > 0).astype(np.float64)

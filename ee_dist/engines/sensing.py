@@ -34,6 +34,7 @@ class SensingPath:
         self.touch = np.array([k == "touch" for k in self.kinds])
         if self.uses["missed_touch"]:
             self.pressed_s = np.zeros(shape)
+        self.stuck_at: Array = np.zeros(shape)
         self.dt = time_step_s
         if self.uses["delay_s"]:
             ticks = self.p["delay_s"] / time_step_s
@@ -66,7 +67,7 @@ class SensingPath:
         if self.uses["gain"]:
             value = value * p["gain"]
         if self.uses["bias"]:
-            value = value + p["bias"]
+            value = np.where(p["bias"] != 0, value + p["bias"], value)
         if self.uses["delay_s"]:
             if not self.filled:
                 self.past[:] = value
@@ -77,7 +78,7 @@ class SensingPath:
             far = self.past[self.whole + 1, self.rows, self.columns]
             value = np.where(self.rest > 0, near * (1 - self.rest) + far * self.rest, near)
         if self.uses["noise"]:
-            value = value + p["noise"] * self.normal[step]
+            value = np.where(p["noise"] != 0, value + p["noise"] * self.normal[step], value)
         if self.uses["dropout"]:
             if self.held is not None:
                 value = np.where(self.uniform[step] < p["dropout"], self.held, value)
@@ -86,6 +87,11 @@ class SensingPath:
             q = np.where(p["quantum"] > 0, p["quantum"], 1.0)
             value = np.where(p["quantum"] > 0, np.round(value / q) * q, value)
         if self.uses["stuck"]:
-            # stuck = 1: the channel reports only zero; between, it reports that share less of its true movement.
-            value = np.where(p["stuck"] > 0, value * (1 - p["stuck"]), value)
+            # The value at which the channel sticks is the last that it reported while it still moved freely.
+            waiting = step * self.dt < p["stuck_from_s"]
+            if step == 0:
+                self.stuck_at = value
+            self.stuck_at = np.where(waiting, value, self.stuck_at)
+            slow = self.stuck_at + (1.0 - p["stuck"]) * (value - self.stuck_at)
+            value = np.where((p["stuck"] > 0) & ~waiting, slow, value)
         return value

@@ -40,7 +40,7 @@ def start_ray(address: str | None, workers: int) -> None:
     if ray.is_initialized():
         return
     # Workers are one process a core: numerical libraries must not start threads of their own in them.
-    one_thread = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     options: dict[str, Any] = {
         "include_dashboard": False,
         "log_to_driver": False,

@@ -18,7 +18,8 @@ from ee_dist.trials.log import Array, SensorLog
 class Metric(Protocol):
     """A diagnosis metric. ``steps(full)`` is how much of a trial of ``full`` steps it needs to see."""
 
-    name: str
+    @property
+    def name(self) -> str: ...
 
     def steps(self, full: int) -> int: ...
 

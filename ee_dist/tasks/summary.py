@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from omegaconf import OmegaConf
+from omegaconf import DictConfig, OmegaConf
 
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.config import Config
@@ -36,6 +36,7 @@ def config_yaml(config: Config, options: Any) -> str:
 def config_digest(config: Config, options: Any) -> str:
     """Of the settings that decide the result: not of where and how it is computed."""
     tree = OmegaConf.create(config_yaml(config, options))
+    assert isinstance(tree, DictConfig)
     for key in ("evaluator", "ray", "plugins"):
         tree.pop(key, None)
     tree.engine.pop("threads", None)

@@ -1,4 +1,4 @@
-"""Hardware as a protocol: something that takes a driver and gives back a sensor log. It never tells what is wrong with it."""
+"""Hardware as a protocol: it takes a driver, gives back a sensor log, and never tells what is wrong with it."""
 
 from __future__ import annotations
 

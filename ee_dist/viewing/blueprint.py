@@ -26,13 +26,7 @@ def scene_view(robot: Robot, name: str, eye: rrb.EyeControls3D) -> rrb.Spatial3D
         color=(255, 255, 255, 14),
     )
     background = rrb.Background(kind=rrb.BackgroundKind.SolidColor, color=DARK)
-    return rrb.Spatial3DView(
-        origin="/world",
-        name=name,
-        eye_controls=eye,
-        background=background,
-        line_grid=grid,
-    )
+    return rrb.Spatial3DView(origin="/world", name=name, eye_controls=eye, background=background, line_grid=grid)
 
 
 def moving_axis(before_s: float = WINDOW_S[0], after_s: float = WINDOW_S[1]) -> rrb.TimeAxis:

@@ -34,39 +34,46 @@ class Pair:
     predicted: SensorLog | None = None
 
 
-def send_sensors(stream: rr.RecordingStream, pairs: Sequence[Pair], path: str = "sensors") -> None:
-    """Scalars at ``<path>/<channel>/measured`` and ``.../predicted``, all rows.
+def units_of(pairs: Sequence[Pair]) -> dict[str, str]:
+    """Units of all measured channels, by name, in the order of their first log."""
+    return {n: u for p in pairs for n, u in zip(p.measured.sensor_names, p.measured.sensor_units, strict=True)}
+
+
+def send_sensors(
+    stream: rr.RecordingStream, pairs: Sequence[Pair], switches: Sequence[str], path: str = "sensors"
+) -> None:
+    """Scalars at ``<path>/<channel>/measured`` and ``.../predicted``, all rows; ``switches`` are drawn in steps.
 
     The prediction is a thin line upon a thick one, so that both are seen where they agree.
     """
-    for source, colour, width in (
-        (MEASURED_NAME, MEASURED, 3.5),
-        (PREDICTED_NAME, PREDICTED, 1.25),
-    ):
+    for source, colour, width in ((MEASURED_NAME, MEASURED, 3.5), (PREDICTED_NAME, PREDICTED, 1.25)):
         logs = [(p.start_s, p.measured if source == MEASURED_NAME else p.predicted) for p in pairs]
         present = [(start, log) for start, log in logs if log is not None]
         if not present:
             continue
-        for name in present[0][1].sensor_names:
+        for name in units_of(pairs):
             place = f"{path}/{name}/{source}"
-            _send_scalars(stream, place, [(s, g, g.channel(name)) for s, g in present])
-            stream.log(
-                place,
-                rr.SeriesLines(colors=colour, names=source, widths=width),
-                static=True,
+            _send_scalars(stream, place, [(s, g, g.channel(name)) for s, g in present if name in g.sensor_names])
+            line = rr.SeriesLines(
+                colors=colour,
+                names=source,
+                widths=width,
+                # A switch knows no values between its two: neither slopes nor means.
+                interpolation_mode="StepAfter" if name in switches else None,
+                aggregation_policy="MinMax" if name in switches else None,
             )
+            stream.log(place, line, static=True)
 
 
 def residual(pairs: Sequence[Pair], name: str) -> Array:
     """Measured minus predicted of one channel over the rows that both logs of a pair have, all pairs in a row."""
-    return np.concatenate([r for _, _, r in _residuals(pairs, name)])
+    return np.concatenate([np.zeros(0), *(r for _, _, r in _residuals(pairs, name))])
 
 
 def send_residuals(stream: rr.RecordingStream, pairs: Sequence[Pair], path: str = "residuals") -> None:
     """Scalars at ``<path>/<channel>``: measured minus predicted."""
-    first = pairs[0].measured
     seen: dict[str, int] = {}
-    for name, unit in zip(first.sensor_names, first.sensor_units, strict=True):
+    for name, unit in units_of(pairs).items():
         place = f"{path}/{name}"
         _send_scalars(stream, place, _residuals(pairs, name))
         colour = RESIDUALS[seen.setdefault(unit, 0) % len(RESIDUALS)]
@@ -77,7 +84,7 @@ def send_residuals(stream: rr.RecordingStream, pairs: Sequence[Pair], path: str 
 def _residuals(pairs: Sequence[Pair], name: str) -> list[tuple[float, SensorLog, Array]]:
     found = []
     for pair in pairs:
-        if pair.predicted is not None:
+        if pair.predicted is not None and name in pair.measured.sensor_names and name in pair.predicted.sensor_names:
             rows = min(len(pair.measured), len(pair.predicted))
             rest = pair.measured.channel(name)[:rows] - pair.predicted.channel(name)[:rows]
             found.append((pair.start_s, pair.measured.head(rows), rest))
@@ -88,24 +95,11 @@ def send_commands(stream: rr.RecordingStream, pairs: Sequence[Pair], path: str =
     """Scalars at ``<path>/<motor>``: what was commanded on the hardware."""
     for k, name in enumerate(pairs[0].measured.motor_names):
         place = f"{path}/{name}"
-        _send_scalars(
-            stream,
-            place,
-            [(p.start_s, p.measured, p.measured.commands[:, k]) for p in pairs],
-        )
-        stream.log(
-            place,
-            rr.SeriesLines(colors=series_colour(k), names=name, widths=1.0),
-            static=True,
-        )
+        _send_scalars(stream, place, [(p.start_s, p.measured, p.measured.commands[:, k]) for p in pairs])
+        stream.log(place, rr.SeriesLines(colors=series_colour(k), names=name, widths=1.0), static=True)
 
 
-def send_touch(
-    stream: rr.RecordingStream,
-    pairs: Sequence[Pair],
-    names: Sequence[str],
-    path: str = "touch",
-) -> None:
+def send_touch(stream: rr.RecordingStream, pairs: Sequence[Pair], names: Sequence[str], path: str = "touch") -> None:
     """Lanes at ``<path>/<channel>/<source>``: on the ground (channel above zero) or in the air."""
     for name in names:
         for source, colour in ((MEASURED_NAME, MEASURED), (PREDICTED_NAME, PREDICTED)):
@@ -117,28 +111,15 @@ def send_touch(
                     continue
                 down = log.channel(name) > 0
                 rows = changes(down)
-                at += [
-                    pair.start_s + seconds_of(log)[rows],
-                    np.array([pair.start_s + interval_s(log)]),
-                ]
+                at += [pair.start_s + seconds_of(log)[rows], np.array([pair.start_s + interval_s(log)])]
                 states += ["ground" if down[r] else "air" for r in rows] + [None]
             if at:
                 place = f"{path}/{name.removeprefix('touch_')}/{source}"
-                _send_states(
-                    stream,
-                    place,
-                    np.concatenate(at),
-                    states,
-                    {"ground": colour, "air": AIR},
-                    labelled=False,
-                )
+                _send_states(stream, place, np.concatenate(at), states, {"ground": colour, "air": AIR}, labelled=False)
 
 
 def send_trial_lane(
-    stream: rr.RecordingStream,
-    pairs: Sequence[Pair],
-    labels: Sequence[str],
-    path: str = "trial",
+    stream: rr.RecordingStream, pairs: Sequence[Pair], labels: Sequence[str], path: str = "trial"
 ) -> None:
     """One lane that names the trial of each interval."""
     at: list[float] = []
@@ -159,29 +140,19 @@ def _send_states(
 ) -> None:
     values = list(colours)
     labels = values if labelled else [" "] * len(values)
-    stream.log(
-        place,
-        rr.StateConfiguration(values=values, labels=labels, colors=list(colours.values())),
-        static=True,
-    )
+    stream.log(place, rr.StateConfiguration(values=values, labels=labels, colors=list(colours.values())), static=True)
     lengths = [0 if s is None else 1 for s in states]
     column = rr.StateChange.columns(state=[s for s in states if s is not None]).partition(lengths)
     stream.send_columns(place, [times(at)], column)
 
 
-def _send_scalars(
-    stream: rr.RecordingStream,
-    place: str,
-    series: Sequence[tuple[float, SensorLog, Array]],
-) -> None:
+def _send_scalars(stream: rr.RecordingStream, place: str, series: Sequence[tuple[float, SensorLog, Array]]) -> None:
     at: list[Array] = []
     values: list[Array] = []
+    if not series:
+        return
     for start, log, numbers in series:
         # A row without a number after the last one keeps a line from running on into the next trial.
         at += [start + seconds_of(log), np.array([start + interval_s(log)])]
         values += [numbers, np.array([np.nan])]
-    stream.send_columns(
-        place,
-        [times(np.concatenate(at))],
-        rr.Scalars.columns(scalars=np.concatenate(values)),
-    )
+    stream.send_columns(place, [times(np.concatenate(at))], rr.Scalars.columns(scalars=np.concatenate(values)))

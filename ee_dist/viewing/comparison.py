@@ -15,7 +15,7 @@ from ee_dist.trials.log import SensorLog
 from ee_dist.viewing import blueprint, channels, world
 from ee_dist.viewing.channels import Pair
 from ee_dist.viewing.palette import GROUND, PREDICTED
-from ee_dist.viewing.robot3d import Appearance
+from ee_dist.viewing.robot3d import Appearance, Shown
 from ee_dist.viewing.stream import interval_s, log_digest, recording, starts_of
 
 APPLICATION = "ee_dist_comparison"
@@ -52,8 +52,8 @@ def write_comparison_rrd(
     starts = starts_of([(k, [m, p]) for k, (_, m, p) in enumerate(kept)])
     shown = [Pair(name, s, m, p) for (name, m, p), s in zip(kept, starts, strict=True)]
     aside = world.BESIDE_M if robot.free_base else 0.0
-    real = [Appearance(p.start_s, robot, p.measured, p.name) for p in shown]
-    ghost = [Appearance(p.start_s, robot, m, "", aside) for p, (_, _, m) in zip(shown, kept, strict=True)]
+    real = [world.seen(Appearance(p.start_s, robot, p.measured, p.name)) for p in shown]
+    ghost = [world.seen(Appearance(s, robot, p, "", aside)) for s, (_, _, p) in zip(starts, kept, strict=True)]
     rungs = list(ladder or ())
     title = title or f"{robot.name}: measured against predicted".replace("_", " ")
     identity = [robot.digest, title, repr(rungs), *(log_digest(g) for _, m, p in kept for g in (m, p))]
@@ -63,7 +63,7 @@ def write_comparison_rrd(
         _send_ladder(stream, rungs)
         if shown:
             world.send_world(stream, robot, real, ghost, starts)
-            channels.send_sensors(stream, shown)
+            channels.send_sensors(stream, shown, [s.name for s in robot.sensors if s.kind == "touch"])
             channels.send_residuals(stream, shown)
             channels.send_commands(stream, shown)
             channels.send_trial_lane(stream, shown, [p.name for p in shown])
@@ -74,8 +74,8 @@ def comparison_text(title: str, pairs: Sequence[Pair], ladder: Sequence[Rung]) -
     lines = [f"### {title}", "", "**Blue**: measured. **Orange**: predicted.", ""]
     if pairs:
         lines += ["| channel | RMS residual | unit | RMS measured |", "|---|---|---|---|"]
-        for name, unit in zip(pairs[0].measured.sensor_names, pairs[0].measured.sensor_units, strict=True):
-            measured = np.concatenate([p.measured.channel(name) for p in pairs])
+        for name, unit in channels.units_of(pairs).items():
+            measured = np.concatenate([p.measured.channel(name) for p in pairs if name in p.measured.sensor_names])
             lines.append(f"| {name} | {_rms(channels.residual(pairs, name)):.4g} | {unit} | {_rms(measured):.4g} |")
     if ladder:
         lines += ["", "| # | model | error held out | error in the fit |", "|---|---|---|---|"]
@@ -107,7 +107,7 @@ def _send_ladder(stream: rr.RecordingStream, ladder: Sequence[Rung]) -> None:
             stream.log(f"ladder/{name}", chart, static=True)
 
 
-def _blueprint(robot: Robot, pairs: Sequence[Pair], real: Sequence[Appearance], with_ladder: bool) -> rrb.Blueprint:
+def _blueprint(robot: Robot, pairs: Sequence[Pair], real: Shown, with_ladder: bool) -> rrb.Blueprint:
     text = rrb.TextDocumentView(origin="/texts/result", name="Result")
     ladder = [blueprint.bars("/ladder", "Error of each model, numbered as above", legend=True)] if with_ladder else []
     if not pairs:
@@ -115,15 +115,15 @@ def _blueprint(robot: Robot, pairs: Sequence[Pair], real: Sequence[Appearance], 
     end_s = max(p.start_s + interval_s(log) for p in pairs for log in (p.measured, p.predicted) if log is not None)
     axis = blueprint.fixed_axis(0.0, end_s) if end_s <= WHOLE_S else blueprint.moving_axis(*WINDOW_S)
     scene = blueprint.scene_view(robot, "Robot (blue) and its model (orange)", world.eye(robot, real))
-    left = rrb.Vertical(scene, text, *ladder)
-    whole = rrb.Horizontal(left, _channel_tabs(robot, pairs[0].measured, axis), column_shares=[2, 3])
+    left = rrb.Vertical(scene, text, *ladder, row_shares=[3, 4, 3][: 2 + len(ladder)])
+    whole = rrb.Horizontal(left, _channel_tabs(robot, channels.units_of(pairs), axis), column_shares=[2, 3])
     return blueprint.framed(rrb.Vertical(whole, blueprint.chapters(end_s), row_shares=[12, 1]))
 
 
-def _channel_tabs(robot: Robot, log: SensorLog, axis: rrb.TimeAxis) -> rrb.Tabs:
+def _channel_tabs(robot: Robot, units: dict[str, str], axis: rrb.TimeAxis) -> rrb.Tabs:
     """Channels above, what is left of them below; a tab for each kind of channel where they are many."""
     known = {s.name: s for s in robot.sensors}
-    shown = [known.get(n, Sensor(n, "channel", "", u)) for n, u in zip(log.sensor_names, log.sensor_units, strict=True)]
+    shown = [known.get(n, Sensor(n, "channel", "", u)) for n, u in units.items()]
     pages = {"channels": shown}
     if len(shown) > ONE_PAGE:
         pages = {kind: [s for s in shown if s.kind == kind] for kind in dict.fromkeys(s.kind for s in shown)}

@@ -71,19 +71,8 @@ class HeadlessViewer:
 
     def __enter__(self) -> Self:
         port = _free_port()
-        command = [
-            str(viewer_binary()),
-            "--headless",
-            "--bind",
-            "127.0.0.1",
-            "--port",
-            str(port),
-        ]
-        command += [
-            "--hide-welcome-screen",
-            "--window-size",
-            f"{self.size[0]}x{self.size[1]}",
-        ]
+        command = [str(viewer_binary()), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
+        command += ["--hide-welcome-screen", "--window-size", f"{self.size[0]}x{self.size[1]}"]
         self._output = tempfile.TemporaryFile()
         self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=self._output, stderr=self._output)
         try:
@@ -94,10 +83,7 @@ class HeadlessViewer:
         return self
 
     def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._end()
 

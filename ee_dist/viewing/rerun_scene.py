@@ -8,13 +8,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from ee_dist.recording.records import (
-    DIAGNOSIS,
-    PREDICTION,
-    REPAIR,
-    RunRecord,
-    TrialRecord,
-)
+from ee_dist.recording.records import DIAGNOSIS, PREDICTION, REPAIR, RunRecord, TrialRecord
 from ee_dist.viewing import blueprint, channels, search_curves, story, world
 from ee_dist.viewing.channels import Pair
 from ee_dist.viewing.robot3d import Appearance, Shown
@@ -30,49 +24,27 @@ def write_rrd(run: RunRecord, path: str | Path) -> None:
     logs = [(t.index, [t.log, *([predicted[t.index].log] if t.index in predicted else [])]) for t in trials]
     starts = starts_of(logs)
     real, ghost = _appearances(run, trials, starts, predicted)
-    identity = [
-        run.robot.digest,
-        repr(sorted(run.metadata.items())),
-        *(log_digest(t.log) for t in run.trials),
-    ]
-    with recording(
-        path,
-        APPLICATION,
-        identity,
-        story.title_of(run),
-        _blueprint(run, trials, starts, real),
-    ) as stream:
-        for place, text in (
-            ("texts/result", story.result_text(run)),
-            ("texts/details", story.details_text(run)),
-        ):
-            stream.log(
-                place,
-                rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN),
-                static=True,
-            )
+    identity = [run.robot.digest, repr(sorted(run.metadata.items())), *(log_digest(t.log) for t in run.trials)]
+    with recording(path, APPLICATION, identity, story.title_of(run), _blueprint(run, trials, starts, real)) as stream:
+        for place, text in (("texts/result", story.result_text(run)), ("texts/details", story.details_text(run))):
+            stream.log(place, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
         if trials:
             pairs = [
                 Pair(t.name, s, g[0], g[1] if len(g) > 1 else None)
                 for t, s, (_, g) in zip(trials, starts, logs, strict=True)
             ]
+            switches = [s.name for s in run.robot.sensors if s.kind == "touch"]
             world.send_world(stream, run.robot, real, ghost, starts)
-            channels.send_sensors(stream, pairs)
+            channels.send_sensors(stream, pairs, switches)
             channels.send_commands(stream, pairs)
-            channels.send_touch(stream, pairs, [s.name for s in run.robot.sensors if s.kind == "touch"])
+            channels.send_touch(stream, pairs, switches)
             channels.send_trial_lane(stream, pairs, [label(t) for t in trials])
-        for phase, where, what in (
-            (REPAIR, "search/distance", "repair"),
-            (DIAGNOSIS, "search/error", "diagnosis"),
-        ):
+        for phase, where, what in ((REPAIR, "search/distance", "repair"), (DIAGNOSIS, "search/error", "diagnosis")):
             search_curves.send_curve(stream, where, [g for g in run.generations if g.phase == phase], what)
 
 
 def _appearances(
-    run: RunRecord,
-    trials: Sequence[TrialRecord],
-    starts: Sequence[float],
-    predicted: Mapping[int, TrialRecord],
+    run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[float], predicted: Mapping[int, TrialRecord]
 ) -> tuple[Shown, Shown]:
     """The robot and its prediction, one of each for every trial."""
     truth = story.truth_of(run) or ()
@@ -81,11 +53,13 @@ def _appearances(
     ghost: list[Appearance | None] = []
     for t, start in zip(trials, starts, strict=True):
         body = world.believed_model(run.robot, () if t.name == story.INTACT else truth)
-        real.append(Appearance(start, body, t.log, label(t)))
+        real.append(world.seen(Appearance(start, body, t.log, label(t))))
         p = predicted.get(t.index)
-        model = None if p is None else world.believed_model(run.robot, p.believed)
-        text = "" if p is None else f"predicted: {p.log.travel_m:.2f} m"
-        ghost.append(None if p is None or model is None else Appearance(start, model, p.log, text, aside))
+        if p is None:
+            ghost.append(None)
+            continue
+        model, text = world.believed_model(run.robot, p.believed), f"predicted: {p.log.travel_m:.2f} m"
+        ghost.append(world.seen(Appearance(start, model, p.log, text, aside)))
     return real, ghost
 
 
@@ -107,9 +81,7 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
     if not trials:
         return blueprint.framed(rrb.Horizontal(search, text))
     scene = blueprint.scene_view(
-        run.robot,
-        "Robot (blue) and what its model expected (orange)",
-        world.eye(run.robot, real),
+        run.robot, "Robot (blue) and what its model expected (orange)", world.eye(run.robot, real)
     )
     axis = blueprint.moving_axis()
     touch = [s for s in run.robot.sensors if s.kind == "touch"]
@@ -118,15 +90,13 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
     if touch:
         tabs.append(blueprint.lanes("/touch", "Feet on the floor"))
         tabs.append(blueprint.sensor_plots(touch, "Touch values", axis))
-    angles = blueprint.sensor_plots(others, "Angles", axis)
     tabs.append(blueprint.plot("/commands", "Commands (rad)", axis))
-    below = rrb.Horizontal(rrb.Tabs(*tabs, active_tab=0), angles)
+    beside = [blueprint.sensor_plots(others, "Other channels", axis)] if others else []
+    below = rrb.Horizontal(rrb.Tabs(*tabs, active_tab=0), *beside)
     left = rrb.Vertical(scene, below, row_shares=[13, 10])
     right = rrb.Vertical(text, search, row_shares=[9, 5])
     end_s = starts[-1] + interval_s(trials[-1].log)
     whole = rrb.Vertical(
-        rrb.Horizontal(left, right, column_shares=[5, 3]),
-        blueprint.chapters(end_s),
-        row_shares=[12, 1],
+        rrb.Horizontal(left, right, column_shares=[5, 3]), blueprint.chapters(end_s), row_shares=[12, 1]
     )
     return blueprint.framed(whole)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import rerun as rr
@@ -37,70 +38,52 @@ class Appearance:
     label: str
     aside_m: float = 0.0
 
+    @cached_property
+    def moves(self) -> tuple[Array, dict[str, Array]]:
+        """Thinned times (K,) on the timeline, s, and poses (K, 7) of every part; rows that the log lacks left out."""
+        seconds = seconds_of(self.log)
+        rows = thinned(seconds, POSE_HZ)
+        base, joints = _base_poses(self.model, self.log)[rows].copy(), joint_positions(self.model, self.log)[rows]
+        base[:, 1] += self.aside_m
+        known = np.isfinite(base).all(axis=1) & np.isfinite(joints).all(axis=1)
+        return self.start_s + seconds[rows][known], part_poses(self.model, base[known], joints[known])
+
+    @property
+    def body(self) -> Array:
+        """Poses (K, 7) of the root part."""
+        return self.moves[1][self.model.root.name]
+
 
 Shown = Sequence[Appearance | None]
 
 
 def send_robot(
-    stream: rr.RecordingStream,
-    path: str,
-    robot: Robot,
-    shown: Shown,
-    starts_s: Sequence[float],
-    ghost: Rgb | None,
+    stream: rr.RecordingStream, path: str, robot: Robot, shown: Shown, starts_s: Sequence[float], ghost: Rgb | None
 ) -> None:
     """Send a robot under ``path``: one appearance a trial, None where it is not to be seen.
 
     ``ghost`` is the colour of one that is drawn see-through.
     """
-    poses = [None if a is None else poses_of(a) for a in shown]
     for part in robot.parts:
-        place = f"{path}/{part.name}"
-        seen = [p is not None and part.name in p[1] for p in poses]
-        moves = [
-            (a.start_s + p[0], p[1][part.name])
-            for a, p in zip(shown, poses, strict=True)
-            if a is not None and p is not None and part.name in p[1]
-        ]
+        moves = [a.moves for a in shown if a is not None and part.name in a.moves[1]]
         if not moves:
             continue
-        pose = np.concatenate([m[1] for m in moves])
+        place = f"{path}/{part.name}"
+        pose = np.concatenate([poses[part.name] for _, poses in moves])
         columns = rr.Transform3D.columns(translation=pose[:, :3], quaternion=pose[:, 3:])
-        stream.send_columns(place, [times(np.concatenate([m[0] for m in moves]))], columns)
+        stream.send_columns(place, [times(np.concatenate([at for at, _ in moves]))], columns)
+        seen = [a is not None and part.name in a.moves[1] for a in shown]
         for solid in drawn.solids_of(robot, part):
             own = f"{place}/{solid.name}"
             colour = None if solid.senses else ghost or (MEASURED if part is robot.root else LIMB)
             _send_solid(stream, own, solid, colour, ghost is not None, seen, starts_s)
             if solid.senses:
-                _send_touch(
-                    stream,
-                    own,
-                    solid,
-                    _touch_sensor(robot, part.name),
-                    shown,
-                    seen,
-                    ghost or FOOT,
-                )
-    for a, p in zip(shown, poses, strict=True):
-        if a is not None and p is not None and robot.free_base:
-            _send_track(stream, f"{path}/track", a, p[0], p[1][robot.root.name], ghost)
-            _send_gravity(stream, f"{path}/gravity", a, p[0], p[1][robot.root.name])
+                _send_touch(stream, own, solid, _touch_sensor(robot, part.name), shown, seen, ghost or FOOT)
+    if robot.free_base:
+        for a, start in zip(shown, starts_s, strict=True):
+            _send_track(stream, f"{path}/track", a, start, ghost)
+            _send_gravity(stream, f"{path}/gravity", a, start)
     _send_labels(stream, f"{path}/label", robot, shown, starts_s, ghost or MEASURED)
-
-
-def poses_of(a: Appearance) -> tuple[Array, dict[str, Array]]:
-    """Thinned times (K,) since the start of the trial, s, and poses (K, 7) of every part.
-
-    Rows whose numbers are not known are left out.
-    """
-    rows = _every(seconds_of(a.log), POSE_HZ)
-    base, joints = (
-        _base_poses(a.model, a.log)[rows].copy(),
-        joint_positions(a.model, a.log)[rows],
-    )
-    base[:, 1] += a.aside_m
-    known = np.isfinite(base).all(axis=1) & np.isfinite(joints).all(axis=1)
-    return seconds_of(a.log)[rows][known], part_poses(a.model, base[known], joints[known])
 
 
 def joint_positions(robot: Robot, log: SensorLog) -> Array:
@@ -116,10 +99,7 @@ def joint_positions(robot: Robot, log: SensorLog) -> Array:
             found[:, column[sensor.target]] = log.channel(sensor.name)
         elif sensor.kind == "angle":
             joint = robot.joint(sensor.target)
-            middle, half = (
-                (joint.lower + joint.upper) / 2,
-                (joint.upper - joint.lower) / 2,
-            )
+            middle, half = (joint.lower + joint.upper) / 2, (joint.upper - joint.lower) / 2
             found[:, column[sensor.target]] = middle + half * log.channel(sensor.name)
     return found
 
@@ -131,7 +111,7 @@ def _base_poses(robot: Robot, log: SensorLog) -> Array:
     return np.tile(np.array([*robot.start_position_m, *robot.start_rotation]), (len(log), 1))
 
 
-def _every(seconds: Array, hz: float) -> Rows:
+def thinned(seconds: Array, hz: float) -> Rows:
     """Row numbers thinned to about ``hz``; first and last row stay."""
     last = len(seconds) - 1
     if last < 1:
@@ -190,76 +170,51 @@ def changes(states: NDArray[np.bool_]) -> Rows:
 
 
 def _send_track(
-    stream: rr.RecordingStream,
-    place: str,
-    a: Appearance,
-    seconds: Array,
-    base: Array,
-    ghost: Rgb | None,
+    stream: rr.RecordingStream, place: str, a: Appearance | None, start_s: float, ghost: Rgb | None
 ) -> None:
     """The way of the body so far, on the floor."""
-    points = base[:, :3].copy()
+    if a is None:
+        stream.send_columns(place, [times(np.array([start_s]))], rr.LineStrips3D.columns(strips=[]).partition([0]))
+        return
+    seconds, points = a.moves[0], a.body[:, :3].copy()
     points[:, 2] = FLOOR_M
-    kept, ends = _every(seconds, TRACK_HZ), _every(seconds, TRACK_UPDATES_HZ)
+    kept, ends = thinned(seconds, TRACK_HZ), thinned(seconds, TRACK_UPDATES_HZ)
     strips = [points[np.append(kept[kept < end], end)].astype(np.float32) for end in ends]
-    colours, radii = (
-        [ghost or MEASURED] * len(ends),
-        [0.002 if ghost else 0.004] * len(ends),
-    )
+    colours, radii = [ghost or MEASURED] * len(ends), [0.002 if ghost else 0.004] * len(ends)
     columns = rr.LineStrips3D.columns(strips=strips, colors=colours, radii=radii)
-    stream.send_columns(place, [times(a.start_s + seconds[ends])], columns)
+    stream.send_columns(place, [times(seconds[ends])], columns)
 
 
-def _send_gravity(stream: rr.RecordingStream, place: str, a: Appearance, seconds: Array, base: Array) -> None:
+def _send_gravity(stream: rr.RecordingStream, place: str, a: Appearance | None, start_s: float) -> None:
     """An arrow where gravity pulls, on a slope only.
 
     The floor is drawn level: a slope turns gravity, as in the engine.
     """
-    down = np.array(gravity_vector(a.model))
-    if not down[:2].any():
-        stream.send_columns(
-            place,
-            [times(np.array([a.start_s]))],
-            rr.Arrows3D.columns(vectors=[]).partition([0]),
-        )
+    down = np.array((0.0, 0.0, -1.0) if a is None else gravity_vector(a.model))
+    if a is None or not down[:2].any():
+        stream.send_columns(place, [times(np.array([start_s]))], rr.Arrows3D.columns(vectors=[]).partition([0]))
         return
-    arrow, count = GRAVITY_M * down / np.linalg.norm(down), len(seconds)
+    arrow, count = GRAVITY_M * down / np.linalg.norm(down), len(a.body)
     columns = rr.Arrows3D.columns(
-        origins=base[:, :3] - 0.3 * arrow,
+        origins=a.body[:, :3] - 0.3 * arrow,
         vectors=np.tile(arrow, (count, 1)),
         colors=[GRAVITY] * count,
         labels=["gravity"] * count,
         radii=[0.004] * count,
     )
-    stream.send_columns(place, [times(a.start_s + seconds)], columns)
+    stream.send_columns(place, [times(a.moves[0])], columns)
 
 
 def _send_labels(
-    stream: rr.RecordingStream,
-    place: str,
-    robot: Robot,
-    shown: Shown,
-    starts_s: Sequence[float],
-    colour: Rgb,
+    stream: rr.RecordingStream, place: str, robot: Robot, shown: Shown, starts_s: Sequence[float], colour: Rgb
 ) -> None:
+    there = [a for a in shown if a is not None]
     # Above a body that walks; above all of a small robot on a bench.
     above = LABEL_ABOVE_M if robot.free_base else 1.2 * max(drawn.reach(robot, p) for p in robot.parts)
-    at: list[Array] = []
-    points: list[Array] = []
-    for a in shown:
-        if a is not None:
-            seconds, poses = poses_of(a)
-            at.append(a.start_s + seconds)
-            points.append(poses[robot.root.name][:, :3] + np.array((0.0, 0.0, above)))
+    points = np.concatenate([a.body[:, :3] for a in there]) + np.array((0.0, 0.0, above))
     stream.send_columns(
-        place,
-        [times(np.concatenate(at))],
-        rr.Points3D.columns(positions=np.concatenate(points)),
+        place, [times(np.concatenate([a.moves[0] for a in there]))], rr.Points3D.columns(positions=points)
     )
     texts = rr.Points3D.columns(labels=["" if a is None else a.label for a in shown])
     stream.send_columns(place, [times(np.array(starts_s))], texts)
-    stream.log(
-        place,
-        rr.Points3D.from_fields(colors=[colour], radii=[0.0], show_labels=True),
-        static=True,
-    )
+    stream.log(place, rr.Points3D.from_fields(colors=[colour], radii=[0.0], show_labels=True), static=True)

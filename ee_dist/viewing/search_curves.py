@@ -18,19 +18,11 @@ BETWEEN_PASSES = 4
 """Empty places between the bars of two passes."""
 
 
-def send_curve(
-    stream: rr.RecordingStream,
-    path: str,
-    records: Sequence[GenerationRecord],
-    what: str,
-) -> None:
+def send_curve(stream: rr.RecordingStream, path: str, records: Sequence[GenerationRecord], what: str) -> None:
     """Bars at ``<path>/<what>_<pass>``: best of each generation; the axis counts generations over all passes."""
     begin = 0
     for pass_index in sorted({r.pass_index for r in records}):
-        own = sorted(
-            (r for r in records if r.pass_index == pass_index),
-            key=lambda r: r.generation,
-        )
+        own = sorted((r for r in records if r.pass_index == pass_index), key=lambda r: r.generation)
         place = f"{path}/{what}_{pass_index + 1}"
         stream.log(
             place,

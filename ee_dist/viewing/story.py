@@ -40,10 +40,7 @@ def best_hypotheses(run: RunRecord) -> dict[int, HypothesisRecord]:
     best: dict[int, HypothesisRecord] = {}
     for record in run.hypotheses:
         have = best.get(record.pass_index)
-        if have is None or (record.generation, -record.rank) > (
-            have.generation,
-            -have.rank,
-        ):
+        if have is None or (record.generation, -record.rank) > (have.generation, -have.rank):
             best[record.pass_index] = record
     return best
 
@@ -90,13 +87,7 @@ def result_text(run: RunRecord) -> str:
         expected = "" if p is None else f"{p.log.travel_m:.2f}"
         lines.append(f"| {t.name} | {t.log.travel_m:.2f} | {share_text(t, intact)} | {expected} |")
     if best or truth is not None:
-        lines += [
-            "",
-            "**What it believed had changed**",
-            "",
-            "| diagnosis | error | hypothesis |",
-            "|---|---|---|",
-        ]
+        lines += ["", "**What it believed had changed**", "", "| diagnosis | error | hypothesis |", "|---|---|---|"]
         lines += [f"| {k + 1} | {r.error:.3g} | {told(r.terms)} |" for k, r in sorted(best.items())]
         lines.append(f"| **truth** | | **{told(truth)}** |")
     if not run.complete:
@@ -110,13 +101,7 @@ def details_text(run: RunRecord) -> str:
     lines += [f"| {key} | {value} |" for key, value in sorted(run.metadata.items()) if key != "truth"]
     final = [h for h in run.hypotheses if h.final]
     for pass_index in sorted({h.pass_index for h in final}):
-        lines += [
-            "",
-            f"## Last hypotheses of diagnosis {pass_index + 1}",
-            "",
-            "| error | hypothesis |",
-            "|---|---|",
-        ]
+        lines += ["", f"## Last hypotheses of diagnosis {pass_index + 1}", "", "| error | hypothesis |", "|---|---|"]
         own = sorted((h for h in final if h.pass_index == pass_index), key=lambda h: h.rank)
         lines += [f"| {h.error:.4g} | {told(h.terms)} |" for h in own]
     return "\n".join(lines)

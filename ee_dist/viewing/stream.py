@@ -23,11 +23,7 @@ _IDS = uuid.UUID("6b1f3a52-7c1e-5d0a-9f57-1d2c0f6e8a34")
 
 @contextmanager
 def recording(
-    path: str | Path,
-    application: str,
-    identity: Sequence[str],
-    title: str,
-    blueprint: rrb.Blueprint,
+    path: str | Path, application: str, identity: Sequence[str], title: str, blueprint: rrb.Blueprint
 ) -> Iterator[rr.RecordingStream]:
     """A recording that becomes ``path`` when the block ends well.
 

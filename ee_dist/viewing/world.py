@@ -14,7 +14,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 from ee_dist.viewing.drawn import reach
 from ee_dist.viewing.palette import GROUND, PREDICTED
-from ee_dist.viewing.robot3d import Appearance, poses_of, send_robot
+from ee_dist.viewing.robot3d import Appearance, Shown, send_robot
 from ee_dist.viewing.stream import times
 
 WORLD = "world"
@@ -25,27 +25,25 @@ LOOK_AHEAD_M = 0.3
 """How far the camera leaves the robot at most to keep the prediction in sight."""
 WALKING_EYE, WALKING_TARGET = (-0.3, -0.85, 0.75), (0.03, 0.2, 0.06)
 FIXED_EYE = (-0.35, -0.9, 0.3)
-FIXED_DISTANCE = 2.6
+FIXED_DISTANCE = 2.2
 """Of the camera, in sizes of what moves."""
 
-Shown = Sequence[Appearance | None]
 
-
-def send_world(
-    stream: rr.RecordingStream,
-    robot: Robot,
-    real: Shown,
-    ghost: Shown,
-    starts_s: Sequence[float],
-) -> None:
+def send_world(stream: rr.RecordingStream, robot: Robot, real: Shown, ghost: Shown, starts_s: Sequence[float]) -> None:
     """Send all that is seen in 3-D: an appearance a trial of the robot, and of its prediction if there is one."""
     stream.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    send_robot(stream, f"{WORLD}/measured", robot, real, starts_s, None)
+    if any(real):
+        send_robot(stream, f"{WORLD}/measured", robot, real, starts_s, None)
     if any(ghost):
         send_robot(stream, f"{WORLD}/predicted", robot, ghost, starts_s, PREDICTED)
-    if robot.free_base:
+    if robot.free_base and any(real):
         _send_marks(stream, [*real, *ghost])
         _send_focus(stream, real, ghost)
+
+
+def seen(appearance: Appearance) -> Appearance | None:
+    """The appearance, or None where its log holds no pose to draw."""
+    return appearance if len(appearance.moves[0]) else None
 
 
 def believed_model(robot: Robot, hypothesis: Hypothesis) -> Robot:
@@ -60,12 +58,10 @@ def eye(robot: Robot, real: Shown) -> rrb.EyeControls3D:
     """From the right and above: going along with a robot that walks, framing one that stands."""
     if robot.free_base:
         return rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=WALKING_EYE,
-            look_target=WALKING_TARGET,
-            tracking_entity="/" + FOCUS,
+            kind=rrb.Eye3DKind.Orbital, position=WALKING_EYE, look_target=WALKING_TARGET, tracking_entity="/" + FOCUS
         )
-    places = np.concatenate([pose[:, :3] for a in real if a is not None for pose in poses_of(a)[1].values()])
+    found = [pose[:, :3] for a in real if a is not None for pose in a.moves[1].values()]
+    places = np.concatenate(found) if found else np.zeros((1, 3))
     middle = (places.max(axis=0) + places.min(axis=0)) / 2
     spread = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
     size = max(spread, 2 * max(reach(robot, part) for part in robot.parts))
@@ -75,16 +71,11 @@ def eye(robot: Robot, real: Shown) -> rrb.EyeControls3D:
 
 def _send_marks(stream: rr.RecordingStream, shown: Shown) -> None:
     """Lines across the floor at the start and at every metre."""
-    paths = [poses_of(a)[1][a.model.root.name] for a in shown if a is not None]
-    farthest = max((float(p[:, 0].max()) for p in paths if len(p)), default=0.0)
-    marks = range(math.ceil(farthest) + 1)
+    farthest = max(float(a.body[:, 0].max()) for a in shown if a is not None)
+    marks = range(max(math.ceil(farthest), 0) + 1)
     near, far = -0.35, BESIDE_M + 0.35
     lines = [[(x, near, 0.0), (x, far, 0.0)] for x in marks]
-    stream.log(
-        f"{WORLD}/marks",
-        rr.LineStrips3D(lines, colors=GROUND, radii=0.002),
-        static=True,
-    )
+    stream.log(f"{WORLD}/marks", rr.LineStrips3D(lines, colors=GROUND, radii=0.002), static=True)
     labels = ["start" if x == 0 else f"{x} m" for x in marks]
     ends = [(x, near - 0.05, 0.0) for x in marks]
     texts = rr.Points3D(ends, radii=0.0, labels=labels, colors=GROUND, show_labels=True)
@@ -101,19 +92,13 @@ def _send_focus(stream: rr.RecordingStream, real: Shown, ghost: Shown) -> None:
     for a, b in zip(real, ghost, strict=True):
         if a is None:
             continue
-        seconds, poses = poses_of(a)
-        place = poses[a.model.root.name][:, :3].copy()
+        place = a.body[:, :3].copy()
         if b is not None:
-            expected_s, expected = poses_of(b)
-            ahead = np.interp(seconds, expected_s, expected[b.model.root.name][:, 0]) - place[:, 0]
+            ahead = np.interp(a.moves[0], b.moves[0], b.body[:, 0]) - place[:, 0]
             place[:, 0] += np.clip(ahead / 2, -LOOK_AHEAD_M, LOOK_AHEAD_M)
             place[:, 1] += b.aside_m / 2
         place[:, 2] = a.model.start_position_m[2]
-        at.append(a.start_s + seconds)
+        at.append(a.moves[0])
         points.append(place)
-    stream.send_columns(
-        FOCUS,
-        [times(np.concatenate(at))],
-        rr.Points3D.columns(positions=np.concatenate(points)),
-    )
+    stream.send_columns(FOCUS, [times(np.concatenate(at))], rr.Points3D.columns(positions=np.concatenate(points)))
     stream.log(FOCUS, rr.Points3D.from_fields(radii=[0.0]), static=True)

@@ -204,7 +204,8 @@ def _with_rotor(robot: Robot, part: Part) -> Part:
                 x, y, z = joint.axis
                 add = np.array([x * x, y * y, z * z, x * y, x * z, y * z]) * drive.rotor_inertia
                 grown = np.array(part.inertia_kg_m2) + add
-                return replace(part, inertia_kg_m2=tuple(float(v) for v in grown))
+                xx, yy, zz, xy, xz, yz = (float(v) for v in grown)
+                return replace(part, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
     return part
 
 

@@ -1,0 +1,121 @@
+"""explain: which missing effect accounts for the residual. Screen all, fit the promising, judge on held-out data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ee_dist.discrepancy.candidates import Candidate
+from ee_dist.discrepancy.fit import WIDTHS, Fit, Model, fit_all
+from ee_dist.discrepancy.folds import halves
+from ee_dist.discrepancy.judge import Judged, judge, least_energy, ranked
+from ee_dist.discrepancy.misfit import Leftover, leftovers
+from ee_dist.discrepancy.problem import Problem, error
+from ee_dist.discrepancy.screen import Progress, Screened, quiet, screen
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.trials.log import Array
+
+EFFECT, NOTHING_MISSING, UNEXPLAINED = "effect", "nothing_missing", "unexplained"
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is tried. ``shares``: sizes of the probes; ``first``: candidates that get a quick fit; ``final``: those
+    of them that are fitted out and judged; ``starts``: values each is fitted from."""
+
+    shares: tuple[float, ...] = (0.1, 0.6)
+    first: int = 28
+    final: int = 10
+    starts: int = 2
+
+
+@dataclass(eq=False)
+class Explanation:
+    """The outcome. ``candidates`` are ranked; ``left`` is what the best (or the model as it is) leaves unexplained."""
+
+    verdict: str
+    baseline_error: float
+    noise_floor: float
+    floor_source: str
+    candidates: list[Judged]
+    screened: list[Screened]
+    left: list[Leftover]
+    base: Array
+    before: Hypothesis = ()
+    tried: int = 0
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def best(self) -> Judged | None:
+        return self.candidates[0] if self.candidates and self.candidates[0].earned else None
+
+    @property
+    def tied(self) -> list[Judged]:
+        """The best and all that are tied with it."""
+        best = self.best
+        return [] if best is None else [best, *(c for c in self.candidates if c.name in best.tied_with)]
+
+
+def explain(
+    problem: Problem,
+    pool: Sequence[Candidate],
+    before: Hypothesis = (),
+    effort: Effort = Effort(),
+    progress: Progress = quiet,
+) -> Explanation:
+    """Search ``pool`` for what explains the residual that the model with ``before`` leaves."""
+    base = problem.residuals([before])[0]
+    if not np.isfinite(base).all():
+        raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
+    floor, source = problem.noise_floor()
+    screened = screen(problem, pool, before, effort.shares, progress=progress)
+    least = least_energy(len(pool))
+    promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)[: effort.first]
+    half = halves(problem)
+    quick = _fit(problem, promising, before, half, effort.starts, WIDTHS[:2], progress)
+    order = sorted(range(len(quick)), key=lambda i: quick[i].energy)[: effort.final]
+    judged = fit_out(problem, [(quick[i].model, quick[i].u) for i in order], base, before, half, len(pool), progress)
+    found = ranked(judged)
+    best = found[0] if found and found[0].earned else None
+    left = leftovers(problem, base if best is None else best.residual)
+    verdict = EFFECT if best is not None else (UNEXPLAINED if left else NOTHING_MISSING)
+    return Explanation(verdict, error(base), floor, source, found, screened, left, base, before, len(pool))
+
+
+def _fit(
+    problem: Problem,
+    promising: Sequence[Screened],
+    before: Hypothesis,
+    half: Array,
+    starts: int,
+    widths: Sequence[float],
+    progress: Progress,
+) -> list[Fit]:
+    """The better of a few quick fits of each candidate, on all data: it only chooses who is judged."""
+    tasks = [(i, Model((s.candidate,)), u) for i, s in enumerate(promising) for u in s.starts[:starts]]
+    everything = np.ones(len(problem.segment_of), dtype=bool)
+    fits = fit_all(problem, [(m, u) for _, m, u in tasks], before, everything, widths=widths, progress=progress)
+    best: dict[int, Fit] = {}
+    for (i, _, _), fit in zip(tasks, fits, strict=True):
+        if i not in best or fit.energy < best[i].energy:
+            best[i] = fit
+    return [best[i] for i in sorted(best)]
+
+
+def fit_out(
+    problem: Problem,
+    starts: Sequence[tuple[Model, Array]],
+    base: Array,
+    before: Hypothesis,
+    half: Array,
+    tried: int,
+    progress: Progress = quiet,
+) -> list[Judged]:
+    """Each model fitted on either half of the segments from the same start, and judged on the other."""
+    twice = [s for s in starts for _ in range(2)]
+    masks = [half[problem.segment_of] == k for k in range(2)]
+    by_half = [fit_all(problem, list(starts), before, masks[k], widths=WIDTHS[1:], progress=progress) for k in range(2)]
+    assert len(twice) == 2 * len(starts)
+    return [judge(problem, base, (by_half[0][i], by_half[1][i]), half, tried) for i in range(len(starts))]

@@ -1,0 +1,105 @@
+"""Nominal numbers that are never quite right: what a fit puts straight before it looks for missing physics.
+
+They are effects like any other, so that a model file says by how much a data sheet was off, but ``explain`` does not
+propose them by itself: hardly any model would not be a little better for one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.targets import motors
+from ee_dist.robots.model import Drive, Quat, Robot
+
+
+@effect(
+    "motor_gain",
+    family="drive",
+    targets=motors,
+    parameters=(Parameter("change", "1", -0.7, 2.0, 0.0, "change of torque per volt as a share of nominal", 0.01),),
+    physics="The motor makes more or less torque of the same voltage than its data sheet says; its back-EMF stays.",
+    signature="Residual torque in proportion to the voltage or duty cycle.",
+    searchable=False,
+)
+def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    scale = 1.0 + values["change"]
+
+    def stronger(d: Drive) -> Drive:
+        return replace(
+            d,
+            kp=d.kp * scale,
+            ki=d.ki * scale,
+            kd=d.kd * scale,
+            torque_limit=d.torque_limit * scale,
+            speed_limit=d.speed_limit * scale,
+        )
+
+    return robot.map_drive(target, stronger)
+
+
+@effect(
+    "back_emf",
+    family="drive",
+    targets=motors,
+    parameters=(Parameter("change", "1", -0.9, 5.0, 0.0, "change of torque lost per speed as a share of nominal", 0.02),),
+    physics="The voltage that the turning motor makes against its supply is larger or smaller than nominal.",
+    signature="Residual torque in proportion to speed, only while the motor is driven.",
+    searchable=False,
+)
+def back_emf(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    return robot.map_drive(target, lambda d: replace(d, speed_limit=d.speed_limit / (1.0 + values["change"])))
+
+
+@effect(
+    "position_gain",
+    family="drive",
+    targets=motors,
+    parameters=(Parameter("factor", "1", 0.001, 1000.0, 1.0, "factor on the gain of the position controller", 0.01),),
+    physics="The position controller is set to another gain: a setting of the trial rather than a fault.",
+    signature="Residual command in proportion to the position error.",
+    searchable=False,
+)
+def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    return robot.map_drive(target, lambda d: replace(d, kp=d.kp * values["factor"]))
+
+
+@effect(
+    "encoder_zero",
+    family="sensing",
+    targets=motors,
+    parameters=(Parameter("offset", "rad or m", -0.1, 0.1, 0.0, "what the encoder reads where the model has zero", 0.001),),
+    physics="The encoder was mounted a little turned: where it reads zero the joint is not where the model has its zero.",
+    signature="Gravity load shifted along the position axis; nothing where gravity does no work on the joint.",
+    searchable=False,
+)
+def encoder_zero(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    offset = values["offset"]
+    if offset == 0.0:
+        return robot
+    joint = robot.joint(target)
+    if joint.kind == "slide":
+        x, y, z = (-offset * a for a in _turned(joint.rotation, joint.axis))
+        px, py, pz = joint.position_m
+        return robot.with_joint(target, position_m=(px + x, py + y, pz + z))
+    ax, ay, az = joint.axis
+    s, c = math.sin(-offset / 2), math.cos(-offset / 2)
+    return robot.with_joint(target, rotation=_times(joint.rotation, (ax * s, ay * s, az * s, c)))
+
+
+def _times(a: Quat, b: Quat) -> Quat:
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def _turned(q: Quat, v: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z, _ = _times(_times(q, (*v, 0.0)), (-q[0], -q[1], -q[2], q[3]))
+    return x, y, z

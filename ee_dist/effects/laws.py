@@ -1,0 +1,60 @@
+"""A user's own terms of the drive path: functions by name, so that a robot that carries one stays plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class LawContext:
+    """What a drive law sees at a step: arrays (R,) over the joints that carry it, whatever robots they belong to.
+
+    ``position`` rad, ``speed`` rad/s, ``torque`` N.m so far at the joint (m, m/s, N for a slide), ``inertia`` that the
+    joint has at least, ``values`` of the law by name, ``t_s``, ``time_step_s``; ``memory`` lasts for the rollout.
+    """
+
+    def __init__(self, values: dict[str, Array], time_step_s: float, inertia: Array | None = None) -> None:
+        self.values = values
+        self.time_step_s = time_step_s
+        self.inertia: Array = np.ones(0) if inertia is None else inertia
+        self.memory: dict[str, Array] = {}
+        self.t_s = 0.0
+        self.position: Array = np.zeros(0)
+        self.speed: Array = np.zeros(0)
+        self.torque: Array = np.zeros(0)
+
+
+LawFunction = Callable[[LawContext], Array]
+
+LAWS: dict[str, LawFunction] = {}
+"""Drive laws by name: each returns the torque (R,) to add at its joints."""
+
+
+class LawError(KeyError):
+    """A drive law that is not registered, or a name that is taken."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def drive_law(name: str) -> Callable[[LawFunction], LawFunction]:
+    """Register a drive law. Each entry of what it returns may depend on its own joint only. Raises LawError."""
+
+    def register(function: LawFunction) -> LawFunction:
+        if name in LAWS and LAWS[name].__module__ != function.__module__:
+            raise LawError(f"a drive law named {name!r} exists already")
+        LAWS[name] = function
+        return function
+
+    return register
+
+
+def find_law(name: str) -> LawFunction:
+    """The drive law of that name. Raises LawError."""
+    if name not in LAWS:
+        raise LawError(f"no drive law named {name!r}; there are: {', '.join(sorted(LAWS)) or 'none'}")
+    return LAWS[name]

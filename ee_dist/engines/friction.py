@@ -1,0 +1,94 @@
+"""Friction at a fixed time step: dry, viscous and load-dependent, for all joints of a batch at once.
+
+A step is implicit. With p = inertia * speed / dt + (all other torque), the momentum rate that friction works against,
+dry friction takes min(|p|, limit) of it and viscous friction its share of what is left. So friction stops a motion and
+never reverses it, holds a joint at rest under load, and a sliding joint feels exactly the limit.
+
+The other torque includes the load that the rest of the robot puts on the joint. No engine reports it: it is what the
+last step's change of speed needed beyond the last torque. Where the joint is heavier than thought (a leg that stands),
+this reads part of our own torque back as load, which is what makes it stop at the right moment all the same. Stopping
+all joints of a robot at once by this rule is stable as long as no combination of joints is lighter than 3/4 of the
+inertia assumed; ``steady_inertia`` assumes one below the lightest. An impact is over when it shows in the load: the load
+counts up to a small multiple of the friction only, so that a wrong one cannot push a moving joint along.
+
+    dry limit = coulomb + brake + |km*tm - ke*te| + kq*(tm - te)^2 + (stribeck + ks*|tm - te|) * exp(-|speed|/stribeck_speed)
+
+with tm the motor's torque and te the external torque on the joint, so that |tm - te| goes through the gear (Duclusaud et
+al. 2025, "Extended Friction Models for the Physics Simulation of Servo Actuators").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ee_dist.trials.log import Array
+
+LOAD_LIMIT = 2.0
+"""How much net torque counts at most, over the friction at hand. Holding needs 1; sliding evenly needs 1."""
+GEAR_LIMIT = 3.0
+"""Torque through the gear counts up to this multiple of the motor's: more would break the gear, and is an impact."""
+DRY = ("coulomb", "brake", "stribeck")
+LOADED = ("load_friction", "backdrive_friction", "quadratic_friction", "stribeck_load")
+
+
+class Friction:
+    """State and arithmetic of the friction of B robots with M joints. ``p`` are the drives' fields, each (B, M)."""
+
+    def __init__(self, p: Mapping[str, Array], uses: Mapping[str, bool], inertia: Array, dt: float) -> None:
+        self.p, self.uses = p, uses
+        self.per_step = inertia / dt
+        self.loaded = any(uses[n] for n in LOADED)
+        self.most_gear = GEAR_LIMIT * p["torque_limit"]
+        rubbing = np.zeros(inertia.shape, dtype=bool)
+        for name in (*DRY, *LOADED, "viscous"):
+            rubbing |= p[name] != 0
+        self.rubbing = rubbing
+        self.last_speed: Array | None = None
+        self.last_torque = np.zeros(inertia.shape)
+
+    @staticmethod
+    def needed(uses: Mapping[str, bool]) -> bool:
+        return any(uses[n] for n in (*DRY, *LOADED, "viscous"))
+
+    def __call__(self, torque: Array, motor: Array, speed: Array) -> Array:
+        """Torque at the joint less friction, from torque at the joint, torque of the motor, speed: all (B, M)."""
+        p, uses = self.p, self.uses
+        load = 0.0 if self.last_speed is None else self.per_step * (speed - self.last_speed) - self.last_torque
+        net = torque + load
+        limit = self._limit(motor, net - motor, speed)
+        most = LOAD_LIMIT * (limit + p["viscous"] * np.abs(speed))
+        rate = self.per_step * speed + np.clip(net, -most, most)
+        if uses["friction_asymmetry"]:
+            a = p["friction_asymmetry"]
+            dry = np.clip(rate, -limit * (1.0 - a), limit * (1.0 + a))
+        else:
+            dry = np.clip(rate, -limit, limit)
+        taken = dry
+        if uses["viscous"]:
+            left, viscous = rate - dry, p["viscous"]
+            if uses["viscous_asymmetry"]:
+                viscous = viscous * (1.0 + p["viscous_asymmetry"] * np.sign(left))
+            taken = dry + left * viscous / (self.per_step + viscous)
+        return np.where(self.rubbing, torque - taken, torque)
+
+    def _limit(self, motor: Array, external: Array, speed: Array) -> Array:
+        p, uses = self.p, self.uses
+        limit = p["coulomb"] + p["brake"]
+        fading = np.exp(-np.abs(speed) / p["stribeck_speed"]) if uses["stribeck"] or uses["stribeck_load"] else None
+        if uses["stribeck"]:
+            limit = limit + p["stribeck"] * fading
+        if self.loaded:
+            external = np.clip(external, -self.most_gear, self.most_gear)
+            limit = limit + np.abs(p["load_friction"] * motor - p["backdrive_friction"] * external)
+            through = np.abs(motor - external)
+            if uses["quadratic_friction"]:
+                limit = limit + p["quadratic_friction"] * through**2
+            if uses["stribeck_load"]:
+                limit = limit + p["stribeck_load"] * fading * through
+        return limit
+
+    def record(self, torque: Array, speed: Array) -> None:
+        """Remember the torque that the step is made with."""
+        self.last_speed, self.last_torque = speed, torque
