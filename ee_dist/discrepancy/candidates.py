@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ee_dist.effects.catalogue import CATALOGUE, Effect, Term
+from ee_dist.effects.catalogue import CATALOGUE, Effect, EffectError, Term, find
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect at a target. Its values are searched as shares ``u`` (P,) of the way from neutral to a bound."""
+    """An effect at a target. Its values are searched as shares ``u`` (P,) of the way from neutral to a bound.
+
+    ``bounds`` (lower, upper) of each parameter are those worth trying on this robot; ``inert`` are parameters that do
+    nothing while the others are neutral (the speed at which a friction falls off).
+    """
 
     effect: Effect
     target: str
+    bounds: tuple[tuple[float, float], ...]
+    inert: tuple[int, ...] = ()
 
     @property
     def name(self) -> str:
@@ -31,28 +38,35 @@ class Candidate:
     @property
     def lower(self) -> Array:
         """Smallest u: -1 where the parameter has room below neutral, else 0."""
-        return np.array([-1.0 if p.lower < p.neutral else 0.0 for p in self.effect.parameters])
+        pairs = zip(self.effect.parameters, self.bounds, strict=True)
+        return np.array([-1.0 if low < p.neutral else 0.0 for p, (low, _) in pairs])
 
     @property
     def upper(self) -> Array:
-        return np.array([1.0 if p.upper > p.neutral else 0.0 for p in self.effect.parameters])
+        pairs = zip(self.effect.parameters, self.bounds, strict=True)
+        return np.array([1.0 if high > p.neutral else 0.0 for p, (_, high) in pairs])
 
     def values(self, u: Sequence[float] | Array) -> dict[str, float]:
         """Parameters by name, in their own units, within bounds."""
         found = {}
-        for p, share in zip(self.effect.parameters, u, strict=True):
-            room = p.upper - p.neutral if share >= 0 else p.neutral - p.lower
-            found[p.name] = float(min(max(p.neutral + float(share) * room, p.lower), p.upper))
+        for p, (low, high), share in zip(self.effect.parameters, self.bounds, u, strict=True):
+            room = high - p.neutral if share >= 0 else p.neutral - low
+            found[p.name] = float(min(max(p.neutral + float(share) * room, low), high))
         return found
 
-    def shares(self, values: dict[str, float]) -> Array:
+    def shares(self, values: Mapping[str, float]) -> Array:
         """The inverse of ``values``."""
         out = []
-        for p in self.effect.parameters:
+        for p, (low, high) in zip(self.effect.parameters, self.bounds, strict=True):
             gap = values[p.name] - p.neutral
-            room = p.upper - p.neutral if gap >= 0 else p.neutral - p.lower
+            room = high - p.neutral if gap >= 0 else p.neutral - low
             out.append(gap / room if room else 0.0)
         return np.array(out)
+
+    def rooms(self, u: Sequence[float] | Array) -> Array:
+        """(P,) what a unit of u is in the parameters' own units, at u."""
+        sides = zip(self.effect.parameters, self.bounds, u, strict=True)
+        return np.array([high - p.neutral if share >= 0 else p.neutral - low for p, (low, high), share in sides])
 
     def term(self, u: Sequence[float] | Array) -> Term:
         return Term(self.effect.name, self.target, tuple(self.values(u).items()))
@@ -64,12 +78,28 @@ class Candidate:
         points = []
         for k in range(self.size):
             for side in (self.upper[k], self.lower[k]):
-                if side:
+                if side and k not in self.inert:
                     points += [side * share * np.eye(self.size)[k] for share in shares]
-        if self.size > 1 and self.effect.parameters[0].neutral == 0.0:
-            # A second parameter often shapes the first (a speed, a place) and does nothing alone: neutral stays.
-            pass
         return points
+
+
+def candidate(robot: Robot, effect: Effect | str, target: str) -> Candidate:
+    """An effect at a target, with the range worth trying. Raises EffectError for an unknown effect or target."""
+    entry = find(effect) if isinstance(effect, str) else effect
+    allowed = entry.targets(robot)
+    if target not in allowed:
+        near = difflib.get_close_matches(target, allowed, n=3, cutoff=0.4) or allowed[:8]
+        raise EffectError(f"{entry.name} cannot act on {target!r} of {robot.name}; it can act on: {', '.join(near)}")
+    worth = entry.bounds(robot, target)
+    bounds = tuple(worth[p.name] for p in entry.parameters)
+    plain = Candidate(entry, target, bounds)
+    inert = []
+    if plain.size > 1:
+        for k in range(plain.size):
+            u = (plain.upper if plain.upper[k] else plain.lower) * 0.5 * np.eye(plain.size)[k]
+            if entry.transform(robot, target, plain.values(u)) == robot:
+                inert.append(k)
+    return Candidate(entry, target, bounds, tuple(inert))
 
 
 def candidates(robot: Robot, without: Iterable[str] = (), only: Iterable[str] | None = None) -> list[Candidate]:
@@ -84,8 +114,34 @@ def candidates(robot: Robot, without: Iterable[str] = (), only: Iterable[str] | 
         if not entry.searchable or entry.name in banned:
             continue
         for target in entry.targets(robot):
-            candidate = Candidate(entry, target)
-            if candidate.name in banned or (wanted is not None and not {entry.name, candidate.name} & wanted):
+            name = f"{entry.name}@{target}" if target else entry.name
+            if name in banned or (wanted is not None and not {entry.name, name} & wanted):
                 continue
-            found.append(candidate)
+            found.append(candidate(robot, entry, target))
     return found
+
+
+def parse(robot: Robot, text: str) -> Candidate:
+    """A candidate as typed: ``coulomb_friction@knee_front_left``. Raises EffectError with the nearest names."""
+    name, _, target = text.partition("@")
+    entry = find(name)
+    targets = entry.targets(robot)
+    if not target and len(targets) == 1:
+        target = targets[0]
+    return candidate(robot, entry, target)
+
+
+def known(robot: Robot, term: Term) -> Candidate:
+    """The candidate of a term of a model file, its range widened to hold the term's own values."""
+    plain = candidate(robot, term.effect, term.target)
+    values = dict(term.values)
+    bounds = tuple(
+        (min(low, values[p.name]), max(high, values[p.name]))
+        for p, (low, high) in zip(plain.effect.parameters, plain.bounds, strict=True)
+    )
+    return Candidate(plain.effect, plain.target, bounds, plain.inert)
+
+
+def excluded_effects() -> Sequence[str]:
+    """Effects of the catalogue that are never proposed by themselves."""
+    return [e.name for e in CATALOGUE.values() if not e.searchable]

@@ -13,6 +13,7 @@ from ee_dist.discrepancy.folds import halves
 from ee_dist.discrepancy.judge import Judged, judge, least_energy, ranked
 from ee_dist.discrepancy.misfit import Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem, error
+from ee_dist.discrepancy.scan import Scanned, scan
 from ee_dist.discrepancy.screen import Progress, Screened, quiet, screen
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
@@ -22,13 +23,14 @@ EFFECT, NOTHING_MISSING, UNEXPLAINED = "effect", "nothing_missing", "unexplained
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is tried. ``shares``: sizes of the probes; ``first``: candidates that get a quick fit; ``final``: those
-    of them that are fitted out and judged; ``starts``: values each is fitted from."""
+    """How much is tried. ``shares``: sizes of the probes; ``first``: candidates that are scanned over their range;
+    ``second``: those of them that get a quick fit, from ``starts`` points each; ``final``: those fitted out and judged."""
 
     shares: tuple[float, ...] = (0.1, 0.6)
-    first: int = 28
-    final: int = 10
+    first: int = 24
+    second: int = 12
     starts: int = 2
+    final: int = 6
 
 
 @dataclass(eq=False)
@@ -70,11 +72,12 @@ def explain(
     if not np.isfinite(base).all():
         raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
     floor, source = problem.noise_floor()
-    screened = screen(problem, pool, before, effort.shares, progress=progress)
+    screened = screen(problem, pool, before, effort.shares, screening_trials(problem, base), progress=progress)
     least = least_energy(len(pool))
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)[: effort.first]
     half = halves(problem)
-    quick = _fit(problem, promising, before, half, effort.starts, WIDTHS[:2], progress)
+    scanned = sorted(scan(problem, promising, before, progress=progress), key=lambda s: s.energy)[: effort.second]
+    quick = _fit(problem, scanned, before, effort.starts, progress)
     order = sorted(range(len(quick)), key=lambda i: quick[i].energy)[: effort.final]
     judged = fit_out(problem, [(quick[i].model, quick[i].u) for i in order], base, before, half, len(pool), progress)
     found = ranked(judged)
@@ -84,19 +87,29 @@ def explain(
     return Explanation(verdict, error(base), floor, source, found, screened, left, base, before, len(pool))
 
 
-def _fit(
-    problem: Problem,
-    promising: Sequence[Screened],
-    before: Hypothesis,
-    half: Array,
-    starts: int,
-    widths: Sequence[float],
-    progress: Progress,
-) -> list[Fit]:
+def screening_trials(problem: Problem, base: Array, share: float = 0.5) -> list[int]:
+    """Trials to screen on: those with most to explain for their length, up to a share of all values. One trial in which
+    a controller was in the loop is always among them: only there does wiring show."""
+    count = len(problem.trials)
+    own = [problem.trial_of_segment[problem.segment_of] == k for k in range(count)]
+    size = np.array([m.sum() for m in own], dtype=float)
+    excess = np.array([float((base[m] ** 2 - problem.floor[m]).sum()) for m in own])
+    order = sorted(range(count), key=lambda k: -excess[k] / max(size[k], 1.0))
+    chosen: list[int] = []
+    for k in order:
+        if not chosen or size[chosen].sum() < share * size.sum():
+            chosen.append(k)
+    looped = getattr(problem, "looped", ())
+    if looped and not set(looped) & set(chosen):
+        chosen.append(looped[0])
+    return sorted(chosen)
+
+
+def _fit(problem: Problem, scanned: Sequence[Scanned], before: Hypothesis, starts: int, progress: Progress) -> list[Fit]:
     """The better of a few quick fits of each candidate, on all data: it only chooses who is judged."""
-    tasks = [(i, Model((s.candidate,)), u) for i, s in enumerate(promising) for u in s.starts[:starts]]
+    tasks = [(i, Model((s.candidate,)), u) for i, s in enumerate(scanned) for u in s.starts[:starts]]
     everything = np.ones(len(problem.segment_of), dtype=bool)
-    fits = fit_all(problem, [(m, u) for _, m, u in tasks], before, everything, widths=widths, progress=progress)
+    fits = fit_all(problem, [(m, u) for _, m, u in tasks], before, everything, widths=WIDTHS[1:3], progress=progress)
     best: dict[int, Fit] = {}
     for (i, _, _), fit in zip(tasks, fits, strict=True):
         if i not in best or fit.energy < best[i].energy:
@@ -114,8 +127,6 @@ def fit_out(
     progress: Progress = quiet,
 ) -> list[Judged]:
     """Each model fitted on either half of the segments from the same start, and judged on the other."""
-    twice = [s for s in starts for _ in range(2)]
     masks = [half[problem.segment_of] == k for k in range(2)]
     by_half = [fit_all(problem, list(starts), before, masks[k], widths=WIDTHS[1:], progress=progress) for k in range(2)]
-    assert len(twice) == 2 * len(starts)
     return [judge(problem, base, (by_half[0][i], by_half[1][i]), half, tried) for i in range(len(starts))]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.drivers import Commands, Driver, Network
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
@@ -14,12 +15,14 @@ from ee_dist.trials.log import SensorLog
 class MeasuredTrial:
     """``driver`` is what the experimenter sent; None where only the log's own commands are known.
 
-    Trials of one ``name`` are repeats of one another: the noise floor is measured from them.
+    Trials of one ``name`` are repeats of one another: the noise floor is measured from them. ``setup`` is what is known
+    to be special about the trial (a gain, a payload); it is applied to the model before any hypothesis.
     """
 
     name: str
     log: SensorLog
     driver: Driver | None = None
+    setup: Hypothesis = ()
 
 
 def driver_of(excitation: Excitation, robot: Robot) -> Commands | Network:

@@ -26,6 +26,8 @@ COMMAND_SHARE = 0.005
 """Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
 _SOFT_FLOOR = 0.974
 """Mean square of SOFT * asinh(x / SOFT) for standard normal x."""
+_ROUGH_FLOOR = 0.93
+"""Mean square of the comparison of roughness, for white noise."""
 
 
 def soften(values: Array) -> Array:
@@ -54,6 +56,7 @@ class OpenLoop:
         self.scale = channel_scale(robot, trials, unmodelled)
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self.trials = tuple(t.name for t in trials)
+        self.looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
         self.channels = (*robot.sensor_names, *(f"command_{m}" for m in robot.motor_names))
         self._data = [digest(t.log.sensors, block, window) for t in trials]
         self._lay_out()
@@ -74,6 +77,7 @@ class OpenLoop:
         dt, at = self.robot.time_step_s, 0
         self.start_s: list[float] = []
         tiny = (self.scale.noise / self.scale.scale) ** 2
+        texture = np.concatenate([_ROUGH_FLOOR * tiny, np.zeros(s)])
         for k, trial in enumerate(self.measured):
             blocks, windows = len(trial.log) // self.block, len(trial.log) // self.window
             first = len(names)
@@ -83,7 +87,7 @@ class OpenLoop:
             of_block = first + np.minimum(np.arange(blocks) // per, count - 1)
             seg += [np.repeat(of_block, s), np.repeat(first + np.arange(windows), 2 * s)]
             chan += [np.tile(np.arange(s), blocks), np.tile(np.arange(s), 2 * windows)]
-            floor += [np.tile(tiny * _SOFT_FLOOR, blocks), np.ones(2 * s * windows)]
+            floor += [np.tile(tiny * _SOFT_FLOOR, blocks), np.tile(texture, windows)]
             if isinstance(trial.driver, Network):
                 m = len(self.robot.drives)
                 seg.append(np.repeat(of_block, m))
@@ -135,3 +139,23 @@ class OpenLoop:
 
     def noise_floor(self) -> tuple[float, str]:
         return float(np.sqrt(self.floor.mean())), self.scale.source
+
+    # -- views of a residual -----------------------------------------------------------------------------------------
+
+    def blocks(self, trial: int, residual: Array) -> Array:
+        """(T // block, S): the part of a residual (n,) that compares means, of one trial."""
+        rows, s = len(self.measured[trial].log) // self.block, len(self.robot.sensors)
+        return residual[self.slices[trial]][: rows * s].reshape(rows, s)
+
+    def raw_blocks(self, trial: int, residual: Array) -> Array:
+        """The same before softening: in standard deviations."""
+        return np.asarray(SOFT * np.sinh(self.blocks(trial, residual) / SOFT))
+
+    def block_floor(self, channel: int) -> float:
+        """Mean square that noise leaves of a value of ``blocks``."""
+        return float((self.scale.noise[channel] / self.scale.scale[channel]) ** 2 * _SOFT_FLOOR)
+
+    def command_scale(self, channel: str) -> float:
+        """What a residual of 1 is for ``command_<motor>``, rad (m)."""
+        joint = self.robot.joint(channel.removeprefix("command_"))
+        return COMMAND_SHARE * (joint.upper - joint.lower)

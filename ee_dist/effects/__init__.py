@@ -1,6 +1,43 @@
 """The effect catalogue. Importing this package registers the effects that come with it."""
 
-from ee_dist.effects import body, calibration, drive, sensing, wiring, world  # noqa: F401
-from ee_dist.effects.catalogue import CATALOGUE, Effect, EffectError, Hypothesis, Parameter, Term, apply, term
+from ee_dist.effects import (  # noqa: F401
+    body,
+    calibration,
+    controller_laws,
+    drive,
+    friction,
+    sensing,
+    transmission,
+    wiring,
+    world,
+)
+from ee_dist.effects.catalogue import (
+    CATALOGUE,
+    Effect,
+    EffectError,
+    Hypothesis,
+    Parameter,
+    Term,
+    apply,
+    effect,
+    load_plugin,
+    loaded_plugins,
+    term,
+)
+from ee_dist.effects.laws import LawContext, drive_law
 
-__all__ = ["CATALOGUE", "Effect", "EffectError", "Hypothesis", "Parameter", "Term", "apply", "term"]
+__all__ = [
+    "CATALOGUE",
+    "Effect",
+    "EffectError",
+    "Hypothesis",
+    "LawContext",
+    "Parameter",
+    "Term",
+    "apply",
+    "drive_law",
+    "effect",
+    "load_plugin",
+    "loaded_plugins",
+    "term",
+]

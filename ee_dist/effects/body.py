@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import replace
 
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import Parameter, Range, effect
 from ee_dist.effects.targets import carried_parts, parts
 from ee_dist.robots.model import Robot
 
@@ -41,32 +41,31 @@ def part_mass(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.with_part(target, mass_kg=scale * part.mass_kg, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
 
 
+def _shifts(robot: Robot, target: str) -> dict[str, Range]:
+    """Up to four fifths of the way to the end of the part, and no more than 0.1 m."""
+    part = robot.part(target)
+    reach = 0.0
+    for shape in part.shapes:
+        middle = math.dist(shape.position_m, part.com_m)
+        half = max(shape.size) if shape.kind != "capsule" else shape.size[0] + shape.size[1] / 2
+        reach = max(reach, middle + half)
+    most = min(0.1, 0.8 * (reach or 0.1))
+    return {"along_x_m": (-most, most), "along_y_m": (-most, most)}
+
+
 @effect(
     "com_shifted",
     family="body",
     targets=parts,
     parameters=(
-        Parameter("along_x_m", "m", -0.1, 0.1, 0.0, "shift along the part's x axis", 0.002),
-        Parameter("along_y_m", "m", -0.1, 0.1, 0.0, "shift along the part's y axis", 0.002),
+        Parameter("along_x_m", "m", -math.inf, math.inf, 0.0, "shift along the part's x axis", 0.002),
+        Parameter("along_y_m", "m", -math.inf, math.inf, 0.0, "shift along the part's y axis", 0.002),
     ),
     physics="The centre of mass of a part lies elsewhere than in the model, as with a payload or a battery put on one side.",
     signature="A lean that is constant at rest and turns with the part; joint load differs between the sides.",
+    reference="Featherstone 2008, Rigid Body Dynamics Algorithms, section 2.13",
+    ranges=_shifts,
 )
 def com_shifted(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     x, y, z = robot.part(target).com_m
     return robot.with_part(target, com_m=(x + values["along_x_m"], y + values["along_y_m"], z))
-
-
-@effect(
-    "rotor_inertia",
-    family="drive",
-    targets=lambda robot: robot.motor_names,
-    parameters=(Parameter("change", "1", -0.9, 4.0, 0.0, "change of reflected rotor inertia as a share of nominal", 0.05),),
-    physics="The spinning rotor behind the gear is heavier than modelled: it resists acceleration of the joint, not its position.",
-    signature="Residual torque proportional to joint acceleration, not to speed or position; steps rise late and overshoot.",
-)
-def rotor_inertia(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    def heavier(drive):  # type: ignore[no-untyped-def]
-        return replace(drive, rotor_inertia=drive.rotor_inertia * (1.0 + values["change"]))
-
-    return robot.map_drive(target, heavier)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ee_dist.effects.catalogue import Parameter, effect
-from ee_dist.effects.targets import motors
+from ee_dist.effects.targets import motors, motors_with_speed_limit
 from ee_dist.robots.model import Drive, Quat, Robot
 
 
@@ -43,7 +43,7 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 @effect(
     "back_emf",
     family="drive",
-    targets=motors,
+    targets=motors_with_speed_limit,
     parameters=(Parameter("change", "1", -0.9, 5.0, 0.0, "change of torque lost per speed as a share of nominal", 0.02),),
     physics="The voltage that the turning motor makes against its supply is larger or smaller than nominal.",
     signature="Residual torque in proportion to speed, only while the motor is driven.",
@@ -57,7 +57,7 @@ def back_emf(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     "position_gain",
     family="drive",
     targets=motors,
-    parameters=(Parameter("factor", "1", 0.001, 1000.0, 1.0, "factor on the gain of the position controller", 0.01),),
+    parameters=(Parameter("factor", "1", 0.01, 100.0, 1.0, "factor on the gain of the position controller", 0.01),),
     physics="The position controller is set to another gain: a setting of the trial rather than a fault.",
     signature="Residual command in proportion to the position error.",
     searchable=False,
@@ -70,7 +70,7 @@ def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
     "encoder_zero",
     family="sensing",
     targets=motors,
-    parameters=(Parameter("offset", "rad or m", -0.1, 0.1, 0.0, "what the encoder reads where the model has zero", 0.001),),
+    parameters=(Parameter("offset", "rad", -0.1, 0.1, 0.0, "what the encoder reads where the model has zero", 0.001),),
     physics="The encoder was mounted a little turned: where it reads zero the joint is not where the model has its zero.",
     signature="Gravity load shifted along the position axis; nothing where gravity does no work on the joint.",
     searchable=False,

@@ -5,20 +5,26 @@ An effect is registered by decorating its transform ``(robot, target, values) ->
     @effect("motor_weak", family="drive", targets=motors, parameters=(Parameter("loss", "1", 0.0, 1.0, 0.0),), ...)
     def motor_weak(robot, target, values): ...
 
-A user's own file does the same and takes part in everything; see docs.
+A user's own file does the same and takes part in everything; see docs/own_effect.md.
 """
 
 from __future__ import annotations
 
 import difflib
+import hashlib
 import importlib.util
+import math
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ee_dist.effects.laws import LAWS
 from ee_dist.robots.model import Robot, RobotError
 
 FAMILIES = ("body", "world", "drive", "sensing", "wiring")
@@ -30,7 +36,11 @@ class EffectError(ValueError):
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect: its unit, its bounds, and the value at which the effect does nothing."""
+    """One number of an effect: its unit, its bounds, and the value at which the effect does nothing.
+
+    ``lower`` and ``upper`` are what physics allows (infinite where it sets no limit); which values are worth trying on
+    a robot says ``Effect.bounds``. ``unit`` is that of a hinge; on a slide see ``Effect.unit``.
+    """
 
     name: str
     unit: str
@@ -43,6 +53,21 @@ class Parameter:
 
 
 Transform = Callable[[Robot, str, Mapping[str, float]], Robot]
+Range = tuple[float, float]
+Ranges = Callable[[Robot, str], Mapping[str, Range]]
+
+SLIDE_UNITS = {
+    "rad": "m",
+    "rad/s": "m/s",
+    "N.m": "N",
+    "N.m/rad": "N/m",
+    "N.m.s/rad": "N.s/m",
+    "rad/(N.m)": "m/N",
+    "1/(N.m)": "1/N",
+    "kg.m^2": "kg",
+}
+"""What a unit of a hinge is on a slide."""
+RESERVED = frozenset({"effect", "target", "effect_name"})
 
 
 @dataclass(frozen=True)
@@ -59,6 +84,8 @@ class Effect:
     reference: str = ""
     searchable: bool = True
     """Whether ``explain`` proposes it by itself."""
+    ranges: Ranges | None = None
+    """Values worth trying on a robot at a target, for parameters whose scale depends on them."""
 
     @property
     def main(self) -> Parameter:
@@ -73,6 +100,25 @@ class Effect:
 
     def neutral_values(self) -> dict[str, float]:
         return {p.name: p.neutral for p in self.parameters}
+
+    def bounds(self, robot: Robot, target: str) -> dict[str, Range]:
+        """(lower, upper) worth trying at this target, by parameter: finite, around neutral, within the hard bounds."""
+        own = {} if self.ranges is None else self.ranges(robot, target)
+        found = {}
+        for p in self.parameters:
+            low, high = own.get(p.name, (p.lower, p.upper))
+            found[p.name] = (max(p.lower, min(low, p.neutral)), min(p.upper, max(high, p.neutral)))
+            if not all(map(math.isfinite, found[p.name])):
+                raise EffectError(f"{self.name}: {p.name} has no finite range at {target!r} of {robot.name}")
+        return found
+
+    def unit(self, parameter: str, robot: Robot, target: str) -> str:
+        """The unit of a parameter at this target: N on a slide where it is N.m on a hinge, or the unit of a channel."""
+        unit = self.parameter(parameter).unit
+        if unit == "channel":
+            return next((s.unit for s in robot.sensors if s.name == target), unit)
+        slide = any(j.name == target and j.kind == "slide" for j in robot.joints)
+        return SLIDE_UNITS.get(unit, unit) if slide else unit
 
 
 @dataclass(frozen=True)
@@ -114,6 +160,7 @@ def effect(
     signature: str,
     reference: str = "",
     searchable: bool = True,
+    ranges: Ranges | None = None,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
@@ -123,12 +170,27 @@ def effect(
         if family not in FAMILIES:
             raise EffectError(f"{name}: no family {family!r}; there are: {', '.join(FAMILIES)}")
         for p in parameters:
-            if not p.lower <= p.neutral <= p.upper:
+            if not p.name.isidentifier() or p.name in RESERVED:
+                raise EffectError(f"{name}: {p.name!r} cannot be the name of a parameter")
+            if not p.lower <= p.neutral <= p.upper or not math.isfinite(p.neutral):
                 raise EffectError(f"{name}: the neutral value of {p.name} lies outside its bounds")
-        _registry[name] = Effect(name, family, transform, targets, parameters, physics, signature, reference, searchable)
+            if ranges is None and not (math.isfinite(p.lower) and math.isfinite(p.upper)):
+                raise EffectError(f"{name}: {p.name} has no finite bounds, so the effect must give ranges")
+        _registry[name] = Effect(
+            name, family, transform, targets, parameters, physics, signature, reference, searchable, ranges
+        )
         return transform
 
     return register
+
+
+def always(**ranges: Range) -> Ranges:
+    """Ranges that are the same for every robot, for parameters whose hard bounds are wider."""
+    return partial(_given, ranges)
+
+
+def _given(ranges: Mapping[str, Range], robot: Robot, target: str) -> Mapping[str, Range]:
+    return ranges
 
 
 def find(name: str) -> Effect:
@@ -145,7 +207,7 @@ def term(effect_name: str, target: str = "", **values: float) -> Term:
     entry = find(effect_name)
     for key, value in values.items():
         p = entry.parameter(key)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:
+        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
             raise EffectError(f"{effect_name}: {key} must be a number ({p.unit}), not {value!r}")
         if not p.lower <= value <= p.upper:
             raise EffectError(f"{effect_name}: {key} = {value:g} lies outside [{p.lower:g}, {p.upper:g}] {p.unit}")
@@ -155,10 +217,14 @@ def term(effect_name: str, target: str = "", **values: float) -> Term:
 
 def from_dict(entry: Mapping[str, Any]) -> Term:
     """A term from ``{effect, target, <parameter>: value}``. Raises EffectError."""
+    if not isinstance(entry, Mapping):
+        raise EffectError(f"an effect is written {{effect: ..., target: ..., <parameter>: <value>}}, not {entry!r}")
     if "effect" not in entry:
         raise EffectError(f"an entry without 'effect': {dict(entry)!r}")
-    values = {str(k): v for k, v in entry.items() if k not in ("effect", "target")}
-    return term(str(entry["effect"]), str(entry.get("target") or ""), **values)
+    name, values = str(entry["effect"]), {str(k): v for k, v in entry.items() if k not in ("effect", "target")}
+    for key in values:
+        find(name).parameter(key)
+    return term(name, str(entry.get("target") or ""), **values)
 
 
 def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
@@ -176,15 +242,52 @@ def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
     return robot
 
 
+_plugins: dict[str, str] = {}
+
+
 def load_plugin(path: str | Path) -> None:
-    """Run a user's file that registers effects of their own. Raises EffectError where it cannot be read."""
-    file = Path(path)
+    """Run a user's file that registers effects of their own; again only if it has changed.
+
+    Raises EffectError where it cannot be read, fails or registers nothing; the catalogue is then as it was.
+    """
+    file = Path(path).resolve()
     if not file.is_file():
-        raise EffectError(f"no such file of effects: {file}")
-    name = f"ee_dist_plugin_{file.stem}"
+        raise EffectError(f"no such file of effects: {path}")
+    content = hashlib.sha256(file.read_bytes()).hexdigest()
+    if _plugins.get(str(file)) == content:
+        return
+    # Two files may share a name; the module's name tells them apart and is the same in every process.
+    name = f"ee_dist_plugin_{file.stem}_{hashlib.sha256(str(file).encode()).hexdigest()[:8]}"
     spec = importlib.util.spec_from_file_location(name, file)
     if spec is None or spec.loader is None:
-        raise EffectError(f"not a Python file: {file}")
+        raise EffectError(f"not a Python file: {path}")
+    before, laws = dict(_registry), dict(LAWS)
+    for registry in (_registry, LAWS):
+        for key in [k for k, v in registry.items() if getattr(v, "transform", v).__module__ == name]:
+            del registry[key]  # type: ignore[attr-defined]
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+        if not any(e.transform.__module__ == name for e in _registry.values()):
+            raise EffectError("it registers no effect; decorate its transform with @effect(...)")
+    except Exception as error:
+        _registry.clear()
+        _registry.update(before)
+        LAWS.clear()
+        LAWS.update(laws)
+        kind = "" if isinstance(error, EffectError) else f"{type(error).__name__}: "
+        raise EffectError(f"{path}{_line_of(error, file)}: {kind}{error}") from error
+    _plugins[str(file)] = content
+
+
+def loaded_plugins() -> tuple[str, ...]:
+    """Absolute paths of the files loaded so far, in order: what a worker process must load to know the same effects."""
+    return tuple(_plugins)
+
+
+def _line_of(error: Exception, file: Path) -> str:
+    if isinstance(error, SyntaxError):
+        return f", line {error.lineno}"
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(file)]
+    return f", line {lines[-1]}" if lines else ""

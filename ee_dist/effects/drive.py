@@ -1,14 +1,18 @@
-"""Effects in the drives: motor, gear and position controller of a joint."""
+"""Effects in the motor and its position controller."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, effect
-from ee_dist.effects.targets import motors
-from ee_dist.robots.model import Drive, Robot
+from ee_dist.effects.catalogue import Parameter, Range, effect
+from ee_dist.effects.targets import motors, motors_with_speed_limit, motors_with_torque_limit, supply
+from ee_dist.robots.model import Drive, Robot, RobotError
+
+MOTORS = "Hughes and Drury 2013, Electric Motors and Drives, chapter 3"
 
 
 @effect(
@@ -28,13 +32,160 @@ def motor_weak(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 
 
 @effect(
-    "joint_jam",
+    "torque_limit",
+    family="drive",
+    targets=motors_with_torque_limit,
+    parameters=(Parameter("loss", "1", 0.0, 0.95, 0.0, "share of the torque limit that is lost", 0.02),),
+    physics="The electronics cap the drive (a lower limit on duty cycle or current) below what the model allows; under the "
+    "cap it works as modelled. With the voltage, the speed without load falls by the same share.",
+    signature="Nothing while little torque is asked; then torque is flat at the cap and the joint falls behind.",
+    reference=MOTORS,
+)
+def torque_limit(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    left = 1.0 - values["loss"]
+
+    def capped(drive: Drive) -> Drive:
+        # Speed falls along, so that the back-EMF of a given speed stays what it was.
+        return replace(drive, torque_limit=drive.torque_limit * left, speed_limit=drive.speed_limit * left)
+
+    return robot.map_drive(target, capped)
+
+
+@effect(
+    "speed_limit",
+    family="drive",
+    targets=motors_with_speed_limit,
+    parameters=(Parameter("loss", "1", 0.0, 0.9, 0.0, "share of the speed without load that is lost", 0.02),),
+    physics="The motor runs slower without load than its data sheet says: its back-EMF takes more torque at any speed.",
+    signature="The joint lags in proportion to its speed, whatever the load; at rest nothing shows. Like viscous friction, "
+    "but gone when the drive is released.",
+    reference=MOTORS,
+)
+def speed_limit(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    def slower(drive: Drive) -> Drive:
+        own = drive.torque_limit / drive.speed_limit
+        return replace(drive, back_emf=(own + drive.back_emf) / (1.0 - values["loss"]) - own)
+
+    if values["loss"] == 0:
+        return robot
+    return robot.map_drive(target, slower)
+
+
+@effect(
+    "supply_sag",
+    family="drive",
+    targets=supply,
+    parameters=(Parameter("share", "1", 0.0, 0.9, 0.0, "share of the voltage lost when all motors give their most", 0.02),),
+    physics="Battery and wires have resistance: the more torque all motors give together, the less voltage is left for each.",
+    signature="All joints lag at once, in the moments when the sum of torques is large; one joint moved alone hardly shows it.",
+    reference=MOTORS,
+)
+def supply_sag(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    return robot.with_world(supply_sag=robot.world.supply_sag + values["share"])
+
+
+@effect(
+    "command_gain",
     family="drive",
     targets=motors,
-    parameters=(Parameter("loss", "1", 0.0, 1.0, 0.0, "share of the range of motion that is lost", 0.02),),
-    physics="Something blocks the joint: it moves freely, but only within a part of its range about the rest pose.",
-    signature="The joint follows until a fixed position, then stops dead however large the command.",
-    reference=PAPER,
+    parameters=(Parameter("change", "1", -0.5, 0.5, 0.0, "change of the commanded position, as a share of it", 0.01),),
+    physics="The drive reads a larger or smaller position than was sent: a wrong scale between command and angle.",
+    signature="The joint's position is a scaled copy of the prediction, at any speed and load; nothing shows at zero.",
 )
-def joint_jam(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.with_joint(target, freedom=robot.joint(target).freedom * (1.0 - values["loss"]))
+def command_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    def scaled(drive: Drive) -> Drive:
+        return replace(drive, command_gain=drive.command_gain * (1.0 + values["change"]))
+
+    return robot.map_drive(target, scaled)
+
+
+def _delays(robot: Robot, target: str) -> dict[str, Range]:
+    return {"delay_s": (0.0, 20.0 * robot.time_step_s)}
+
+
+@effect(
+    "command_delay",
+    family="drive",
+    targets=motors,
+    parameters=(Parameter("delay_s", "s", 0.0, 2.0, 0.0, "time from command to reaction", 0.002),),
+    physics="A command takes effect late: bus, filter and firmware hold it back.",
+    signature="The joint's motion is the prediction shifted in time: the residual is speed times delay, and zero at rest.",
+    ranges=_delays,
+)
+def command_delay(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    def later(drive: Drive) -> Drive:
+        return replace(drive, delay_s=drive.delay_s + values["delay_s"])
+
+    return robot.map_drive(target, later)
+
+
+def _zeros(robot: Robot, target: str) -> dict[str, Range]:
+    most = 0.4 * scales.travel(robot, target)
+    return {"offset_rad": (-most, most)}
+
+
+@effect(
+    "zero_offset",
+    family="drive",
+    targets=motors,
+    parameters=(
+        Parameter("offset_rad", "rad", -math.inf, math.inf, 0.0, "how far below its command the joint settles", 0.005),
+    ),
+    physics="The controller's zero is not the joint's: a horn mounted a tooth off, or a calibration lost.",
+    signature="A constant shift of one joint, from the first step, at any speed and load.",
+    ranges=_zeros,
+)
+def zero_offset(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    def shifted(drive: Drive) -> Drive:
+        return replace(drive, zero_offset=drive.zero_offset + values["offset_rad"])
+
+    return robot.map_drive(target, shifted)
+
+
+def _widths(robot: Robot, target: str) -> dict[str, Range]:
+    return {"half_width_rad": (0.0, 0.2 * scales.travel(robot, target))}
+
+
+@effect(
+    "deadband",
+    family="drive",
+    targets=motors,
+    parameters=(
+        Parameter("half_width_rad", "rad", 0.0, math.inf, 0.0, "error on either side that the drive ignores", 0.002),
+    ),
+    physics="The controller does nothing about small errors, so as not to hum; beyond, it sees the error less the band.",
+    signature="The joint stops short of its target by up to the half width, on the side it came from; slow, small commands are lost.",
+    ranges=_widths,
+)
+def deadband(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    def wider(drive: Drive) -> Drive:
+        return replace(drive, deadband=drive.deadband + values["half_width_rad"])
+
+    return robot.map_drive(target, wider)
+
+
+def _rotors(robot: Robot, target: str) -> dict[str, Range]:
+    rotor = scales.drive_of(robot, target).rotor_inertia
+    return {"added_kg_m2": (-0.25 * rotor, max(4.0 * rotor, scales.inertia(robot, target)))}
+
+
+@effect(
+    "rotor_inertia",
+    family="drive",
+    targets=motors,
+    parameters=(
+        Parameter("added_kg_m2", "kg.m^2", -math.inf, math.inf, 0.0, "rotor inertia at the joint on top of nominal", 1e-4),
+    ),
+    physics="The spinning rotor behind the gear is heavier than modelled: it resists acceleration of the joint, not its position.",
+    signature="Residual torque proportional to joint acceleration, not to speed or position; steps rise late and overshoot.",
+    reference="Featherstone 2008, Rigid Body Dynamics Algorithms, section 9.6",
+    ranges=_rotors,
+)
+def rotor_inertia(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    def heavier(drive: Drive) -> Drive:
+        total = drive.rotor_inertia + values["added_kg_m2"]
+        if total < 0:
+            raise RobotError(f"the rotor of {target} has {drive.rotor_inertia:g} kg.m^2; less than none is left")
+        return replace(drive, rotor_inertia=total)
+
+    return robot.map_drive(target, heavier)

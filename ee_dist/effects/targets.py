@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 from ee_dist.robots.model import Robot
 
 
-def whole_robot(robot: Robot) -> tuple[str, ...]:
-    return ("",)
-
-
 def parts(robot: Robot) -> tuple[str, ...]:
-    return tuple(p.name for p in robot.parts)
+    """Parts whose mass can show: all but a root that is bolted down."""
+    return tuple(p.name for p in robot.parts[0 if robot.free_base else 1 :])
 
 
 def carried_parts(robot: Robot) -> tuple[str, ...]:
@@ -20,6 +19,24 @@ def carried_parts(robot: Robot) -> tuple[str, ...]:
 
 def motors(robot: Robot) -> tuple[str, ...]:
     return robot.motor_names
+
+
+def motors_with_speed_limit(robot: Robot) -> tuple[str, ...]:
+    return tuple(d.joint for d in robot.drives if math.isfinite(d.speed_limit))
+
+
+def motors_with_torque_limit(robot: Robot) -> tuple[str, ...]:
+    return tuple(d.joint for d in robot.drives if math.isfinite(d.torque_limit))
+
+
+def supply(robot: Robot) -> tuple[str, ...]:
+    """The one supply that feeds all motors."""
+    return ("supply",) if motors_with_torque_limit(robot) else ()
+
+
+def base(robot: Robot) -> tuple[str, ...]:
+    """The root part of a robot that moves about."""
+    return (robot.root.name,) if robot.free_base else ()
 
 
 def sensors(robot: Robot) -> tuple[str, ...]:

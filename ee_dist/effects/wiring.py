@@ -40,3 +40,18 @@ def motors_tied(robot: Robot, target: str, values: Mapping[str, float]) -> Robot
     source = list(robot.wiring.source)
     source[second] = source[first]
     return replace(robot, wiring=replace(robot.wiring, source=tuple(source)))
+
+
+@effect(
+    "motors_swapped",
+    family="wiring",
+    targets=motor_pairs,
+    physics="Two motor cables are in each other's sockets: each motor obeys the command meant for the other.",
+    signature="Each of two joints does what was predicted for the other; all else follows from that.",
+    reference=PAPER,
+)
+def motors_swapped(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    first, second = (robot.motor_names.index(name) for name in target.split("+"))
+    source = list(robot.wiring.source)
+    source[first], source[second] = source[second], source[first]
+    return replace(robot, wiring=replace(robot.wiring, source=tuple(source)))

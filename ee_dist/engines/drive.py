@@ -71,11 +71,14 @@ class DrivePath:
         self.lower, self.upper = np.ascontiguousarray(stops[:, :, 0]), np.ascontiguousarray(stops[:, :, 1])
         self.inertia = _each(robots, felt_inertia).reshape(shape)
         self.transmission: Transmission | None = None
-        if self.uses["backlash"] or self.uses["compliance"]:
-            self.transmission = Transmission(self.p, self.inertia, self.dt)
         self.friction: Friction | None = None
-        if Friction.needed(self.uses):
-            self.friction = Friction(self.p, self.uses, _each(robots, steady_inertia).reshape(shape), self.dt)
+        elastic = self.uses["backlash"] or self.uses["compliance"]
+        if elastic or Friction.needed(self.uses):
+            steady = _each(robots, steady_inertia).reshape(shape)
+            if elastic:
+                self.transmission = Transmission(self.p, steady, self.dt)
+            if Friction.needed(self.uses):
+                self.friction = Friction(self.p, self.uses, steady, self.dt)
 
     def _prepare_laws(self, robots: Sequence[Robot]) -> None:
         groups: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, tuple[float, ...]]]] = {}
@@ -126,7 +129,7 @@ class DrivePath:
             torque = torque.copy()
             np.add.at(torque, (rows, columns), added)
         if self.friction is not None:
-            torque = self.friction(torque, active, qd)
+            torque = self.friction(torque, active, qd, enabled)
         torque = self._stops(torque, q, qd) * self.present
         if self.friction is not None:
             self.friction.record(torque, qd)

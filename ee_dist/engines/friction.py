@@ -9,12 +9,14 @@ last step's change of speed needed beyond the last torque. Where the joint is he
 this reads part of our own torque back as load, which is what makes it stop at the right moment all the same. Stopping
 all joints of a robot at once by this rule is stable as long as no combination of joints is lighter than 3/4 of the
 inertia assumed; ``steady_inertia`` assumes one below the lightest. An impact is over when it shows in the load: the load
-counts up to a small multiple of the friction only, so that a wrong one cannot push a moving joint along.
+counts only as far as friction could need it, so that a wrong one cannot push a moving joint along.
 
-    dry limit = coulomb + brake + |km*tm - ke*te| + kq*(tm - te)^2 + (stribeck + ks*|tm - te|) * exp(-|speed|/stribeck_speed)
+    dry limit = coulomb + brake + |km*tm - ke*te| + kq*(tm - te)^2
+                + (stribeck + ks*|tm - te|) * exp(-|speed| / stribeck_speed) +- asymmetry
 
-with tm the motor's torque and te the external torque on the joint, so that |tm - te| goes through the gear (Duclusaud et
-al. 2025, "Extended Friction Models for the Physics Simulation of Servo Actuators").
+with tm the motor's torque and te the external torque on the joint, so that |tm - te| goes through the gear; km is
+load_friction and ke = km + backdrive_friction (Duclusaud et al. 2025, "Extended Friction Models for the Physics
+Simulation of Servo Actuators").
 """
 
 from __future__ import annotations
@@ -26,11 +28,13 @@ import numpy as np
 from ee_dist.trials.log import Array
 
 LOAD_LIMIT = 2.0
-"""How much net torque counts at most, over the friction at hand. Holding needs 1; sliding evenly needs 1."""
+"""How much load counts at most beyond our own torque, over the friction at hand. Holding and sliding evenly need 1."""
 GEAR_LIMIT = 3.0
 """Torque through the gear counts up to this multiple of the motor's: more would break the gear, and is an impact."""
 DRY = ("coulomb", "brake", "stribeck")
 LOADED = ("load_friction", "backdrive_friction", "quadratic_friction", "stribeck_load")
+SIDED = ("friction_asymmetry", "viscous_asymmetry")
+SLOPED = ("viscous", "back_emf")
 
 
 class Friction:
@@ -42,34 +46,43 @@ class Friction:
         self.loaded = any(uses[n] for n in LOADED)
         self.most_gear = GEAR_LIMIT * p["torque_limit"]
         rubbing = np.zeros(inertia.shape, dtype=bool)
-        for name in (*DRY, *LOADED, "viscous"):
+        for name in (*DRY, *LOADED, *SIDED, *SLOPED):
             rubbing |= p[name] != 0
         self.rubbing = rubbing
+        self.electric = p["back_emf"] * p["strength"]
+        self.uses_viscous = any(uses[n] for n in (*SLOPED, "viscous_asymmetry"))
+        self.backdriving = np.maximum(p["load_friction"] + p["backdrive_friction"], 0.0)
         self.last_speed: Array | None = None
         self.last_torque = np.zeros(inertia.shape)
 
     @staticmethod
     def needed(uses: Mapping[str, bool]) -> bool:
-        return any(uses[n] for n in (*DRY, *LOADED, "viscous"))
+        return any(uses[n] for n in (*DRY, *LOADED, *SIDED, *SLOPED))
 
-    def __call__(self, torque: Array, motor: Array, speed: Array) -> Array:
-        """Torque at the joint less friction, from torque at the joint, torque of the motor, speed: all (B, M)."""
+    def __call__(self, torque: Array, motor: Array, speed: Array, enabled: Array | None = None) -> Array:
+        """Torque at the joint less friction, from torque at the joint, torque of the motor, speed: all (B, M).
+
+        A back-EMF beyond the model's own is viscous friction that is gone when the drive is not ``enabled``: as part of
+        the motor's explicit torque it could be too steep for the time step.
+        """
         p, uses = self.p, self.uses
-        load = 0.0 if self.last_speed is None else self.per_step * (speed - self.last_speed) - self.last_torque
-        net = torque + load
-        limit = self._limit(motor, net - motor, speed)
-        most = LOAD_LIMIT * (limit + p["viscous"] * np.abs(speed))
-        rate = self.per_step * speed + np.clip(net, -most, most)
+        load: Array = np.zeros_like(torque)
+        if self.last_speed is not None:
+            load = self.per_step * (speed - self.last_speed) - self.last_torque
+        limit = self._limit(motor, torque - motor + load, speed)
+        up = down = limit
         if uses["friction_asymmetry"]:
-            a = p["friction_asymmetry"]
-            dry = np.clip(rate, -limit * (1.0 - a), limit * (1.0 + a))
-        else:
-            dry = np.clip(rate, -limit, limit)
-        taken = dry
-        if uses["viscous"]:
-            left, viscous = rate - dry, p["viscous"]
+            up = np.maximum(limit + p["friction_asymmetry"], 0.0)
+            down = np.maximum(limit - p["friction_asymmetry"], 0.0)
+        viscous = p["viscous"] + (self.electric if enabled is None else self.electric * enabled)
+        steepest = viscous + np.abs(p["viscous_asymmetry"])
+        most = np.abs(torque) + LOAD_LIMIT * (np.maximum(up, down) + steepest * np.abs(speed))
+        rate = self.per_step * speed + torque + np.clip(load, -most, most)
+        taken = dry = np.clip(rate, -down, up)
+        if self.uses_viscous:
+            left = rate - dry
             if uses["viscous_asymmetry"]:
-                viscous = viscous * (1.0 + p["viscous_asymmetry"] * np.sign(left))
+                viscous = np.maximum(viscous + p["viscous_asymmetry"] * np.sign(left), 0.0)
             taken = dry + left * viscous / (self.per_step + viscous)
         return np.where(self.rubbing, torque - taken, torque)
 
@@ -81,7 +94,7 @@ class Friction:
             limit = limit + p["stribeck"] * fading
         if self.loaded:
             external = np.clip(external, -self.most_gear, self.most_gear)
-            limit = limit + np.abs(p["load_friction"] * motor - p["backdrive_friction"] * external)
+            limit = limit + np.abs(p["load_friction"] * motor - self.backdriving * external)
             through = np.abs(motor - external)
             if uses["quadratic_friction"]:
                 limit = limit + p["quadratic_friction"] * through**2

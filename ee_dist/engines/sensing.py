@@ -88,7 +88,7 @@ class SensingPath:
             value = np.where(p["quantum"] > 0, np.round(value / q) * q, value)
         if self.uses["stuck"]:
             # The value at which the channel sticks is the last that it reported while it still moved freely.
-            waiting = step * self.dt < p["stuck_from_s"]
+            waiting = step * self.dt < p["stuck_from_s"] - 1e-9
             if step == 0:
                 self.stuck_at = value
             self.stuck_at = np.where(waiting, value, self.stuck_at)

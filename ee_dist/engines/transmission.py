@@ -2,8 +2,9 @@
 
 Where motor and joint touch, they move as one: the rotor's inertia is part of the joint's in every engine, and the
 torque goes through as it is. When the motor would have to pull, it lets go and flies through the play with its own
-inertia until it meets a side; what it brings along in momentum is handed over in that step. Nothing penetrates, so the
-result stays finite at any play and any time step, and goes over to the rigid drive as the play goes to zero.
+inertia until it meets a side; the momentum that it brings along is handed over in that step, as far as the joint can
+take it without running ahead of the motor. Nothing penetrates, so the result stays finite at any play and any time step,
+and goes over to the rigid drive as the play goes to zero.
 
 A twist is compliance times the torque carried. The motor is where the joint is plus that twist, and the torque follows
 what the controller asks there through the motor's own damping; as the compliance goes to zero, this is the rigid drive.
@@ -32,6 +33,7 @@ class Transmission:
         self.loose = self.play > 0
         self.elastic = self.loose | (self.compliance > 0)
         self.rotor = np.maximum(p["rotor_inertia"], LIGHTEST_ROTOR * inertia)
+        self.landing = np.minimum(self.rotor, inertia)
         self.side = np.zeros(inertia.shape)
         """Where the motor presses: on the upper (1) or lower (-1) side of the play, or nowhere (0)."""
         self.position: Array | None = None
@@ -59,7 +61,7 @@ class Transmission:
             position = self.position + dt * speed
             beyond = position - (q + dt * qd)
             side = np.where(np.abs(beyond) > self.play, np.sign(beyond), 0.0)
-            brought = self.rotor * (self.speed - qd) / dt
+            brought = self.landing * (self.speed - qd) / dt
             pressed = np.maximum(side * (torque + brought), 0.0) * side
             torque = np.where(self.loose, pressed, torque)
             self.side = np.where(self.loose, side, 0.0)

@@ -65,6 +65,9 @@ class Counts:
     steps: int = 0
     asked_steps: int = 0
 
+    def reset(self) -> None:
+        self.asked = self.simulated = self.steps = self.asked_steps = 0
+
     def copy(self) -> Counts:
         return Counts(self.asked, self.simulated, self.steps, self.asked_steps)
 

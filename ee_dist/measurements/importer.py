@@ -168,10 +168,11 @@ class _Import:
 
     # -- columns -----------------------------------------------------------------------------------------------------
 
-    def _column(self, column: Column, unit: str, name: str, step_like: bool) -> Array:
+    def _column(self, column: Column, unit: str, name: str, step_like: bool, quiet: bool = False) -> Array:
         """The column on the grid, in ``unit``; ``step_like`` values are held, others joined by lines."""
         raw = self.table.numbers(column.column, gaps=column.gaps == "interpolate")
-        self.report.suspicious += suspicions(f"{name} ({column.column})", raw[np.isfinite(raw)]) if column.signed_bits == 0 else []
+        if not quiet and not column.signed_bits:
+            self.report.suspicious += suspicions(f"{name} ({column.column})", raw[np.isfinite(raw)])
         size = factor(column.unit, unit, f"{self.mapping.source}: {name}")
         if np.isnan(raw).any():
             good = np.flatnonzero(np.isfinite(raw))
@@ -237,7 +238,7 @@ class _Import:
         """A drive that is switched off obeys no command: its command is NaN."""
         if self.mapping.enabled is None:
             return
-        on = self._column(self.mapping.enabled, "1", "enabled", True) > 0.5
+        on = self._column(self.mapping.enabled, "1", "enabled", True, quiet=True) > 0.5
         if not on.all():
             commands[~on] = math.nan
             self.report.done.append(f"drives released in {int((~on).sum())} rows ({self.mapping.enabled.column})")

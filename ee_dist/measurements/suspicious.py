@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.trials.log import Array
 
 CLIPPED_SHARE = 0.02
+CLIPPED_DROP = 0.15
 STUCK_SHARE = 0.5
 COUNTERS = (8, 10, 12, 14, 16, 32)
 
@@ -23,9 +25,7 @@ def suspicions(name: str, values: Array) -> list[str]:
     for edge, what in ((values.max(), "highest"), (values.min(), "lowest")):
         at = values == edge
         share = float(np.mean(at))
-        longest = _longest_true(at)
-        # A signal at rest sits at one value too: clipping shows where many separate runs end at the very same value.
-        if share > CLIPPED_SHARE and longest >= 5 and _runs(at) >= 2 and len(np.unique(values)) > 20:
+        if share > CLIPPED_SHARE and len(np.unique(values)) > 20 and _cut_off(values, at, spread):
             found.append(f"{name}: clipped? {100 * share:.0f} % of the rows are at the {what} value, {edge:.6g}")
     jump = float(np.max(np.abs(np.diff(values))))
     for bits in COUNTERS:
@@ -93,11 +93,13 @@ def _longest_run(values: Array) -> tuple[int, int]:
     return int(lengths[k]), int(edges[k])
 
 
-def _longest_true(flags: np.ndarray) -> int:
-    padded = np.r_[False, flags, False].astype(int)
-    edges = np.flatnonzero(np.diff(padded))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
-
-
-def _runs(flags: np.ndarray) -> int:
-    return int(np.sum(np.diff(np.r_[False, flags].astype(int)) == 1))
+def _cut_off(values: Array, at: NDArray[np.bool_], spread: float) -> bool:
+    """Whether two or more stretches at the edge are entered at speed. A smooth peak nears its top slowly: as long before
+    a stretch as it lasts, it is close by; a signal that is cut off is still far away."""
+    edges = np.flatnonzero(np.diff(np.r_[False, at, False].astype(int)))
+    entered = 0
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        before = first - (last - first)
+        if last - first >= 5 and before >= 0 and abs(values[before] - values[first]) > CLIPPED_DROP * spread:
+            entered += 1
+    return entered >= 2

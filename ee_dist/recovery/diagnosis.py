@@ -87,6 +87,22 @@ def diagnose(
     return decode(ga.genomes[0], robot), ga.genomes[0].copy(), float(-ga.scores[0])
 
 
+def prune(judge: Judge, hypothesis: Hypothesis, error: float, parsimony: float) -> tuple[Hypothesis, float]:
+    """Drop terms, the least missed first, that do not lower the error by the share ``parsimony`` of it.
+
+    Evolution has no reason to remove a gene that changes nothing in these trials, such as a jam of a joint that never
+    came near it; but a model that believes in it would plan around it.
+    """
+    while hypothesis:
+        shorter = [(*hypothesis[:k], *hypothesis[k + 1 :]) for k in range(len(hypothesis))]
+        errors = judge.errors(shorter)
+        k = int(np.argmin(errors))
+        if errors[k] * (1.0 - parsimony) > error:
+            break
+        hypothesis, error = shorter[k], float(errors[k])
+    return hypothesis, error
+
+
 def _final(ga: GeneticAlgorithm, robot: Robot, pass_index: int) -> list[HypothesisRecord]:
     different: dict[Hypothesis, float] = {}
     for genome, score in zip(ga.genomes, ga.scores, strict=True):

@@ -15,7 +15,7 @@ from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.evolution.ga import Budget, Genomes
 from ee_dist.recording.records import HARDWARE, PREDICTION, TrialRecord
-from ee_dist.recovery.diagnosis import Judge, diagnose
+from ee_dist.recovery.diagnosis import Judge, diagnose, prune
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.recovery.repair import repair
@@ -32,12 +32,16 @@ class Plan:
     diagnosis: Budget = Budget()
     compensating_trials: int = 4
     steps: int = 1000
+    parsimony: float = 0.1
+    """Share of the error that a term of a hypothesis must account for to be believed; the paper has no such rule (0)."""
 
     def __post_init__(self) -> None:
         if self.compensating_trials < 1:
             raise ValueError("plan: compensating_trials must be 1 or more")
         if self.steps < 2:
             raise ValueError("plan: steps must be 2 or more")
+        if not 0.0 <= self.parsimony < 1.0:
+            raise ValueError(f"plan: parsimony must be from 0 to below 1, not {self.parsimony}")
 
 
 @dataclass
@@ -89,6 +93,8 @@ def recover(
         judge = Judge(robot, trials, metric, evaluator)
         hypothesis, genome, error = diagnose(judge, believed, plan.diagnosis, diagnosis_seeds[k], observer, k)
         believed.append(genome)
+        if plan.parsimony:
+            hypothesis, error = prune(judge, hypothesis, error, plan.parsimony)
         result.hypotheses.append(hypothesis)
         result.errors.append(error)
         name = "after the change" if k == 0 else f"trial {k}"

@@ -247,3 +247,23 @@ def _number(value: Any, where: str) -> float:
 def _near(name: str, allowed: tuple[str, ...]) -> str:
     near = difflib.get_close_matches(name, allowed, n=3, cutoff=0.4)
     return f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(allowed)}"
+
+
+def robot_of(name: str, urdf: str | None = None, drives: str | None = None) -> tuple[Robot, tuple[str, ...]]:
+    """The robot of three settings: a name or file; or ``urdf`` with the description ``drives`` that goes with it.
+
+    Raises RobotError.
+    """
+    if name != "urdf":
+        return load_robot(name)
+    if drives is None:
+        if urdf is None:
+            raise RobotError("robot=urdf needs robot.urdf=FILE.urdf, or robot.drives=FILE.yaml that names one")
+        return load_robot(urdf)
+    path = Path(drives)
+    data = dict(_yaml(path))
+    if urdf is not None:
+        data["urdf"] = str(Path(urdf).resolve())
+    if "urdf" not in data:
+        raise RobotError(f"{path}: names no URDF; add 'urdf: FILE.urdf' or give robot.urdf=FILE.urdf")
+    return _described(data, path.parent, str(path))

@@ -29,14 +29,18 @@ def rotation_matrix(quaternion: tuple[float, float, float, float]) -> NDArray[np
     )
 
 
-def mass_matrix(robot: Robot, positions: Mapping[str, float] | None = None) -> NDArray[np.float64]:
+def mass_matrix(
+    robot: Robot, positions: Mapping[str, float] | None = None, rotor_on_part: bool = False
+) -> NDArray[np.float64]:
     """Generalised mass matrix (n, n): six rows of the root if it is free, then the joints that move.
 
     ``positions`` are joint positions by name (rad or m), zero where not given. Sums J^T I J over the parts
-    (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6), rotor inertia added.
+    (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6), rotor inertia added: on the joint, as it is, or with
+    ``rotor_on_part`` on the part that the joint moves, where an engine without rotors puts it.
     """
     at = positions or {}
     joints = [j for j in robot.present_joints if j.kind != "fixed"]
+    carrier = {j.child: j.name for j in joints}
     free = 6 if robot.free_base else 0
     n = free + len(joints)
     place = {robot.root.name: (np.zeros(3), np.eye(3))}
@@ -55,12 +59,21 @@ def mass_matrix(robot: Robot, positions: Mapping[str, float] | None = None) -> N
         path[joint.child] = (*path[joint.parent], *(() if joint.kind == "fixed" else (joint.name,)))
         axes[joint.name] = (here, axis, joint.kind)
     column = {j.name: free + i for i, j in enumerate(joints)}
+    rotor = {d.joint: d.rotor_inertia for d in robot.drives}
+    on_part = {j.child: rotor.get(j.name, 0.0) for j in joints} if rotor_on_part else {}
     matrix = np.zeros((n, n))
     for part in robot.present_parts:
         here, facing = place[part.name]
         com = here + facing @ np.array(part.com_m)
+        mass, extra = part.mass_kg, on_part.get(part.name, 0.0)
         xx, yy, zz, xy, xz, yz = part.inertia_kg_m2
         inertia = facing @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ facing.T
+        if extra:
+            _, axis, kind = axes[carrier[part.name]]
+            if kind == "slide":
+                mass = mass + extra
+            else:
+                inertia = inertia + extra * np.outer(axis, axis)
         linear, angular = np.zeros((3, n)), np.zeros((3, n))
         if free:
             linear[:, :3] = np.eye(3)
@@ -74,10 +87,9 @@ def mass_matrix(robot: Robot, positions: Mapping[str, float] | None = None) -> N
             else:
                 linear[:, column[name]] = np.cross(axis, com - pivot)
                 angular[:, column[name]] = axis
-        matrix += part.mass_kg * linear.T @ linear + angular.T @ inertia @ angular
-    rotor = {d.joint: d.rotor_inertia for d in robot.drives}
+        matrix += mass * linear.T @ linear + angular.T @ inertia @ angular
     for name, c in column.items():
-        matrix[c, c] += rotor.get(name, 0.0)
+        matrix[c, c] += 0.0 if rotor_on_part else rotor.get(name, 0.0)
     return matrix
 
 
@@ -94,7 +106,7 @@ def steady_inertia(robot: Robot) -> NDArray[np.float64]:
 
     With D = diag(d), stopping every joint by a torque d * speed / dt turns speeds v into (1 - M^-1 D) v. The row sums
     d_j * sum_k |(M^-1)_jk| are at most 1 here (Gershgorin), so nothing is amplified. It is the least value over position
-    zero and some others. For one joint on a bolted base it is the true inertia.
+    zero and some others, and over both ways in which engines count rotors. For one joint on a bolted base it is the true inertia.
     """
     return _steady(_body(robot))
 
@@ -125,11 +137,13 @@ def _steady(robot: Robot) -> NDArray[np.float64]:
     names = [j.name for j in joints if j.name in driven]
     least = np.full(len(names), np.inf)
     rng = np.random.default_rng(0)
+    some_rotor = any(d.rotor_inertia for d in robot.drives)
     # The inertia of a single joint on a bolted base does not depend on where it stands.
     for k in range(1 + POSES * (free + len(joints) > 1)):
         place = {j.name: 0.0 if k == 0 else rng.uniform(*_reach(j)) for j in joints}
-        inverse = np.linalg.inv(mass_matrix(robot, place))[np.ix_(rows, rows)]
-        least = np.minimum(least, 1.0 / np.abs(inverse).sum(axis=1))
+        for rotor_on_part in (False, True) if some_rotor else (False,):
+            inverse = np.linalg.inv(mass_matrix(robot, place, rotor_on_part))[np.ix_(rows, rows)]
+            least = np.minimum(least, 1.0 / np.abs(inverse).sum(axis=1))
     steady = dict(zip(names, least.tolist(), strict=True))
     return _fixed(np.array([steady.get(d.joint, 1.0) for d in robot.drives]))
 

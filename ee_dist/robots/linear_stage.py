@@ -16,7 +16,7 @@ SPEED_GAIN_V_S_M = 243.45
 LIMIT_V = 10.0
 TRAVEL_M = (-0.05, 0.3)
 SPEED_LAW = "speed_from_readings"
-"""The drive law that replaces the true speed in the controller by a difference of readings; see engines/laws.py."""
+"""The drive law that replaces the true speed in the controller by a difference of readings; see effects/controller_laws.py."""
 
 
 def linear_stage(

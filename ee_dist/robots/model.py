@@ -106,18 +106,17 @@ class Drive:
     zero_offset: float = 0.0  # rad by which the controller's zero lies off the joint's
     deadband: float = 0.0  # rad of error on either side that the controller leaves alone
     delay_s: float = 0.0
+    back_emf: float = 0.0  # N.m.s/rad on top of torque_limit / speed_limit
     viscous: float = 0.0  # N.m.s/rad
     coulomb: float = 0.0  # N.m
     stribeck: float = 0.0  # N.m on top at rest, gone as exp(-|speed| / stribeck_speed)
     stribeck_speed: float = 0.1
     stribeck_load: float = 0.0  # the same as a share of the torque through the gear
-    load_friction: float = 0.0
-    """Dry friction |load_friction * motor torque - backdrive_friction * external torque|: equal shares follow the
-    torque through the gear."""
-    backdrive_friction: float = 0.0
+    load_friction: float = 0.0  # dry friction as a share of the torque through the gear, motor less external
+    backdrive_friction: float = 0.0  # by how much that share is larger for the external torque
     quadratic_friction: float = 0.0  # 1/(N.m), times the square of the torque through the gear
-    friction_asymmetry: float = 0.0  # share by which dry friction is larger moving up, and smaller moving down
-    viscous_asymmetry: float = 0.0
+    friction_asymmetry: float = 0.0  # N.m by which dry friction is larger moving up, and smaller moving down
+    viscous_asymmetry: float = 0.0  # N.m.s/rad, likewise
     offset_torque: float = 0.0
     backlash: float = 0.0  # rad of play between motor and joint, in all
     compliance: float = 0.0  # rad/(N.m) by which motor and joint twist apart

@@ -96,6 +96,7 @@ class BudgetConfig:
     crossovers: int = 24
     compensating_trials: int = 4
     steps: int = 1000
+    parsimony: float = 0.1
 
     def __post_init__(self) -> None:
         self.plan()
@@ -108,6 +109,7 @@ class BudgetConfig:
                 diagnosis=Budget(self.diagnosis_population, self.diagnosis_generations, *shared),
                 compensating_trials=self.compensating_trials,
                 steps=self.steps,
+                parsimony=self.parsimony,
             )
         except ValueError as error:
             raise ConfigError(str(error)) from None

@@ -77,8 +77,8 @@ def run(config: Config, options: Options, out: Path) -> None:
         REPAIR: plan.repair.population * plan.repair.generations * float(plan.steps) / 2,
         DIAGNOSIS: plan.diagnosis.population * plan.diagnosis.generations * share / 4,
     }
+    evaluator = evaluator_of(config)
     with (
-        evaluator_of(config) as evaluator,
         RunWriter(path, robot, metadata, {"config.yaml": config_yaml(config, options).encode()}) as writer,
         PassProgress(console, passes, weights) as progress,
     ):
@@ -86,7 +86,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         result = recover(robot, intact, changed, metric, plan, evaluator, search_seed, observer)
         truth = changed.reveal()
         writer.finish({"result_digest": digest.hex, "truth": json.dumps([t.as_dict() for t in truth])})
-        counts = evaluator.counts
+    counts = evaluator.counts
     hardware.close()
     recording = out / "recovery.rrd"
     write_rrd(read_run(path), recording)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 from ee_dist.effects.catalogue import load_plugin
@@ -51,17 +50,32 @@ def build_robot(config: Config) -> Robot:
     return quadruped()
 
 
-@contextmanager
-def evaluator_of(config: Config) -> Iterator[Evaluator]:
-    """The evaluator, closed at the end. Raises EvaluatorError where Ray cannot be reached."""
+_kept: dict[object, Evaluator] = {}
+
+
+def evaluator_of(config: Config) -> Evaluator:
+    """The evaluator of these settings, its counts at zero. Raises EvaluatorError where Ray cannot be reached.
+
+    The jobs of a sweep run one after the other in this process and share it: its warm worlds and actors, and what it
+    simulated already. A sweep over scenarios evolves the intact robot's controllers once.
+    """
     settings = config.evaluator
-    inner: Evaluator
-    if settings.name == "serial":
-        inner = SerialEvaluator(engine_maker(config, alone=True)(), settings.chunk or 256)
-    else:
-        inner = RayEvaluator(engine_maker(config, alone=False), settings.workers, settings.chunk, config.ray.address)
-    evaluator = CachedEvaluator(inner) if settings.cache else inner
-    try:
-        yield evaluator
-    finally:
-        evaluator.close()
+    key = (settings.name, settings.workers, settings.chunk, settings.cache, config.ray.address, engine_maker(config, True))
+    if key not in _kept:
+        close_evaluators()
+        inner: Evaluator
+        if settings.name == "serial":
+            inner = SerialEvaluator(engine_maker(config, alone=True)(), settings.chunk or 256)
+        else:
+            inner = RayEvaluator(engine_maker(config, alone=False), settings.workers, settings.chunk, config.ray.address)
+        _kept[key] = CachedEvaluator(inner) if settings.cache else inner
+    evaluator = _kept[key]
+    evaluator.counts.reset()
+    return evaluator
+
+
+@atexit.register
+def close_evaluators() -> None:
+    """End the actors and close the worlds of all evaluators made so far."""
+    while _kept:
+        _kept.popitem()[1].close()

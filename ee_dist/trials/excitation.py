@@ -157,9 +157,9 @@ def gait_weights(robot: Robot, amplitude: float, seed: int) -> tuple[float, ...]
 
 
 STANDARD = (
-    Excitation("multisine", 5.0, 0.5, 1),
-    Excitation("steps", 5.0, 0.35, 2),
-    Excitation("slow_sines", 6.4, 0.6, 3),
-    Excitation("gait", 3.0, 0.35, 4),
+    Excitation("multisine", 4.8, 0.5, 1),
+    Excitation("steps", 4.2, 0.35, 2),
+    Excitation("slow_sines", 4.8, 0.6, 3),
+    Excitation("gait", 2.4, 0.35, 4),
 )
 """What ``task=trial`` runs unless told otherwise."""

@@ -117,7 +117,7 @@ def _blueprint(robot: Robot, pairs: Sequence[Pair], real: Shown, with_ladder: bo
     scene = blueprint.scene_view(robot, "Robot (blue) and its model (orange)", world.eye(robot, real))
     left = rrb.Vertical(scene, text, *ladder, row_shares=[3, 4, 3][: 2 + len(ladder)])
     whole = rrb.Horizontal(left, _channel_tabs(robot, channels.units_of(pairs), axis), column_shares=[2, 3])
-    return blueprint.framed(rrb.Vertical(whole, blueprint.chapters(end_s), row_shares=[12, 1]))
+    return blueprint.framed(rrb.Vertical(whole, blueprint.chapters(end_s), row_shares=[10, 1]))
 
 
 def _channel_tabs(robot: Robot, units: dict[str, str], axis: rrb.TimeAxis) -> rrb.Tabs:

@@ -17,7 +17,7 @@ from rerun.experimental import ViewerClient, ViewerState
 
 START_S = 30.0
 LOAD_S = 60.0
-GREETING_S = 5.0
+GREETING_S = 4.0
 """For so long after its start the viewer lays a note over the picture that it runs without a screen."""
 
 
@@ -74,6 +74,7 @@ class HeadlessViewer:
         command = [str(viewer_binary()), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
         command += ["--hide-welcome-screen", "--window-size", f"{self.size[0]}x{self.size[1]}"]
         self._output = tempfile.TemporaryFile()
+        self._started = time.monotonic()
         self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=self._output, stderr=self._output)
         try:
             self._client = self._connected(f"rerun+http://127.0.0.1:{port}/proxy")
@@ -96,8 +97,11 @@ class HeadlessViewer:
         deadline = time.monotonic() + LOAD_S
         while time.monotonic() < deadline:
             state = self.client.get_state()
-            if not state.loading and any(r.timelines for r in state.recordings):
+            if state.recordings and not state.loading:
                 return
+            failed = [entry.message for entry in self.client.get_logs() if entry.level == "ERROR"]
+            if failed:
+                raise ViewerError(f"the viewer cannot read {path}: {failed[0].splitlines()[0]}")
             time.sleep(0.05)
         raise ViewerError(f"the viewer did not finish loading {path} in {LOAD_S:g} s")
 
@@ -125,7 +129,12 @@ class HeadlessViewer:
         last = b""
         deadline = time.monotonic() + limit_s
         while time.monotonic() < deadline:
-            png = self.client.take_screenshot(view_id)
+            try:
+                png = self.client.take_screenshot(view_id)
+            except ConnectionError as error:
+                if view is None:
+                    raise ViewerError(f"the viewer gave no picture: {error}") from error
+                raise ViewerError(f"the view {view!r} is not on the screen: it lies behind another tab") from error
             if png == last and time.monotonic() > self._started + GREETING_S:
                 return png
             last = png

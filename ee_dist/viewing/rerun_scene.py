@@ -97,6 +97,6 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
     right = rrb.Vertical(text, search, row_shares=[9, 5])
     end_s = starts[-1] + interval_s(trials[-1].log)
     whole = rrb.Vertical(
-        rrb.Horizontal(left, right, column_shares=[5, 3]), blueprint.chapters(end_s), row_shares=[12, 1]
+        rrb.Horizontal(left, right, column_shares=[5, 3]), blueprint.chapters(end_s), row_shares=[10, 1]
     )
     return blueprint.framed(whole)

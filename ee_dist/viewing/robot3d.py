@@ -22,7 +22,9 @@ Rows = NDArray[np.intp]
 POSE_HZ, TRACK_HZ, TRACK_UPDATES_HZ = 33.0, 10.0, 4.0
 FLOOR_M = 0.003
 """Height of lines on the floor, just above it so that the two do not flicker."""
-LABEL_ABOVE_M, GRAVITY_M = 0.16, 0.3
+LABEL_ABOVE_M = 0.16
+GRAVITY_M, GRAVITY_AT_M = 0.25, (0.25, 0.0, 0.15)
+"""Length of the arrow of gravity, and where it begins, ahead of the body and above it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +85,7 @@ def send_robot(
         for a, start in zip(shown, starts_s, strict=True):
             _send_track(stream, f"{path}/track", a, start, ghost)
             _send_gravity(stream, f"{path}/gravity", a, start)
-    _send_labels(stream, f"{path}/label", robot, shown, starts_s, ghost or MEASURED)
+        _send_labels(stream, f"{path}/label", shown, starts_s, ghost or MEASURED)
 
 
 def joint_positions(robot: Robot, log: SensorLog) -> Array:
@@ -196,7 +198,7 @@ def _send_gravity(stream: rr.RecordingStream, place: str, a: Appearance | None, 
         return
     arrow, count = GRAVITY_M * down / np.linalg.norm(down), len(a.body)
     columns = rr.Arrows3D.columns(
-        origins=a.body[:, :3] - 0.3 * arrow,
+        origins=a.body[:, :3] + np.array(GRAVITY_AT_M),
         vectors=np.tile(arrow, (count, 1)),
         colors=[GRAVITY] * count,
         labels=["gravity"] * count,
@@ -205,13 +207,9 @@ def _send_gravity(stream: rr.RecordingStream, place: str, a: Appearance | None, 
     stream.send_columns(place, [times(a.moves[0])], columns)
 
 
-def _send_labels(
-    stream: rr.RecordingStream, place: str, robot: Robot, shown: Shown, starts_s: Sequence[float], colour: Rgb
-) -> None:
+def _send_labels(stream: rr.RecordingStream, place: str, shown: Shown, starts_s: Sequence[float], colour: Rgb) -> None:
     there = [a for a in shown if a is not None]
-    # Above a body that walks; above all of a small robot on a bench.
-    above = LABEL_ABOVE_M if robot.free_base else 1.2 * max(drawn.reach(robot, p) for p in robot.parts)
-    points = np.concatenate([a.body[:, :3] for a in there]) + np.array((0.0, 0.0, above))
+    points = np.concatenate([a.body[:, :3] for a in there]) + np.array((0.0, 0.0, LABEL_ABOVE_M))
     stream.send_columns(
         place, [times(np.concatenate([a.moves[0] for a in there]))], rr.Points3D.columns(positions=points)
     )

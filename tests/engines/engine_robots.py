@@ -27,12 +27,13 @@ def ball(height_m: float = RADIUS_M, com_m: tuple[float, float, float] = (0.0, 0
     return Robot("ball", (part,), (), (), sensors, Wiring(()), World(**world), start_position_m=start)
 
 
-def block(**world: float) -> Robot:
-    """A free box that lies on the floor."""
-    part = Part("block", MASS_KG, (0.0, 0.0, 0.0), box_inertia(MASS_KG, *BOX_HALF_M), (Shape("box", BOX_HALF_M),))
-    sensors = (Sensor("height", "height", ""), Sensor("speed", "speed_x", ""), Sensor("touch", "touch", "block"))
+def sled(**world: float) -> Robot:
+    """A free box that lies on the floor on four round feet. (Bullet keeps too few contacts of a flat side that slides.)"""
+    feet = tuple(Shape("sphere", (0.02,), (x, y, 0.02 - BOX_HALF_M[2])) for x in (-0.1, 0.1) for y in (-0.1, 0.1))
+    part = Part("sled", MASS_KG, (0.0, 0.0, 0.0), box_inertia(MASS_KG, *BOX_HALF_M), feet)
+    sensors = (Sensor("height", "height", ""), Sensor("speed", "speed_x", ""), Sensor("touch", "touch", "sled"))
     start = (0.0, 0.0, BOX_HALF_M[2])
-    return Robot("block", (part,), (), (), sensors, Wiring(()), World(**world), start_position_m=start)
+    return Robot("sled", (part,), (), (), sensors, Wiring(()), World(**world), start_position_m=start)
 
 
 def loose_drive(joint: str, rotor_inertia: float = 0.0) -> Drive:
@@ -67,13 +68,17 @@ def no_commands(robot: Robot) -> Commands:
     return Commands(np.zeros((1, len(robot.drives))))
 
 
-def at(joints: list[float], speeds: list[float], pose: list[float] | None = None, twist: list[float] | None = None) -> State:
+def at(
+    joints: list[float], speeds: list[float], pose: list[float] | None = None, twist: list[float] | None = None
+) -> State:
     """A start state from plain lists."""
     base = None if pose is None else np.array(pose)
     return State(np.array(joints), np.array(speeds), base, None if twist is None else np.array(twist))
 
 
-def run(engine: Engine, robot: Robot, steps: int, start: State | None = None, commands: Array | None = None) -> SensorLog:
+def run(
+    engine: Engine, robot: Robot, steps: int, start: State | None = None, commands: Array | None = None
+) -> SensorLog:
     """One rollout, with poses."""
     driver = no_commands(robot) if commands is None else Commands(commands)
     (log,) = engine.rollout([Rollout(robot, driver, steps, start=start, pose=True)])

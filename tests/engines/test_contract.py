@@ -13,18 +13,18 @@ from engine_robots import (
     G,
     at,
     ball,
-    block,
     calm_commands,
+    loose_drive,
     mixed_models,
     network,
-    no_commands,
     one_joint,
     run,
+    sled,
 )
 
 from ee_dist.engines.contract import Engine, Rollout
 from ee_dist.engines.drivers import Commands
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.robots.quadruped import FOOT_M, LOWER_M, quadruped
 from ee_dist.trials.log import SensorLog
 
@@ -57,21 +57,28 @@ def test_a_push_gives_force_over_mass_and_drag_its_exponential(engine: Engine) -
     start = at([], [], [0.0, 0.0, 1.0, *UPRIGHT], [1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
     log = run(engine, dragged, 201, start)
     assert log.base_pose is not None
-    gone = (1 - np.exp(-4.0 / MASS_KG * 2.0)) * MASS_KG / 4.0
-    assert log.base_pose[-1, :2] == pytest.approx([gone, 0.5 * gone], rel=0.015)
+    # Speed falls by the factor 1 - h c / m a step, which tends to exp(-c t / m).
+    factor = 1 - 0.01 * 4.0 / MASS_KG
+    gone = 0.01 * (factor ** np.arange(1, 201)).sum()
+    assert gone == pytest.approx((1 - np.exp(-4.0 / MASS_KG * 2.0)) * MASS_KG / 4.0, rel=0.02)
+    assert log.base_pose[-1, :2] == pytest.approx([gone, 0.5 * gone], rel=1e-6)
 
 
-def test_a_twist_is_that_of_the_centre_of_mass(engine: Engine) -> None:
-    com, spin = np.array([0.2, 0.0, 0.0]), 2.0
+def test_a_twist_is_that_of_the_centre_of_mass_in_the_frame_of_the_floor(engine: Engine) -> None:
+    spin, quarter = 2.0, [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
     robot = ball(com_m=(0.2, 0.0, 0.0), gravity_m_s2=0.0, has_floor=False)
-    start = at([], [], [0.0, 0.0, 1.0, *UPRIGHT], [0.5, 0.0, 0.1, 0.0, 0.0, spin])
-    log = run(engine, replace(robot, time_step_s=0.002), 501, start)
+    sensors = (Sensor("speed", "speed_x", ""), Sensor("turn", "turn_rate", ""))
+    robot = replace(robot, time_step_s=0.002, sensors=sensors)
+    # A quarter turn about x: the robot's y axis, about which it spins, is the floor's z axis.
+    start = at([], [], [0.0, 0.0, 1.0, *quarter], [0.5, 0.0, 0.1, 0.0, 0.0, spin])
+    log = run(engine, robot, 501, start)
     assert log.base_pose is not None
     t = log.times_s
-    turned = np.stack([0.2 * np.cos(spin * t), 0.2 * np.sin(spin * t), np.zeros_like(t)], axis=1)
-    expected = np.array([0.0, 0.0, 1.0]) + com + t[:, None] * np.array([0.5, 0.0, 0.1]) - turned
+    arm = np.stack([0.2 * np.cos(spin * t), 0.2 * np.sin(spin * t), np.zeros_like(t)], axis=1)
+    expected = np.array([0.2, 0.0, 1.0]) + t[:, None] * np.array([0.5, 0.0, 0.1]) - arm
     assert log.base_pose[:, :3] == pytest.approx(expected, abs=1e-3)
-    assert np.unwrap(2 * np.arctan2(log.base_pose[:, 5], log.base_pose[:, 6])) == pytest.approx(spin * t, abs=1e-6)
+    assert log.channel("speed") == pytest.approx(0.5, abs=2e-3)
+    assert log.channel("turn") == pytest.approx(spin, abs=2e-3)
 
 
 # -- joints ----------------------------------------------------------------------------------------------------------
@@ -104,7 +111,8 @@ def test_coulomb_friction_stops_a_slide_where_the_formula_says_and_never_reverse
     robot = one_joint("slide", (1.0, 0.0, 0.0)).map_drive("joint", lambda d: replace(d, coulomb=5.0))
     log = run(engine, robot, 400, at([0.0], [0.5]))
     speed = log.channel("velocity")
-    assert log.channel("position")[-1] == pytest.approx(0.5**2 / (2 * 5.0 / MASS_KG), rel=0.01)
+    step = robot.time_step_s
+    assert log.channel("position")[-1] == pytest.approx(0.5**2 / (2 * 5.0 / MASS_KG) - 0.5 * step / 2, rel=1e-6)
     assert speed.min() > -1e-9
     assert np.abs(speed[-100:]).max() < 1e-9
     first = speed[:50]
@@ -125,35 +133,40 @@ def test_a_stop_is_not_passed(engine: Engine) -> None:
     robot = one_joint("hinge", (0.0, 1.0, 0.0)).with_joint("joint", lower=-0.2, upper=0.3)
     swung = run(engine, robot, 2000, at([0.0], [2.0])).channel("position")
     assert 0.25 < swung.max() < 0.31
-    assert -0.21 < swung.min()
+    assert swung.min() > -0.21
 
 
 # -- the floor -------------------------------------------------------------------------------------------------------
 
 
+SLIDING = {"pybullet": 0.01, "mujoco": 0.1}
+"""How exactly an engine slides. MuJoCo's friction is convex: a fast slide chatters, on and off the floor by a millimetre."""
+
+
 @pytest.mark.parametrize("friction", [0.2, 0.5])
 @pytest.mark.parametrize("speed", [0.5, 1.0])
-def test_a_block_slides_as_far_as_friction_lets_it(engine: Engine, friction: float, speed: float) -> None:
+def test_a_sled_slides_as_far_as_friction_lets_it(engine: Engine, friction: float, speed: float) -> None:
     start = at([], [], [0.0, 0.0, BOX_HALF_M[2], *UPRIGHT], [speed, 0.0, 0.0, 0.0, 0.0, 0.0])
-    log = run(engine, block(friction=friction), 150, start)
-    # PyBullet's ten solver iterations leave up to 7 % (longer), MuJoCo's soft landing up to 4 % (shorter).
-    assert log.travel_m == pytest.approx(speed**2 / (2 * friction * G), rel=0.08)
+    log = run(engine, sled(friction=friction), 150, start)
+    # Speed falls before position moves, which costs half a step's way.
+    expected = speed**2 / (2 * friction * G) - speed * 0.01 / 2
+    assert log.travel_m == pytest.approx(expected, rel=SLIDING[engine.name])
     assert abs(log.channel("speed")[-1]) < 1e-3
-    assert np.abs(log.channel("height") - BOX_HALF_M[2]).max() < 1e-3, "it neither hops nor sinks"
+    assert np.abs(log.channel("height") - BOX_HALF_M[2]).max() < 2.5e-3, "it neither hops nor sinks"
 
 
-def test_a_slope_holds_a_block_below_the_angle_of_friction_only(engine: Engine) -> None:
+def test_a_slope_holds_a_sled_below_the_angle_of_friction_only(engine: Engine) -> None:
     slope, friction = 0.3, 0.2
-    held = run(engine, block(friction=0.4, tilt_y_rad=slope), 300)
+    held = run(engine, sled(friction=0.4, tilt_y_rad=slope), 300)
     assert abs(held.travel_m) < 2e-3
-    slid = run(engine, block(friction=friction, tilt_y_rad=slope), 101)
+    slid = run(engine, sled(friction=friction, tilt_y_rad=slope), 101)
     down = G * (np.sin(slope) - friction * np.cos(slope))
-    assert slid.travel_m == pytest.approx(0.5 * down * 1.0**2, rel=0.03)
+    assert slid.travel_m == pytest.approx(0.505 * down * 1.0**2, rel=SLIDING[engine.name])
 
 
 def test_tilts_turn_gravity_the_way_they_say(engine: Engine) -> None:
-    nose_down = run(engine, block(friction=0.0, tilt_y_rad=0.1), 101).base_pose
-    sideways = run(engine, block(friction=0.0, tilt_x_rad=0.1), 101).base_pose
+    nose_down = run(engine, sled(friction=0.0, tilt_y_rad=0.1), 101).base_pose
+    sideways = run(engine, sled(friction=0.0, tilt_x_rad=0.1), 101).base_pose
     assert nose_down is not None
     assert sideways is not None
     far = 0.5 * G * np.sin(0.1)
@@ -178,14 +191,17 @@ def test_touch_is_open_in_the_air_and_closed_on_the_floor(engine: Engine) -> Non
 
 
 def test_a_robot_stands_at_the_height_of_its_knees(engine: Engine) -> None:
-    commands = np.tile([0.0, 0.35], (200, 4))
-    log = run(engine, quadruped(), 200, commands=commands)
+    # A floor that gives lets four legs share the weight; on a hard one, which of them carry is left to the solver.
+    compliance = 3e-4
+    robot = quadruped().with_world(compliance_m_n=compliance)
+    log = run(engine, robot, 400, commands=np.tile([0.0, 0.35], (400, 4)))
     assert log.joints is not None
     assert log.base_pose is not None
     knee = log.joints[-1, 1::2]
-    assert knee == pytest.approx(0.35, abs=0.1)
-    height = (LOWER_M * np.cos(knee)).mean() + FOOT_M
-    assert log.base_pose[-1, 2] == pytest.approx(height, abs=5e-4)
+    assert knee == pytest.approx(0.35, abs=0.05)
+    assert np.ptp(knee) < 1e-3
+    sunk = sum(p.mass_kg for p in robot.parts) * G / 4 * compliance
+    assert log.base_pose[-1, 2] == pytest.approx((LOWER_M * np.cos(knee)).mean() + FOOT_M - sunk, abs=3e-4)
     assert (log.sensors[-1, :4] == 1).all()
 
 
@@ -198,33 +214,39 @@ def test_a_rollout_starts_in_the_state_asked_for(engine: Engine) -> None:
     joints, speeds = rng.uniform(-0.5, 0.5, 8), rng.uniform(-1, 1, 8)
     start = at(list(joints), list(speeds), pose, [0.4, 0.0, 0.0, 0.0, 0.0, 0.5])
     robot = quadruped().with_part("body", com_m=(0.01, 0.02, 0.0))
-    log = run(engine, robot, 3, start, np.tile(joints, (3, 1)))
+    robot = replace(robot, drives=tuple(loose_drive(d.joint, d.rotor_inertia) for d in robot.drives))
+    log = run(engine, robot, 3, start)
     assert log.joints is not None
     assert log.base_pose is not None
     assert log.joints[0] == pytest.approx(joints, abs=1e-12)
-    assert log.base_pose[0] == pytest.approx(pose, abs=1e-9)
-    assert log.joints[1] - log.joints[0] == pytest.approx(speeds * 0.01, abs=0.004)
+    assert log.base_pose[0] == pytest.approx(pose, abs=1e-6)
+    assert log.joints[1] - log.joints[0] == pytest.approx(speeds * 0.01, abs=3e-4)
     # The next rollout, without a state, starts at the robot's own pose.
     after = run(engine, robot, 2)
     assert after.joints is not None
     assert after.base_pose is not None
     assert after.joints[0] == pytest.approx(0.0, abs=0)
-    assert after.base_pose[0] == pytest.approx([*robot.start_position_m, *robot.start_rotation], abs=1e-12)
+    assert after.base_pose[0] == pytest.approx([*robot.start_position_m, *robot.start_rotation], abs=1e-6)
 
 
-def test_a_lost_leg_leaves_its_channels_dead_and_the_body_leaning(engine: Engine) -> None:
-    whole, lame = run(engine, quadruped(), 200), run(engine, quadruped().without("upper_front_left"), 200)
-    assert (lame.channel("touch_front_left") == -1).all()
-    assert (lame.channel("angle_front_left") == 0).all()
-    assert (whole.channel("touch_front_left")[5:] == 1).all()
+def test_lost_legs_leave_their_channels_dead_and_the_robot_on_its_side(engine: Engine) -> None:
+    whole = run(engine, quadruped(), 200)
+    lame = run(engine, quadruped().without("upper_front_left").without("upper_rear_left"), 200)
+    assert (whole.channel("touch_rear_left")[50:] == 1).any()
+    for leg in ("front_left", "rear_left"):
+        assert (lame.channel(f"touch_{leg}") == -1).all()
+        assert (lame.channel(f"angle_{leg}") == 0).all()
     assert lame.joints is not None
     assert lame.torques is not None
-    assert (lame.joints[:, :2] == 0).all()
-    assert (lame.torques[:, :2] == 0).all()
+    gone = [0, 1, 4, 5]
+    assert (lame.joints[:, gone] == 0).all()
+    assert (lame.torques[:, gone] == 0).all()
+    assert np.abs(np.delete(lame.joints, gone, axis=1)).max() > 0.01
     assert whole.base_pose is not None
     assert lame.base_pose is not None
-    lean = 2 * np.abs(lame.base_pose[-1, 3:5]).max()
-    assert lean > 0.02 > 2 * np.abs(whole.base_pose[-1, 3:5]).max()
+    # Without its left legs it falls to the left: a negative turn about the forward axis.
+    assert 2 * lame.base_pose[-1, 3] < -0.3
+    assert abs(2 * whole.base_pose[-1, 3]) < 0.02
 
 
 @pytest.mark.parametrize("pose", [True, False])
@@ -274,38 +296,53 @@ def test_a_result_does_not_depend_on_its_batch_its_order_or_what_ran_before(engi
 
 
 def test_a_fresh_engine_gives_the_same_bits(engine: Engine) -> None:
-    rollouts = _rollouts(mixed_models()[:4])
-    fresh = type(engine)(largest_batch=3)  # type: ignore[call-arg]
-    for one, other in zip(engine.rollout(rollouts), fresh.rollout(rollouts[::-1])[::-1], strict=True):
+    rollouts = _rollouts(mixed_models())
+    used = engine.rollout(rollouts)
+    for rollout, expected in zip(rollouts, used, strict=True):
+        fresh = type(engine)()
+        assert_same_bits(fresh.rollout([rollout])[0], expected)
+        fresh.close()
+
+
+def test_small_batches_give_the_same_bits(engine: Engine) -> None:
+    rollouts = _rollouts(mixed_models())
+    small = type(engine)(largest_batch=3)  # type: ignore[call-arg]
+    for one, other in zip(engine.rollout(rollouts), small.rollout(rollouts), strict=True):
         assert_same_bits(one, other)
-    fresh.close()
+    small.close()
 
 
 # -- agreement -------------------------------------------------------------------------------------------------------
 
 
-def test_the_engines_agree_over_the_first_part_of_a_calm_trial(
-    engines: dict[str, Engine], record_property: pytest.RecordProperty
+@pytest.mark.parametrize(
+    ("compliance", "body_mm", "joints_mrad", "touch_share"), [(0.0, 8.0, 18.0, 0.15), (3e-4, 4.0, 8.0, 0.02)]
+)
+def test_the_engines_agree_over_the_first_second_of_a_calm_trial(
+    engines: dict[str, Engine], compliance: float, body_mm: float, joints_mrad: float, touch_share: float
 ) -> None:
+    """On a hard floor, which of four legs carry is left to the solver, and the engines part there first."""
     steps, count = 100, 12
-    rollouts = [Rollout(quadruped(), Commands(calm_commands(i, steps)), steps, pose=True) for i in range(count)]
+    robot = quadruped().with_world(compliance_m_n=compliance)
+    rollouts = [Rollout(robot, Commands(calm_commands(i, steps)), steps, pose=True) for i in range(count)]
     bullet, mujoco = (engines[name].rollout(rollouts) for name in ("pybullet", "mujoco"))
-    apart, joints, touch = [], [], []
-    for a, b in zip(bullet, mujoco, strict=True):
-        assert a.base_pose is not None
-        assert b.base_pose is not None
-        assert a.joints is not None
-        assert b.joints is not None
-        apart.append(np.linalg.norm(a.base_pose[:, :3] - b.base_pose[:, :3], axis=1).max() * 1000)
-        joints.append(np.sqrt(((a.joints - b.joints) ** 2).mean()) * 1000)
-        touch.append((a.sensors[:, :4] != b.sensors[:, :4]).mean())
-    for name, values in (("body_mm", apart), ("joints_mrad", joints), ("touch_share", touch)):
-        record_property(name, float(np.median(values)))
-        print(f"{name}: median {np.median(values):.3g}, worst {max(values):.3g} of {count} trials of {steps} steps")
-    assert np.median(apart) < 8
-    assert max(apart) < 40
-    assert np.median(joints) < 18
-    assert np.median(touch) < 0.15
+    gaps = np.array([_gap(a, b) for a, b in zip(bullet, mujoco, strict=True)])
+    for name, values in zip(("body mm", "joints mrad", "touch share"), gaps.T, strict=True):
+        print(f"compliance {compliance:g} m/N, {name}: median {np.median(values):.3g}, worst {values.max():.3g}")
+    assert (np.median(gaps, axis=0) < [body_mm, joints_mrad, touch_share]).all()
+    assert (gaps.max(axis=0) < 4 * np.array([body_mm, joints_mrad, touch_share])).all()
+    assert gaps[:, 1].min() > 0.01, "two engines, not one"
+
+
+def _gap(a: SensorLog, b: SensorLog) -> tuple[float, float, float]:
+    """Greatest distance of the bodies (mm), RMS difference of the joints (mrad), share of unlike touch values."""
+    assert a.base_pose is not None
+    assert b.base_pose is not None
+    assert a.joints is not None
+    assert b.joints is not None
+    body = np.linalg.norm(a.base_pose[:, :3] - b.base_pose[:, :3], axis=1).max()
+    joints = np.sqrt(((a.joints - b.joints) ** 2).mean())
+    return 1e3 * float(body), 1e3 * float(joints), float((a.sensors[:, :4] != b.sensors[:, :4]).mean())
 
 
 def test_the_engines_stand_alike(engines: dict[str, Engine]) -> None:
@@ -315,7 +352,3 @@ def test_the_engines_stand_alike(engines: dict[str, Engine]) -> None:
         assert b.base_pose is not None
         assert a.base_pose[:, :3] == pytest.approx(b.base_pose[:, :3], abs=6e-3)
         assert a.base_pose[:, 3:] == pytest.approx(b.base_pose[:, 3:], abs=0.02)
-
-
-def test_no_commands_means_no_commands() -> None:
-    assert no_commands(quadruped()).values.shape == (1, 8)

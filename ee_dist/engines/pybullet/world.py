@@ -32,7 +32,11 @@ def structure_key(robot: Robot) -> str:
     drives = tuple((d.joint, d.rotor_inertia) for d in robot.drives)
     sensors = tuple((s.kind, s.target) for s in robot.sensors if s.kind == "touch")
     start = (robot.start_position_m, robot.start_rotation, robot.free_base, robot.time_step_s)
-    return repr((parts, joints, drives, sensors, start, robot.world.has_floor, robot.world.compliance_m_n))
+    # The principal axes of a part are fixed when it is built. Most parts' are those of their frame.
+    oblique = {j.child for j in robot.present_joints if sum(map(bool, j.axis)) > 1}
+    turned = [q for q in robot.present_parts if any(q.inertia_kg_m2[3:]) or q.name in oblique]
+    turns = tuple(_principal(_with_rotor(robot, q))[1] for q in turned)
+    return repr((parts, joints, drives, sensors, start, turns, robot.world.has_floor, robot.world.compliance_m_n))
 
 
 class World:

@@ -1,0 +1,25 @@
+"""Hidden effects drawn at random, for blind trials: over the whole catalogue, all targets, the range worth trying."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ee_dist.discrepancy.candidates import Candidate, candidate
+from ee_dist.effects.catalogue import CATALOGUE, Term
+from ee_dist.robots.model import Robot
+
+LEAST, MOST = 0.1, 0.9
+"""Shares of the way from neutral to a bound within which magnitudes are drawn."""
+
+
+def draw(robot: Robot, rng: np.random.Generator) -> tuple[Candidate, Term]:
+    """An effect, then a target, then its values; every effect of the catalogue is as likely as any other."""
+    entries = [e for e in CATALOGUE.values() if e.searchable and e.targets(robot)]
+    entry = entries[int(rng.integers(len(entries)))]
+    targets = entry.targets(robot)
+    chosen = candidate(robot, entry, targets[int(rng.integers(len(targets)))])
+    u = []
+    for low, high in zip(chosen.lower, chosen.upper, strict=True):
+        side = float(rng.choice([s for s in (low, high) if s] or [0.0]))
+        u.append(side * float(rng.uniform(LEAST, MOST)))
+    return chosen, chosen.term(u)

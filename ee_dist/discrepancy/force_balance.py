@@ -1,0 +1,171 @@
+"""The problem of measured forces: what the drive gave, less what the measured motion needed and friction took.
+
+For a robot on a fixed base whose joint positions and drive torques were measured. Nothing is simulated: positions are
+low-passed and differentiated, the torque that this motion needs comes from inverse dynamics, friction and springs from
+the drive path's own laws at each instant, and what is left over is the residual. It is linear in most parameters, never
+chaotic, and takes milliseconds a model; what it cannot see are the controller (a delay, a gain) and the sensors.
+
+For one joint, and with the settings below, this is the published definition of the relative force error on EMPS (Janot,
+Gautier, Brunot 2019; Gautier, Janot, Vandanjon 2013): regressor and force both decimated, signs taken before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.prediction import roughness
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.effects.controller_laws import CONTROLLER_LAWS
+from ee_dist.effects.laws import LawContext, find_law
+from ee_dist.engines.friction import Friction
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.sampling import LowPass, decimated
+from ee_dist.robots.inertia import felt_inertia
+from ee_dist.robots.inverse_dynamics import joint_torques
+from ee_dist.robots.model import Drive, Robot
+from ee_dist.trials.log import Array, SensorLog
+
+INSTANT_S = 1e-9
+"""Time step at which the drive path's implicit friction is that of the instant."""
+
+
+@dataclass(frozen=True)
+class Processing:
+    """What is done to the measurements: low-pass of the positions, rows dropped at the start (where the filter settles),
+    one row kept of ``keep_every``, blocks of time judged apart."""
+
+    low_pass: LowPass = field(default_factory=LowPass)
+    drop_rows: int = 49
+    keep_every: int = 10
+    blocks: int = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A measured motion (T, M): positions, speeds, accelerations; ``torque`` that the drives gave."""
+
+    position: Array
+    speed: Array
+    acceleration: Array
+    torque: Array
+
+
+def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
+    """Raises MeasurementError where the log lacks positions or torques, or is too short."""
+    if log.joints is None or log.torques is None:
+        what = "joint positions" if log.joints is None else "torques of the drives"
+        raise MeasurementError(f"the log of {robot.name} has no {what}: a balance of forces needs both")
+    if len(log) < processing.drop_rows + 10 * processing.keep_every:
+        raise MeasurementError(f"the log of {robot.name} has only {len(log)} rows: too few for the filters")
+    dt = float(np.median(np.diff(log.times_s)))
+    position = np.stack([processing.low_pass(q, dt) for q in log.joints.T], axis=1)
+    speed = np.gradient(position, dt, axis=0)
+    acceleration = np.gradient(speed, dt, axis=0)
+    cut = slice(processing.drop_rows, None)
+    return Motion(position[cut], speed[cut], acceleration[cut], np.array(log.torques[cut]))
+
+
+class ForceBalance:
+    """Implements ``ee_dist.discrepancy.problem.Problem``. Channels are the drives.
+
+    A residual value is a force left over in units of the root mean square of the measured force, so that the error is
+    the relative force error. Segments are blocks of time.
+    """
+
+    def __init__(self, trials: Sequence[MeasuredTrial], robot: Robot, processing: Processing | None = None) -> None:
+        self.robot, self.measured = robot, tuple(trials)
+        self.processing = processing or Processing()
+        self.motions = [motion_of(t.log, robot, self.processing) for t in trials]
+        self.models = [apply(robot, t.setup) for t in trials]
+        self.trials = tuple(t.name for t in trials)
+        self.channels = robot.motor_names
+        every = self.processing.keep_every
+        forces = [decimated(m.torque, every) for m in self.motions]
+        self.scale = np.sqrt(np.mean(np.concatenate(forces) ** 2, axis=0))
+        if not self.scale.all():
+            raise MeasurementError(f"{self.channels[int(np.argmin(self.scale))]}: its measured torque is zero throughout")
+        self._lay_out(forces)
+        p = self.processing
+        self.error_definition = (
+            "relative force error: root mean square of the force left over, over that of the measured force; positions "
+            f"through a {p.low_pass}, central differences, forces decimated by {p.keep_every}; 0.01 is one per cent"
+        )
+
+    def _lay_out(self, forces: Sequence[Array]) -> None:
+        names: list[str] = []
+        seg, chan, floor, of_trial = [], [], [], []
+        self.slices: list[slice] = []
+        self.times_s: list[Array] = []
+        at, motors = 0, len(self.channels)
+        for k, (trial, force) in enumerate(zip(self.measured, forces, strict=True)):
+            rows = len(force)
+            blocks = min(self.processing.blocks, max(1, rows // 20))
+            block = np.minimum(np.arange(rows) * blocks // rows, blocks - 1)
+            dt = float(np.median(np.diff(trial.log.times_s))) * self.processing.keep_every
+            start = self.processing.drop_rows * dt / self.processing.keep_every
+            self.times_s.append(start + np.arange(rows) * dt)
+            first = len(names)
+            names += [f"{trial.name}@{start + float(np.argmax(block == b)) * dt:.1f}s" for b in range(blocks)]
+            of_trial += [k] * blocks
+            seg.append(np.repeat(first + block, motors))
+            chan.append(np.tile(np.arange(motors), rows))
+            noise = np.median(roughness(force / self.scale), axis=0) / 0.455
+            floor.append(np.tile(noise, rows))
+            self.slices.append(slice(at, at + rows * motors))
+            at += rows * motors
+        self.segments = tuple(names)
+        self.trial_of_segment = np.array(of_trial)
+        self.segment_of = np.concatenate(seg).astype(np.int64)
+        self.channel_of = np.concatenate(chan).astype(np.int64)
+        self.floor = np.concatenate(floor)
+
+    def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+        """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
+        chosen = range(len(self.measured)) if trials is None else trials
+        out = np.zeros((len(hypotheses), len(self.segment_of)))
+        for row, hypothesis in enumerate(hypotheses):
+            for k in chosen:
+                left = left_over(apply(self.models[k], hypothesis), self.motions[k])
+                kept = decimated(left, self.processing.keep_every) if np.isfinite(left).all() else None
+                out[row, self.slices[k]] = np.inf if kept is None else (kept / self.scale).ravel()
+        return out
+
+    def noise_floor(self) -> tuple[float, str]:
+        return float(np.sqrt(self.floor.mean())), "estimated: second differences of the measured force"
+
+
+def left_over(robot: Robot, motion: Motion) -> Array:
+    """(T, M): what the drives gave at the joints, less what the motion needed."""
+    needed = joint_torques(robot, motion.position, motion.speed, motion.acceleration)
+    q, qd = motion.position, motion.speed
+    p, uses = _fields(robot.drives)
+    active = motion.torque * p["strength"]
+    torque = active - p["spring"] * (q - p["spring_rest"]) + p["offset_torque"]
+    rows = np.arange(len(q))
+    for law in robot.laws:
+        if law.name in CONTROLLER_LAWS:
+            continue
+        k = robot.motor_names.index(law.joint)
+        context = LawContext({n: np.full(len(q), v) for n, v in law.values}, INSTANT_S)
+        context.position, context.speed, context.torque = q[:, k], qd[:, k], torque[:, k]
+        torque[rows, k] += find_law(law.name)(context)
+    if Friction.needed(uses):
+        inertia = felt_inertia(robot)[None, :]
+        friction = Friction(p, uses, inertia, INSTANT_S)
+        # The load on a joint is all that its motion needed beyond its own inertia.
+        load = inertia * motion.acceleration - needed
+        friction.record(-load, qd)
+        torque = friction(torque, active, qd)
+    return torque - needed
+
+
+def _fields(drives: Sequence[Drive]) -> tuple[dict[str, Array], dict[str, bool]]:
+    """Numbers of the drives by field, (1, M) each, and whether any is not neutral."""
+    names = [f for f in Drive.__dataclass_fields__ if f != "joint"]
+    p = {n: np.array([[getattr(d, n) for d in drives]], dtype=float) for n in names}
+    neutral = {n: Drive.__dataclass_fields__[n].default for n in names}
+    return p, {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}

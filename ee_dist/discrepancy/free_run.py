@@ -1,0 +1,205 @@
+"""The problem of a whole record simulated freely: from the measured first state, in the loop of the robot's own controller.
+
+The model gets what the robot got (commands, supply voltage, when its drives were released) and nothing else, for the
+whole record; what counts is how far its joints are from where they were measured. That is what a user of the model will
+do with it, and the strictest test: an error once made goes on. It suits robots that are held by their controller.
+
+A residual value is sign(e) * sqrt(|e|), so that squares add up to absolute errors: the mean square is the mean absolute
+position error. A stick that lasts too long moves a joint far away for a while; squares of that would outweigh the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
+from ee_dist.evaluation.jobs import Evaluator, Job
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array, SensorLog, State
+
+
+@dataclass(frozen=True)
+class ToPositions:
+    """The reduction that keeps every n-th of the first ``rows`` of some channels, (rows // n, C)."""
+
+    columns: tuple[int, ...]
+    every: int
+    rows: int
+
+    @property
+    def key(self) -> str:
+        return f"positions:{self.columns}:{self.every}:{self.rows}"
+
+    def __call__(self, log: SensorLog) -> Array:
+        return log.sensors[: self.rows : self.every, list(self.columns)].copy()
+
+
+class FreeRun:
+    """Implements ``ee_dist.discrepancy.problem.Problem``. Channels are the joint positions; a segment is a whole trial.
+
+    ``every``: rows of a log from one residual value to the next. ``windows_s`` starts the model anew from the measured
+    state so often, and makes segments of the windows; None runs each trial through.
+    """
+
+    rugged = True
+    """Errors jump where a joint sticks or slips: fits search rather than follow a slope."""
+    least_share = 0.05
+    """Share of the mean absolute error that an effect has to take off held-out trials."""
+
+    def __init__(
+        self,
+        trials: Sequence[MeasuredTrial],
+        robot: Robot,
+        evaluator: Evaluator,
+        every: int = 5,
+        windows_s: float | None = None,
+    ) -> None:
+        self.robot, self.measured, self.evaluator, self.every = robot, tuple(trials), evaluator, every
+        columns = [k for k, s in enumerate(robot.sensors) if s.kind == "position"]
+        if not columns:
+            raise MeasurementError(f"{robot.name}: no sensor of kind 'position', which a free run is compared by")
+        self.columns = tuple(columns)
+        self.setups = [apply(robot, t.setup) for t in trials]
+        self.trials = tuple(t.name for t in trials)
+        self.channels = tuple(robot.sensor_names[k] for k in columns)
+        self.pieces = [p for k, t in enumerate(trials) for p in _pieces(k, t, robot, windows_s)]
+        self._lay_out()
+        self.floor = np.concatenate([_floor(p.log.sensors[::every, columns]) for p in self.pieces])
+        unit = robot.sensors[columns[0]].unit
+        how = "over free runs of the whole record" if windows_s is None else f"over windows of {windows_s:g} s"
+        self.error_definition = f"square root of the mean absolute position error ({unit}) {how}, every trial counting the same"
+
+    def _lay_out(self) -> None:
+        """Segments and places of all residual values. A trial's values carry equal weight in sum, whatever its length."""
+        width = len(self.columns)
+        sizes = [len(p.log.sensors[:: self.every]) * width for p in self.pieces]
+        starts = np.concatenate([[0], np.cumsum(sizes)])
+        self.slices = [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)]
+        self.segments = tuple(f"{self.trials[p.trial]}@{p.start_s:.1f}s" for p in self.pieces)
+        self.trial_of_segment = np.array([p.trial for p in self.pieces])
+        self.segment_of = np.repeat(np.arange(len(sizes)), sizes)
+        self.channel_of = np.concatenate([np.tile(np.arange(width), n // width) for n in sizes])
+        of_trial = np.bincount(self.trial_of_segment, weights=sizes)
+        self.weight = (of_trial.mean() / of_trial)[self.trial_of_segment]
+
+    def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+        """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
+        chosen = [i for i, p in enumerate(self.pieces) if trials is None or p.trial in set(trials)]
+        models = {k: [apply(self.setups[k], h) for h in hypotheses] for k in {self.pieces[i].trial for i in chosen}}
+        # Rollouts of one length with the same inputs share a batch, so all run as long as the longest.
+        steps, switched = max(len(p.log) for p in self.pieces), any(p.enabled is not None for p in self.pieces)
+        jobs = [
+            Job(p.rollout(m, steps, switched), ToPositions(self.columns, self.every, len(p.log)))
+            for p in (self.pieces[i] for i in chosen)
+            for m in models[p.trial]
+        ]
+        found = self.evaluator.evaluate(jobs)
+        out = np.zeros((len(hypotheses), len(self.segment_of)))
+        for place, i in enumerate(chosen):
+            measured = self.pieces[i].log.sensors[:: self.every, list(self.columns)]
+            error = measured[None] - np.stack(found[place * len(hypotheses) : (place + 1) * len(hypotheses)])
+            with np.errstate(invalid="ignore"):
+                value = np.sign(error) * np.sqrt(np.abs(error) * self.weight[i])
+            out[:, self.slices[i]] = np.where(np.isfinite(value), value, np.inf).reshape(len(hypotheses), -1)
+        return out
+
+    def noise_floor(self) -> tuple[float, str]:
+        return float(np.sqrt(self.floor.mean())), "estimated: second differences of the measured positions"
+
+    def mean_absolute(self, hypothesis: Hypothesis) -> Array:
+        """(trials,) mean absolute position error of each trial, rad or m."""
+        energy = self.residuals([hypothesis])[0] ** 2 / self.weight[self.segment_of]
+        trial = self.trial_of_segment[self.segment_of]
+        return np.bincount(trial, weights=energy) / np.bincount(trial)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A stretch of a trial that is simulated in one go. ``log`` is what was measured of it."""
+
+    trial: int
+    start_s: float
+    log: SensorLog
+    commands: Array
+    enabled: Array | None
+    start: State
+
+    def rollout(self, model: Robot, steps: int, switched: bool) -> Rollout:
+        """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
+        enabled = np.ones(len(self.log)) if self.enabled is None and switched else self.enabled
+        return Rollout(model, Commands(self.commands), steps, start=self.start, supply_v=self.log.supply_v, enabled=enabled)
+
+
+def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None) -> list[Piece]:
+    log = trial.log
+    if log.joints is None:
+        raise MeasurementError(f"trial {trial.name!r}: no joint positions in its log: nothing to start a simulation from")
+    if log.motor_names != robot.motor_names or log.sensor_names != robot.sensor_names:
+        raise MeasurementError(
+            f"trial {trial.name!r} is of another robot: its channels are {', '.join(log.sensor_names)}; "
+            f"{robot.name} has {', '.join(robot.sensor_names)}"
+        )
+    dt = float(np.median(np.diff(log.times_s)))
+    if abs(dt / robot.time_step_s - 1) > 1e-3:
+        raise MeasurementError(
+            f"trial {trial.name!r} has a row every {dt:g} s, {robot.name} a time step of {robot.time_step_s:g} s; import it at "
+            f"{1 / robot.time_step_s:g} Hz"
+        )
+    speeds = _speeds(log, robot, dt)
+    commands, enabled = released(log.commands)
+    length = len(log) if windows_s is None else max(2, round(windows_s / dt))
+    found = []
+    for first in range(0, len(log), length):
+        last = min(first + length, len(log))
+        if last - first < min(length, len(log)) // 2:
+            break
+        found.append(
+            Piece(
+                index,
+                first * dt,
+                log.part(first, last),
+                commands[first:last],
+                None if enabled is None else enabled[first:last],
+                State(log.joints[first].copy(), speeds[first].copy()),
+            )
+        )
+    return found
+
+
+def released(commands: Array) -> tuple[Array, Array | None]:
+    """Commands (T, M) with numbers everywhere, and (T,) 0 where the drives were released, if they were.
+
+    A released drive obeys no command: its command is NaN in the log.
+    """
+    gone = ~np.isfinite(commands).all(axis=1)
+    if not gone.any():
+        return commands, None
+    rows = np.where(gone, 0, np.arange(len(commands)))
+    first = int(np.argmin(gone))
+    return np.nan_to_num(commands[np.maximum(np.maximum.accumulate(rows), first)]), (~gone).astype(float)
+
+
+def _speeds(log: SensorLog, robot: Robot, dt: float) -> Array:
+    """Measured speeds (T, M); differences of the positions where a joint has no sensor for it."""
+    assert log.joints is not None
+    out = np.gradient(log.joints, dt, axis=0)
+    for k, motor in enumerate(robot.motor_names):
+        for c, sensor in enumerate(robot.sensors):
+            if sensor.kind == "velocity" and sensor.target == motor:
+                out[:, k] = log.sensors[:, c]
+    return out
+
+
+def _floor(positions: Array) -> Array:
+    """Mean absolute error (n,) that the noise of the readings alone would leave."""
+    if len(positions) < 3:
+        return np.zeros(positions.size)
+    second = np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2]) / np.sqrt(6.0)
+    return np.tile(np.median(second, axis=0), len(positions))

@@ -1,0 +1,84 @@
+"""Model files: a base robot and the effects that it is believed to have. To add an effect is to append a line ::
+
+    robot: servo_pendulum            # a name, a file beside this one (.yaml, .urdf), or a description
+    effects:
+      - {effect: viscous_friction, target: servo, damping_nm_s_rad: 0.005}
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
+from ee_dist.robots.describe import load_robot
+from ee_dist.robots.model import Robot, RobotError
+from ee_dist.robots.serial import robot_to_dict
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """``robot`` is the base, without the effects of ``terms``; ``source`` is how the file names it, seen from ``folder``."""
+
+    robot: Robot
+    terms: Hypothesis
+    source: Any
+    folder: Path
+
+    @property
+    def model(self) -> Robot:
+        return apply(self.robot, self.terms)
+
+
+def read_model(path: str | Path) -> ModelFile:
+    """Raises RobotError or EffectError in one line: no such file, not YAML, an unknown robot, effect, target or value."""
+    file = Path(path)
+    try:
+        data = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RobotError(f"{file}: no such model file") from None
+    except IsADirectoryError:
+        raise RobotError(f"{file}: a folder; expected a model file (YAML)") from None
+    except (yaml.YAMLError, UnicodeError) as error:
+        raise RobotError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(data, Mapping) or "robot" not in data:
+        raise RobotError(f"{file}: a model file is a mapping with 'robot' and 'effects'")
+    for key in data:
+        if key not in ("robot", "effects"):
+            raise RobotError(f"{file}: unknown key {key!r}; there are: robot, effects")
+    robot, _ = load_robot(data["robot"], file.parent)
+    entries = data.get("effects") or []
+    if not isinstance(entries, list):
+        raise EffectError(f"{file}: effects: expected a list, not {entries!r}")
+    try:
+        terms = tuple(from_dict(e) for e in entries)
+        apply(robot, terms)
+    except EffectError as error:
+        raise EffectError(f"{file}: {error}") from None
+    return ModelFile(robot, terms, data["robot"], file.parent)
+
+
+def write_model(path: str | Path, source: Any, folder: Path, terms: Hypothesis, notes: Sequence[str] = ()) -> None:
+    """Write a model file, whole or not at all; ``notes`` become comments above it.
+
+    ``source`` names the robot as seen from ``folder`` (a robot itself is written out in full).
+    """
+    file = Path(path)
+    if isinstance(source, Robot):
+        source = robot_to_dict(source)
+    elif isinstance(source, str) and Path(source).suffix:
+        source = os.path.relpath(folder / source, file.parent)
+    elif isinstance(source, Mapping) and "urdf" in source:
+        source = {**source, "urdf": os.path.relpath(folder / str(source["urdf"]), file.parent)}
+    lines = [f"# {line}" for note in notes for line in note.splitlines()]
+    lines.append(yaml.safe_dump({"robot": source}, sort_keys=False, default_flow_style=None, width=120).rstrip())
+    lines.append("effects:" if terms else "effects: []")
+    lines += [f"  - {yaml.safe_dump(t.as_dict(), default_flow_style=True, sort_keys=False, width=1000).strip()}" for t in terms]
+    partial = file.with_name(file.name + ".part")
+    partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    partial.replace(file)

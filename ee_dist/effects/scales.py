@@ -1,0 +1,50 @@
+"""How large the numbers of a robot are, so that an effect's range suits a small servo and a machine tool alike."""
+
+from __future__ import annotations
+
+import math
+
+from ee_dist.robots.inertia import felt_inertia, steady_inertia
+from ee_dist.robots.model import Drive, Robot
+
+
+def drive_of(robot: Robot, joint: str) -> Drive:
+    return next(d for d in robot.drives if d.joint == joint)
+
+
+def travel(robot: Robot, joint: str) -> float:
+    """Half the range of a joint, at most 1 rad of a hinge; rad (m)."""
+    j = robot.joint(joint)
+    half = (j.upper - j.lower) / 2
+    return min(half, 1.0) if j.kind == "hinge" or not math.isfinite(half) else half
+
+
+def inertia(robot: Robot, joint: str) -> float:
+    """What a torque on the joint meets, kg.m^2 (kg)."""
+    return float(felt_inertia(robot)[robot.motor_names.index(joint)])
+
+
+def torque(robot: Robot, joint: str) -> float:
+    """The torque limit of a drive, or what its controller asks at half the range of the joint; N.m (N)."""
+    drive = drive_of(robot, joint)
+    for known in (drive.torque_limit, drive.kp * travel(robot, joint)):
+        if 0 < known < math.inf:
+            return known
+    return 10.0 * inertia(robot, joint)
+
+
+def speed(robot: Robot, joint: str) -> float:
+    """The speed of a drive without load, or half the range of the joint in a quarter of a second; rad/s (m/s)."""
+    limit = drive_of(robot, joint).speed_limit
+    return limit if 0 < limit < math.inf else 4.0 * travel(robot, joint)
+
+
+def stiffest(robot: Robot, joint: str) -> float:
+    """The stiffest spring on the joint that its time step resolves, some twelve steps a period; N.m/rad (N/m)."""
+    least = float(steady_inertia(robot)[robot.motor_names.index(joint)])
+    return 0.25 * least / robot.time_step_s**2
+
+
+def weight(robot: Robot) -> float:
+    """N; of the mass alone where there is no gravity."""
+    return sum(p.mass_kg for p in robot.present_parts) * (robot.world.gravity_m_s2 or 9.81)

@@ -1,0 +1,106 @@
+"""An engine for robots of one moving joint on a fixed base: their dynamics in closed form, for a whole batch at once.
+
+A general engine spends its time on bodies and contacts that a pendulum or a slide does not have. Here a step is a few
+array operations whatever the number of rows, and the inertia about the joint and the work of gravity are exact. Steps
+are semi-implicit Euler, as in Bullet. Everything else (drives, sensors, controllers) is the same code as for any engine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from ee_dist.engines.contract import EngineError, Rollout, Truth
+from ee_dist.engines.loop import in_batches
+from ee_dist.robots.inverse_dynamics import joint_torques
+from ee_dist.robots.model import Drive, Robot
+from ee_dist.trials.log import Array, SensorLog
+
+_PLAIN = Drive("", kp=0.0, ki=0.0, kd=0.0, torque_limit=0.0, speed_limit=1.0)
+
+
+def fits(robot: Robot) -> bool:
+    """Whether this engine can simulate the robot."""
+    moving = [j.name for j in robot.joints if j.kind != "fixed"]
+    return not robot.free_base and not robot.lost and moving == list(robot.motor_names) and len(moving) == 1
+
+
+class OneJointEngine:
+    """Implements ``ee_dist.engines.contract.Engine``."""
+
+    name = "one_joint"
+
+    def __init__(self, largest_batch: int = 512) -> None:
+        self.largest_batch = largest_batch
+
+    def rollout(self, rollouts: Sequence[Rollout]) -> list[SensorLog]:
+        """Logs in the order asked. Raises EngineError for a robot that has more than one joint or moves about."""
+        for r in rollouts:
+            if not fits(r.model):
+                raise EngineError(f"one_joint cannot simulate {r.model.name!r}: it is for one driven joint on a fixed base")
+        return in_batches(rollouts, OneJointBodies, self.largest_batch)
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class OneJointBodies:
+    """Implements ``ee_dist.engines.contract.Bodies``."""
+
+    def __init__(self, batch: Sequence[Rollout]) -> None:
+        count = len(batch)
+        self.dt = batch[0].model.time_step_s
+        terms = {id(r.model): r.model for r in batch}
+        known = {key: _dynamics(robot) for key, robot in terms.items()}
+        self.inertia, self.constant, self.cosine, self.sine = np.array([known[id(r.model)] for r in batch]).T[:, :, None]
+        self.q, self.qd = np.zeros((count, 1)), np.zeros((count, 1))
+        for i, r in enumerate(batch):
+            if r.start is not None:
+                self.q[i], self.qd[i] = r.start.joints, r.start.speeds
+        self.swings = bool(self.cosine.any() or self.sine.any())
+        self.touches = sum(s.kind == "touch" for s in batch[0].model.sensors)
+        self.base = np.array([(*r.model.start_position_m, *r.model.start_rotation) for r in batch])
+
+    def read(self, touch: bool, pose: bool, twist: bool) -> Truth:
+        truth = Truth(self.q, self.qd)
+        if touch:
+            truth.touch = np.zeros((len(self.q), self.touches), dtype=bool)
+        if pose:
+            truth.base_pose = self.base
+        if twist:
+            truth.base_twist = np.zeros((len(self.q), 6))
+        return truth
+
+    def step(self, torques: Array, force: Array | None) -> None:
+        load = self.constant
+        if self.swings:
+            load = load + self.cosine * np.cos(self.q) + self.sine * np.sin(self.q)
+        self.qd = self.qd + self.dt * (torques - load) / self.inertia
+        self.q = self.q + self.dt * self.qd
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def _dynamics(robot: Robot) -> tuple[float, float, float, float]:
+    """(inertia, c, a, b): holding the joint still at q takes c + a cos q + b sin q (a = b = 0 for a slide)."""
+    drives = tuple(replace(_PLAIN, joint=d.joint, rotor_inertia=d.rotor_inertia) for d in robot.drives)
+    return _of_body(replace(robot, drives=drives, sensors=(), laws=()))
+
+
+@lru_cache(maxsize=4096)
+def _of_body(robot: Robot) -> tuple[float, float, float, float]:
+    # Gravity on a turning body is a first harmonic of its angle, so that three angles tell all of it.
+    kind = next(j.kind for j in robot.joints if j.kind != "fixed")
+    angles = [0.0, math.pi / 2, math.pi] if kind == "hinge" else [0.0, 0.0, 0.0]
+    at, moved = np.array([[*angles, 0.0]]).T, np.array([[0.0, 0.0, 0.0, 1.0]]).T
+    held = [float(v) for v in joint_torques(robot, at, np.zeros((4, 1)), moved)[:, 0]]
+    inertia = held[3] - held[0]
+    if kind == "slide":
+        return inertia, held[0], 0.0, 0.0
+    constant = (held[0] + held[2]) / 2
+    return inertia, constant, (held[0] - held[2]) / 2, held[1] - constant

@@ -1,0 +1,135 @@
+"""task=trial: a simulated physical robot with a hidden change is tried, and only what its sensors said is written down."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from ee_dist.discrepancy.candidates import candidate
+from ee_dist.discrepancy.draw import draw
+from ee_dist.discrepancy.measured import driver_of
+from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
+from ee_dist.engines.drivers import Commands
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.recording.reader import read_run
+from ee_dist.recording.records import HARDWARE, TrialRecord
+from ee_dist.recording.writer import RunWriter
+from ee_dist.robots.model import Robot
+from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.seal import FILE, sealed
+from ee_dist.tasks.summary import Stopwatch, config_digest, package_version, write_summary
+from ee_dist.tasks.wiring import build_robot, engine_maker
+from ee_dist.trials.excitation import Excitation, parse
+from ee_dist.trials.log import SensorLog
+from ee_dist.trials.noise import with_noise
+from ee_dist.viewing.rerun_scene import write_rrd
+
+TYPICAL = 0.35
+"""How far from neutral, as a share of the range worth trying, an effect chosen by name alone is put."""
+
+
+@dataclass
+class Options:
+    name: str = "trial"
+    excitations: list[str] = field(default_factory=list)
+    repeats: int = 2
+    noise: float = 0.02
+
+    def __post_init__(self) -> None:
+        if self.repeats < 1:
+            raise ConfigError(f"task.repeats={self.repeats}: must be 1 or more")
+        if not 0 <= self.noise <= 1:
+            raise ConfigError(f"task.noise={self.noise}: must be a share of the channels' range, from 0 to 1")
+        if not self.excitations:
+            raise ConfigError("task.excitations: name at least one, such as task.excitations=[multisine]")
+
+
+def run(config: Config, options: Options, out: Path) -> None:
+    """Write trial.mcap, sealed.json, trial.rrd and summary.json into ``out``."""
+    console, watch = Console(), Stopwatch()
+    seeds = np.random.SeedSequence(config.seed)
+    hidden_seed, noise_seed = seeds.spawn(2)
+    engine = engine_maker(config, alone=True)()
+    robot = with_noise(build_robot(config), config.noise or options.noise)
+    hidden = hypothesis(config.hidden, robot, hidden_seed)
+    apply(robot, hidden)
+    plan = [parse(text) for text in options.excitations]
+    text, digest = sealed({"hidden": [t.as_dict() for t in hidden], "seed": config.seed, "engine": config.engine.name})
+    metadata = {
+        "task": "trial",
+        "version": package_version(),
+        "engine": config.engine.name,
+        "noise": str(config.noise or options.noise),
+        "seal": digest,
+        "excitations": json.dumps([e.as_dict() for e in plan]),
+    }
+    hardware = PhysicalRobot(engine, robot, hidden, noise_seed)
+    path, sums = out / "trial.mcap", hashlib.sha256()
+    table = Table(title=f"Trials of {robot.name}, hidden change sealed", title_justify="left")
+    for column in ("trial", "what was done", "seconds", "rows"):
+        table.add_column(column)
+    with RunWriter(path, robot, metadata) as writer:
+        for k, excitation in enumerate(plan * options.repeats):
+            log, record = one_trial(hardware, excitation, robot, k)
+            writer.trial(record)
+            sums.update(np.ascontiguousarray(log.sensors).tobytes())
+            table.add_row(str(k + 1), str(excitation), f"{excitation.seconds:g}", str(len(log)))
+        writer.finish({"result_digest": sums.hexdigest()})
+    engine.close()
+    (out / FILE).write_text(text, encoding="utf-8")
+    write_rrd(read_run(path), out / "trial.rrd")
+    console.print(table)
+    console.print(f"Noise: {config.noise or options.noise:.1%} of each channel's range. Seal {digest[:16]}.", highlight=False)
+    write_summary(out, "trial", config, options, watch, sums.hexdigest(), {
+        "trials": [e.as_dict() for e in plan * options.repeats], "noise": config.noise or options.noise, "seal": digest,
+        "log": str(path), "channels": [{"name": s.name, "unit": s.unit} for s in robot.sensors],
+    })  # fmt: skip
+    for label, file in (("log", path), ("rerun", out / "trial.rrd"), ("truth", out / FILE)):
+        console.print(f"  {label:<10}{os.path.relpath(file)}", highlight=False, soft_wrap=True)
+    console.print(f"Next: python -m ee_dist task=explain measured={os.path.relpath(path)}", highlight=False, soft_wrap=True)
+
+
+def one_trial(hardware: PhysicalRobot, excitation: Excitation, robot: Robot, index: int) -> tuple[SensorLog, TrialRecord]:
+    """Run it, and write down what the experimenter knows: what was sent, and what the sensors said."""
+    driver = driver_of(excitation, robot)
+    log = hardware.trial(driver, excitation.steps(robot))
+    if isinstance(driver, Commands):
+        # What reached the drives behind faulty wiring is not known to who sent the commands.
+        log = replace(log, commands=np.array(driver.values[: len(log)]))
+    log = replace(log, torques=None)
+    return log, TrialRecord(index, excitation.kind, HARDWARE, driver, log)
+
+
+def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypothesis:
+    """The hidden change as asked for: none, ``random``, ``effect@target``, or a list of entries. Raises ConfigError."""
+    if asked is None or asked == "none" or asked == []:
+        return ()
+    if asked == "random":
+        return (draw(robot, np.random.default_rng(seed))[1],)
+    if isinstance(asked, str):
+        return tuple(_by_name(robot, part) for part in asked.split("+hidden=")[-1].split(";"))
+    if isinstance(asked, Mapping):
+        asked = [asked]
+    if not isinstance(asked, (list, tuple)):
+        raise ConfigError(f"hidden={asked}: give effect@target, random, or a list such as [{{effect: ..., target: ...}}]")
+    return tuple(from_dict(e) if isinstance(e, Mapping) else _by_name(robot, str(e)) for e in asked)
+
+
+def _by_name(robot: Robot, text: str):  # type: ignore[no-untyped-def]
+    name, _, target = text.strip().partition("@")
+    from ee_dist.effects.catalogue import find
+
+    targets = find(name).targets(robot)
+    if not targets:
+        raise EffectError(f"{name} cannot act on {robot.name}: it has no place for it")
+    chosen = candidate(robot, name, target or targets[0])
+    return chosen.term([(u if u else low) * TYPICAL for u, low in zip(chosen.upper, chosen.lower, strict=True)])

@@ -1,0 +1,44 @@
+"""Fixtures of the effect tests; their robots are in ``effect_robots.py``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+# Under every import mode of pytest; a module called conftest could be another folder's.
+sys.path.insert(0, str(Path(__file__).parent))
+
+from effect_robots import Bench
+
+from ee_dist.effects import catalogue, laws
+from ee_dist.engines.contract import Engine
+from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.engines.pybullet.engine import PyBulletEngine
+
+
+@pytest.fixture(scope="session", params=["pybullet", "mujoco"])
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    """Both engines in turn: an effect is the same in each."""
+    engine: Engine = PyBulletEngine() if request.param == "pybullet" else MuJoCoEngine(threads=1)
+    yield Bench(engine)
+    engine.close()
+
+
+@pytest.fixture(scope="session")
+def pybullet() -> Iterator[PyBulletEngine]:
+    engine = PyBulletEngine()
+    yield engine
+    engine.close()
+
+
+@pytest.fixture
+def own_catalogue() -> Iterator[None]:
+    """Leaves the catalogue as it was, whatever the test registers."""
+    kept = [(d, dict(d)) for d in (catalogue._registry, catalogue._plugins, laws.LAWS)]
+    yield
+    for registry, before in kept:
+        registry.clear()
+        registry.update(before)

@@ -1,0 +1,210 @@
+"""Effects in motor, controller and transmission do what their numbers say."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from effect_robots import ARM_M, MASS_KG, Bench, G, block, lever, slider
+
+from ee_dist.effects import term
+from ee_dist.effects.catalogue import Term
+from ee_dist.robots.model import Robot
+
+HOLD_NM = MASS_KG * G * ARM_M
+PULL_N = 10.0
+SERVO = {"kp": 400.0, "kd": 60.0}
+
+
+def settled(bench: Bench, robot: Robot, *terms: Term, command: float = 0.0) -> float:
+    """Where a joint comes to rest."""
+    found = bench.run(robot, *terms, steps=3000, command=command).channel("position")
+    assert np.ptp(found[-100:]) < 1e-4
+    return float(found[-1])
+
+
+def test_motor_weak_sags_more_under_the_same_load(bench: Bench) -> None:
+    robot = lever(kp=100.0, kd=10.0)
+    for loss in (0.0, 0.5):
+        angle = settled(bench, robot, term("motor_weak", "joint", loss=loss))
+        assert (1 - loss) * 100.0 * angle == pytest.approx(HOLD_NM * math.cos(angle), rel=1e-4)
+
+
+def test_torque_limit_caps_the_acceleration_and_the_speed(bench: Bench) -> None:
+    robot = slider(kp=1e4, torque_limit=PULL_N)
+    log = bench.run(robot, term("torque_limit", "joint", loss=0.4), steps=100, command=9.0)
+    assert log.channel("velocity")[50] / 0.05 == pytest.approx(0.6 * PULL_N / MASS_KG, rel=0.01)
+    quick = slider(kp=1e4, torque_limit=100.0, speed_limit=1.0)
+    log = bench.run(quick, term("torque_limit", "joint", loss=0.4), command=9.0)
+    assert log.channel("velocity")[-1] == pytest.approx(0.6, rel=0.01)
+
+
+def test_speed_limit_is_the_speed_without_load(bench: Bench) -> None:
+    robot = slider(kp=1e4, torque_limit=100.0, speed_limit=1.0)
+    for loss in (0.0, 0.4, 0.9):
+        log = bench.run(robot, term("speed_limit", "joint", loss=loss), command=9.0)
+        assert log.channel("velocity")[-1] == pytest.approx(1.0 - loss, rel=0.01)
+
+
+def test_supply_sag_takes_its_share_at_full_torque_and_half_at_half(bench: Bench) -> None:
+    sag = term("supply_sag", "supply", share=0.4)
+    full = bench.run(slider(kp=1e4, torque_limit=PULL_N), sag, steps=100, command=9.0)
+    assert full.torques is not None
+    assert full.torques[5:, 0] == pytest.approx(0.6 * PULL_N)
+    # The error hardly changes in a tenth of a second: half of the limit is asked all the time.
+    half = bench.run(slider(kp=0.5, torque_limit=PULL_N), sag, steps=100, command=10.0)
+    assert half.torques is not None
+    assert half.torques[5:50, 0] == pytest.approx(0.8 * 0.5 * PULL_N, rel=0.01)
+
+
+def test_command_gain_scales_where_the_joint_goes(bench: Bench) -> None:
+    assert settled(bench, slider(**SERVO), term("command_gain", "joint", change=0.25), command=0.2) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("steps", [7, 50])
+def test_command_delay_shifts_the_motion_by_its_time(bench: Bench, steps: int) -> None:
+    command = np.concatenate([np.zeros(5), np.full(395, 0.2)])
+    base, late = (
+        bench.run(slider(**SERVO), term("command_delay", "joint", delay_s=d * 0.001), steps=400, command=command)
+        for d in (0, steps)
+    )
+    np.testing.assert_array_equal(late.channel("position")[steps:], base.channel("position")[:-steps])
+    assert np.ptp(base.channel("position")) > 0.1
+
+
+def test_command_delay_of_half_a_step_is_half_way(bench: Bench) -> None:
+    ramp = np.linspace(0.0, 1.0, 1001)
+    late = bench.run(slider(**SERVO), term("command_delay", "joint", delay_s=0.0205), steps=1001, command=ramp)
+    base = bench.run(slider(**SERVO), steps=1001, command=ramp)
+    behind = (base.channel("position") - late.channel("position"))[-1]
+    assert behind == pytest.approx(0.0205, rel=0.01), "a ramp of 1 m/s is as far behind as it is late"
+
+
+def test_zero_offset_shifts_the_joint(bench: Bench) -> None:
+    assert settled(bench, slider(**SERVO), term("zero_offset", "joint", offset_rad=0.05), command=0.2) == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize("command", [0.3, -0.3])
+def test_deadband_stops_short_by_its_half_width(bench: Bench, command: float) -> None:
+    found = settled(bench, slider(kp=400.0, kd=120.0), term("deadband", "joint", half_width_rad=0.02), command=command)
+    assert abs(command - found) == pytest.approx(0.02, abs=1e-4)
+    assert abs(found) < abs(command)
+
+
+def test_rotor_inertia_divides_the_acceleration(bench: Bench) -> None:
+    inertia = MASS_KG * ARM_M**2
+    terms = (term("rotor_inertia", "joint", added_kg_m2=inertia), term("offset_torque", "joint", torque_nm=1.0))
+    # Hanging straight down, gravity pulls nowhere.
+    log = bench.run(lever(), *terms, steps=21, position=math.pi / 2)
+    assert log.channel("velocity")[-1] / 0.02 == pytest.approx(0.5 / inertia, rel=0.01)
+
+
+def test_joint_jam_stops_the_joint_within_its_range(bench: Bench) -> None:
+    found = settled(bench, slider(kp=400.0, kd=120.0), term("joint_jam", "joint", loss=0.95), command=2.0)
+    assert found == pytest.approx(0.5, abs=0.002)
+
+
+def test_backlash_is_how_far_the_joint_can_be_moved_with_the_motor_held(bench: Bench) -> None:
+    ends = [
+        settled(
+            bench,
+            slider(rotor_inertia=0.5, **SERVO),
+            term("backlash", "joint", gap_rad=0.04),
+            term("viscous_friction", "joint", damping_nm_s_rad=20.0),
+            term("offset_torque", "joint", torque_nm=pull),
+        )
+        for pull in (PULL_N, -PULL_N)
+    ]
+    assert ends[0] - ends[1] == pytest.approx(0.04 + 2 * PULL_N / SERVO["kp"], rel=1e-3)
+
+
+def test_backlash_of_nearly_nothing_is_nearly_the_rigid_drive(bench: Bench) -> None:
+    command = 0.3 * np.sin(np.arange(2000) * 0.001 * 6.0)
+    rigid = bench.run(slider(rotor_inertia=0.5, **SERVO), steps=2000, command=command).channel("position")
+    loose = [
+        bench.run(
+            slider(rotor_inertia=0.5, **SERVO), term("backlash", "joint", gap_rad=gap), steps=2000, command=command
+        ).channel("position")
+        for gap in (1e-6, 0.04)
+    ]
+    small, large = (float(np.abs(found - rigid).max()) for found in loose)
+    assert small < 1e-3
+    assert 0.015 < large < 0.05
+
+
+def test_backlash_lets_the_joint_wait_after_a_reversal(bench: Bench) -> None:
+    command = 0.3 * np.sin(np.arange(4000) * 0.001 * 2.0)
+    dry = term("coulomb_friction", "joint", torque_nm=20.0)  # or the joint would coast on through the gap
+    robot = slider(rotor_inertia=0.1, kp=4000.0, kd=300.0)
+    tight, loose = (
+        bench.run(robot, dry, term("backlash", "joint", gap_rad=gap), steps=4000, command=command).channel("position")
+        for gap in (0.0, 0.05)
+    )
+    assert np.ptp(tight) - np.ptp(loose) == pytest.approx(0.05, abs=0.01), "each side is reached half a gap short"
+
+
+def test_elastic_transmission_twists_by_compliance_times_torque(bench: Bench) -> None:
+    soft = term("elastic_transmission", "joint", compliance_rad_nm=0.004)
+    grease = term("viscous_friction", "joint", damping_nm_s_rad=20.0)
+    found = settled(bench, slider(**SERVO), soft, grease, term("offset_torque", "joint", torque_nm=PULL_N))
+    assert found == pytest.approx(PULL_N / SERVO["kp"] + 0.004 * PULL_N, rel=1e-3)
+
+
+def test_elastic_transmission_swings_with_the_stiffness_of_motor_and_shaft_in_series(bench: Bench) -> None:
+    soft = term("elastic_transmission", "joint", compliance_rad_nm=0.01)
+    log = bench.run(slider(kp=400.0), soft, steps=3000, position=0.1)
+    ups = np.flatnonzero(np.diff(np.sign(log.channel("position"))) > 0)
+    period = float(np.diff(ups).mean()) * 0.001
+    assert period == pytest.approx(2 * math.pi * math.sqrt(MASS_KG * (1 / 400.0 + 0.01)), rel=0.01)
+
+
+def test_parallel_spring_swings_about_its_rest_with_its_own_period(bench: Bench) -> None:
+    spring = term("parallel_spring", "joint", stiffness_nm_rad=50.0, rest_rad=0.2)
+    position = bench.run(slider(), spring, steps=4000, position=0.3).channel("position")
+    ups = np.flatnonzero(np.diff(np.sign(position - 0.2)) > 0)
+    assert float(np.diff(ups).mean()) * 0.001 == pytest.approx(2 * math.pi * math.sqrt(MASS_KG / 50.0), rel=0.01)
+    assert position.max() == pytest.approx(0.3, rel=0.01)
+
+
+def test_parallel_spring_beside_another_is_one_stiffer_spring_between_their_rests(bench: Bench) -> None:
+    two = (
+        term("parallel_spring", "joint", stiffness_nm_rad=30.0, rest_rad=0.4),
+        term("parallel_spring", "joint", stiffness_nm_rad=10.0, rest_rad=-0.4),
+        term("viscous_friction", "joint", damping_nm_s_rad=15.0),
+    )
+    assert settled(bench, slider(), *two) == pytest.approx(0.2, abs=1e-4)
+
+
+def test_offset_torque_accelerates_by_torque_over_mass(bench: Bench) -> None:
+    log = bench.run(slider(), term("offset_torque", "joint", torque_nm=PULL_N), steps=101)
+    assert log.channel("velocity")[-1] / 0.1 == pytest.approx(PULL_N / MASS_KG, rel=1e-6)
+
+
+def test_a_released_drive_neither_pushes_nor_brakes(bench: Bench) -> None:
+    robot = slider(kp=400.0, kd=60.0, torque_limit=100.0, speed_limit=1.0)
+    braked, free = (
+        bench.run(robot, speed=0.5, steps=200, command=9.0, enabled=np.full(200, on)) for on in (1.0, 0.0)
+    )
+    np.testing.assert_array_equal(free.channel("velocity"), np.full(200, 0.5))
+    assert abs(braked.channel("velocity")[-1] - 0.5) > 0.1
+    untouched = bench.run(robot, speed=0.5, steps=200, command=9.0)
+    np.testing.assert_array_equal(braked.sensors, untouched.sensors)
+
+
+def test_a_released_drive_falls_and_is_caught_when_it_is_enabled_again(bench: Bench) -> None:
+    on = np.concatenate([np.zeros(100), np.ones(2900)])
+    position = bench.run(lever(kp=100.0, kd=10.0), steps=3000, enabled=on).channel("position")
+    assert position[100] == pytest.approx(0.5 * G / ARM_M * 0.1**2, rel=0.02)
+    assert position[-1] == pytest.approx(HOLD_NM * math.cos(position[-1]) / 100.0, rel=1e-3)
+
+
+def test_a_released_drive_keeps_its_friction(bench: Bench) -> None:
+    terms = (term("coulomb_friction", "joint", torque_nm=4.0), term("speed_limit", "joint", loss=0.5))
+    robot = slider(torque_limit=100.0, speed_limit=1.0)
+    log = bench.run(robot, *terms, speed=1.0, steps=101, enabled=np.zeros(1))
+    assert log.channel("velocity")[-1] == pytest.approx(1.0 - 0.1 * 4.0 / MASS_KG, rel=1e-3)
+
+
+def test_a_drive_without_a_floor_or_load_does_nothing_at_rest(bench: Bench) -> None:
+    assert bench.run(block(), steps=20).joints == pytest.approx(0.0)

@@ -1,0 +1,62 @@
+"""The real command line, run in this process in an empty folder."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ee_dist.__main__ import main
+
+TINY = (
+    "budget=quick", "budget.population=8", "budget.generations=2", "budget.diagnosis_population=8",
+    "budget.diagnosis_generations=2", "budget.crossovers=2", "budget.steps=80",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Outcome:
+    status: int
+    out: str
+    err: str
+    folder: Path
+
+    def runs(self) -> list[Path]:
+        """Folders that hold a summary."""
+        return sorted(p.parent for p in self.folder.glob("logs/**/summary.json"))
+
+    def summary(self) -> dict[str, Any]:
+        (run,) = self.runs()
+        return json.loads((run / "summary.json").read_text())
+
+
+@pytest.fixture
+def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+    """``cli("+scenario=8", ...)``: each call runs in a folder of its own."""
+    count = iter(range(1000))
+
+    def run(*arguments: str) -> Outcome:
+        folder = tmp_path / f"call_{next(count)}"
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        monkeypatch.setattr(sys, "argv", ["ee_dist", *arguments])
+        capfd.readouterr()
+        try:
+            status = main()
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        out, err = capfd.readouterr()
+        return Outcome(status, out, err, folder)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def tiny() -> tuple[str, ...]:
+    """A run of seconds."""
+    return TINY

@@ -1,0 +1,139 @@
+"""The main job end to end: the real command line, its files read back."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from ee_dist.engines.pybullet.engine import PyBulletEngine
+from ee_dist.engines.contract import Rollout
+from ee_dist.effects import apply
+from ee_dist.recording.reader import read_run
+from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
+
+KEYS = {
+    "format", "task", "version", "config_digest", "result_digest", "seed", "engine", "wall_s", "cpu_s", "scenario",
+    "metric", "distance_m", "hypotheses", "fitness", "diagnosis_error", "truth", "recovered_fraction", "evaluations",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, tiny):
+    """One small run of scenario 8, as a user starts it."""
+    folder = tmp_path_factory.mktemp("run")
+    command = [sys.executable, "-m", "ee_dist", "+scenario=8", "evaluator=serial", *tiny]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    (summary,) = folder.glob("logs/recover/*/summary.json")
+    return summary.parent, done.stdout, json.loads(summary.read_text())
+
+
+def test_summary_has_the_documented_keys(finished):
+    _, _, summary = finished
+    assert KEYS <= set(summary)
+    assert len(summary["distance_m"]["trials"]) == 4
+    assert len(summary["hypotheses"]) == 4
+    assert [len(f) for f in summary["fitness"]] == [3] * 5
+    assert summary["truth"][0] == {"effect": "part_lost", "target": "upper_rear_left", "values": {}}
+    counts = summary["evaluations"]
+    assert counts["simulated"] < counts["asked"]
+    assert counts["steps"] < counts["asked_steps"]
+
+
+def test_terminal_tells_the_result_and_where_the_files_are(finished):
+    folder, out, summary = finished
+    for name in ("recovery.mcap", "recovery.rrd", "summary.json"):
+        assert name in out
+        assert (folder / name).stat().st_size > 0
+    assert "after the change" in out
+    assert "truth" in out
+    assert summary["result_digest"][:16] in out
+
+
+def test_plain_mcap_lists_every_trial_and_hypothesis(finished):
+    folder, _, _ = finished
+    counts: dict[str, int] = {}
+    with (folder / "recovery.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, channel, _, _ in reader.iter_decoded_messages():
+            counts[channel.topic] = counts.get(channel.topic, 0) + 1
+        names = {a.name for a in reader.iter_attachments()}
+    assert counts["/hardware/trial"] == 6, "intact, after the change, four compensating"
+    assert counts["/prediction/trial"] == 6
+    assert counts["/hardware/rows"] == 6 * 80
+    assert counts["/repair/generation"] == 5 * 3
+    assert counts["/diagnosis/generation"] == 4 * 3
+    assert counts["/diagnosis/hypothesis"] >= 4 * (3 + 1)
+    assert {"robot.json", "config.yaml"} <= names
+
+
+def test_the_recorded_trials_are_what_the_hardware_did(finished):
+    """A recorded controller on the true model gives the recorded log, bit for bit."""
+    folder, _, summary = finished
+    run = read_run(folder / "recovery.mcap")
+    assert run.complete
+    from ee_dist.effects.catalogue import from_dict
+
+    truth = [from_dict(t) for t in json.loads(run.metadata["truth"])]
+    hardware = {t.index: t for t in run.trials if t.source == HARDWARE}
+    engine = PyBulletEngine()
+    for index in (1, 5):
+        recorded = hardware[index]
+        (again,) = engine.rollout([Rollout(apply(run.robot, truth), recorded.driver, len(recorded.log), pose=True)])
+        assert again.sensors.tobytes() == recorded.log.sensors.tobytes()
+        assert again.base_pose.tobytes() == recorded.log.base_pose.tobytes()
+    engine.close()
+    assert [round(t.log.base_pose[-1, 0] - t.log.base_pose[0, 0], 12) for t in hardware.values()][2:] == [
+        round(m, 12) for m in summary["distance_m"]["trials"]
+    ]
+    assert {t.index for t in run.trials if t.source == PREDICTION} == set(range(6))
+    assert {g.phase for g in run.generations} == {REPAIR, DIAGNOSIS}
+
+
+def test_view_rebuilds_the_scene_from_the_mcap_alone(finished, cli, tmp_path):
+    folder, _, _ = finished
+    alone = tmp_path / "alone.mcap"
+    alone.write_bytes((folder / "recovery.mcap").read_bytes())
+    outcome = cli("task=view", f"log={alone}", "task.open=false")
+    assert outcome.status == 0, outcome.err
+    (scene,) = outcome.folder.glob("logs/view/*/alone.rrd")
+    assert scene.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("scenario", range(1, 14))
+@pytest.mark.parametrize("metric", ["rolling_mean", "distance"])
+def test_every_scenario_runs_with_both_metrics(cli, scenario, metric):
+    outcome = cli(
+        f"+scenario={scenario}", f"metric={metric}", "evaluator=serial", "budget=quick", "budget.population=4",
+        "budget.generations=1", "budget.diagnosis_population=4", "budget.diagnosis_generations=1", "budget.crossovers=1",
+        "budget.compensating_trials=1", "budget.steps=62", "budget.tournament=2",
+    )  # fmt: skip
+    assert outcome.status == 0, outcome.err
+    assert outcome.summary()["scenario"] == scenario
+
+
+def test_a_sweep_gives_each_job_its_own_folder(cli, tiny):
+    outcome = cli("-m", "+scenario=1,9", "seed=0,1", "evaluator=serial", *tiny, "budget.compensating_trials=1")
+    assert outcome.status == 0, outcome.err
+    summaries = [json.loads((run / "summary.json").read_text()) for run in outcome.runs()]
+    assert {(s["scenario"], s["seed"]) for s in summaries} == {(1, 0), (1, 1), (9, 0), (9, 1)}
+    assert len({s["result_digest"] for s in summaries}) == 4
+
+
+def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny):
+    base = ["+scenario=3", *tiny, "budget.compensating_trials=1"]
+    same = [
+        ["evaluator=serial"],
+        ["evaluator=serial", "evaluator.cache=false", "evaluator.chunk=3"],
+        ["evaluator=ray", "evaluator.workers=1"],
+        ["evaluator=ray", "evaluator.workers=2", "evaluator.chunk=1"],
+        ["evaluator=ray", "evaluator.workers=3", "evaluator.cache=false"],
+    ]
+    digests = {cli(*base, *extra).summary()["result_digest"] for extra in same}
+    assert len(digests) == 1
+    assert cli(*base, "evaluator=serial", "seed=1").summary()["result_digest"] not in digests
