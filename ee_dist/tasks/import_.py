@@ -36,9 +36,13 @@ def run(config: Config, options: Options, out: Path) -> None:
     """
     watch = Stopwatch()
     if not options.mapping:
-        raise ConfigError("task.mapping=: which column is which channel? name a YAML file; see docs/bring_your_robot.md")
+        raise ConfigError(
+            "task.mapping=: which column is which channel? name a YAML file; see docs/bring_your_robot.md"
+        )
     if Path(options.output).name != options.output or not options.output.endswith(".mcap"):
-        raise ConfigError(f"task.output={options.output}: expected the name of a file that ends in .mcap, such as measured.mcap")
+        raise ConfigError(
+            f"task.output={options.output}: expected the name of a file that ends in .mcap, such as measured.mcap"
+        )
     mapping = read_mapping(options.mapping)
     robot, notes = robot_of_mapping(mapping, config)
     found = [import_file(f, mapping, robot, i) for i, f in enumerate(files_of(config.measured, mapping.kind))]
@@ -54,7 +58,9 @@ def run(config: Config, options: Options, out: Path) -> None:
     console = Console()
     for line in (*(f"note: {n}" for n in notes), *text.splitlines()):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    console.print(f"wrote {out / options.output}: {len(found)} trial(s) of {robot.name}", highlight=False, soft_wrap=True)
+    console.print(
+        f"wrote {out / options.output}: {len(found)} trial(s) of {robot.name}", highlight=False, soft_wrap=True
+    )
 
 
 def robot_of_mapping(mapping: Mapping, config: Config) -> tuple[Robot, tuple[str, ...]]:
@@ -79,7 +85,9 @@ def files_of(measured: Any, kind: str | None = None) -> list[Path]:
             wanted = {s for s, k in FORMATS.items() if kind is None or k == kind}
             inside = sorted(f for f in path.iterdir() if f.is_file() and f.suffix.lower() in wanted)
             if not inside:
-                raise MeasurementError(f"{path}: no file to import in this folder; expected {', '.join(sorted(wanted))}")
+                raise MeasurementError(
+                    f"{path}: no file to import in this folder; expected {', '.join(sorted(wanted))}"
+                )
             files += inside
         else:
             files.append(path)

@@ -92,16 +92,22 @@ def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
     order = [log.sensor_names.index(n) for n in robot.sensor_names]
     for k, sensor in zip(order, robot.sensors, strict=True):
         if log.sensor_units[k] != sensor.unit:
-            raise LogError(f"{where}: {sensor.name} is in {log.sensor_units[k]!r}, the model has it in {sensor.unit!r}; convert it")
+            raise LogError(
+                f"{where}: {sensor.name} is in {log.sensor_units[k]!r}, the model has it in {sensor.unit!r}; convert it"
+            )
         bad = ~np.isfinite(log.sensors[:, k])
         if bad.any():
             row = int(np.argmax(bad))
-            raise LogError(f"{where}: {sensor.name} is not a number in {int(bad.sum())} rows, first at {log.times_s[row]:g} s")
+            raise LogError(
+                f"{where}: {sensor.name} is not a number in {int(bad.sum())} rows, first at {log.times_s[row]:g} s"
+            )
     if not np.isfinite(log.commands).all():
         raise LogError(f"{where}: commands hold values that are not numbers")
     step = np.diff(log.times_s)
     if abs(float(np.median(step)) - robot.time_step_s) > 1e-6 or float(np.ptp(step)) > 1e-6:
-        raise LogError(f"{where}: rows are {np.median(step):g} s apart, the model steps {robot.time_step_s:g} s; resample the log")
+        raise LogError(
+            f"{where}: rows are {np.median(step):g} s apart, the model steps {robot.time_step_s:g} s; resample the log"
+        )
     motors = [log.motor_names.index(n) for n in robot.motor_names]
     return replace(
         log,

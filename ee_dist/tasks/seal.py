@@ -38,7 +38,9 @@ def opened(path: Path, digest: str | None = None) -> tuple[Hypothesis, dict[str,
         if found != data["digest"]:
             raise ConfigError(f"{path}: the seal is broken: its content was changed after the trial")
         if digest and digest != found:
-            raise ConfigError(f"{path}: this envelope belongs to another log (seal {found[:12]}, the log says {digest[:12]})")
+            raise ConfigError(
+                f"{path}: this envelope belongs to another log (seal {found[:12]}, the log says {digest[:12]})"
+            )
         truth = json.loads(zlib.decompress(base64.b64decode(payload)[::-1]))
     except FileNotFoundError:
         raise ConfigError(f"{path}: no sealed truth there; task=trial writes it beside the log") from None

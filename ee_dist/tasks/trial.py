@@ -88,17 +88,23 @@ def run(config: Config, options: Options, out: Path) -> None:
     (out / FILE).write_text(text, encoding="utf-8")
     write_rrd(read_run(path), out / "trial.rrd")
     console.print(table)
-    console.print(f"Noise: {config.noise or options.noise:.1%} of each channel's range. Seal {digest[:16]}.", highlight=False)
+    console.print(
+        f"Noise: {config.noise or options.noise:.1%} of each channel's range. Seal {digest[:16]}.", highlight=False
+    )
     write_summary(out, "trial", config, options, watch, sums.hexdigest(), {
         "trials": [e.as_dict() for e in plan * options.repeats], "noise": config.noise or options.noise, "seal": digest,
         "log": str(path), "channels": [{"name": s.name, "unit": s.unit} for s in robot.sensors],
     })  # fmt: skip
     for label, file in (("log", path), ("rerun", out / "trial.rrd"), ("truth", out / FILE)):
         console.print(f"  {label:<10}{os.path.relpath(file)}", highlight=False, soft_wrap=True)
-    console.print(f"Next: python -m ee_dist task=explain measured={os.path.relpath(path)}", highlight=False, soft_wrap=True)
+    console.print(
+        f"Next: python -m ee_dist task=explain measured={os.path.relpath(path)}", highlight=False, soft_wrap=True
+    )
 
 
-def one_trial(hardware: PhysicalRobot, excitation: Excitation, robot: Robot, index: int) -> tuple[SensorLog, TrialRecord]:
+def one_trial(
+    hardware: PhysicalRobot, excitation: Excitation, robot: Robot, index: int
+) -> tuple[SensorLog, TrialRecord]:
     """Run it, and write down what the experimenter knows: what was sent, and what the sensors said."""
     driver = driver_of(excitation, robot)
     log = hardware.trial(driver, excitation.steps(robot))
@@ -120,7 +126,9 @@ def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypoth
     if isinstance(asked, Mapping):
         asked = [asked]
     if not isinstance(asked, (list, tuple)):
-        raise ConfigError(f"hidden={asked}: give effect@target, random, or a list such as [{{effect: ..., target: ...}}]")
+        raise ConfigError(
+            f"hidden={asked}: give effect@target, random, or a list such as [{{effect: ..., target: ...}}]"
+        )
     return tuple(from_dict(e) if isinstance(e, Mapping) else _by_name(robot, str(e)) for e in asked)
 
 

@@ -60,14 +60,23 @@ def evaluator_of(config: Config) -> Evaluator:
     simulated already. A sweep over scenarios evolves the intact robot's controllers once.
     """
     settings = config.evaluator
-    key = (settings.name, settings.workers, settings.chunk, settings.cache, config.ray.address, engine_maker(config, True))
+    key = (
+        settings.name,
+        settings.workers,
+        settings.chunk,
+        settings.cache,
+        config.ray.address,
+        engine_maker(config, True),
+    )
     if key not in _kept:
         close_evaluators()
         inner: Evaluator
         if settings.name == "serial":
             inner = SerialEvaluator(engine_maker(config, alone=True)(), settings.chunk or 256)
         else:
-            inner = RayEvaluator(engine_maker(config, alone=False), settings.workers, settings.chunk, config.ray.address)
+            inner = RayEvaluator(
+                engine_maker(config, alone=False), settings.workers, settings.chunk, config.ray.address
+            )
         _kept[key] = CachedEvaluator(inner) if settings.cache else inner
     evaluator = _kept[key]
     evaluator.counts.reset()

@@ -45,7 +45,10 @@ def test_every_situation_can_be_said():
         "part_lost": (term("part_lost", "upper_front_left"), genome(gene("part_lost", 0, 8, 0))),
         "part_mass": (term("part_mass", "body", change=2.0), genome(gene("part_mass", 0, 9, SCALE))),
         "motor_weak": (term("motor_weak", "knee_front_left", loss=0.5), genome(gene("motor_weak", 1, 8, 0))),
-        "sensor_failing": (term("sensor_failing", "angle_front_right", loss=0.5), genome(gene("sensor_failing", 5, 8, 0))),
+        "sensor_failing": (
+            term("sensor_failing", "angle_front_right", loss=0.5),
+            genome(gene("sensor_failing", 5, 8, 0)),
+        ),
         "joint_jam": (term("joint_jam", "hip_rear_right", loss=0.5), genome(gene("joint_jam", 6, 8, 0))),
         "floor_tilt": (term("floor_tilt", "floor", sideways_deg=30.0), genome(gene("floor_tilt", 0, 8, SCALE))),
     }

@@ -12,7 +12,9 @@ from ee_dist.trials.log import SensorLog
 def log(sensors: np.ndarray, travel_m: float = 0.0) -> SensorLog:
     steps, channels = sensors.shape
     names = tuple(f"s{k}" for k in range(channels))
-    return SensorLog(np.arange(steps) * 0.01, sensors, np.zeros((steps, 1)), names, ("1",) * channels, ("m",), travel_m=travel_m)
+    return SensorLog(
+        np.arange(steps) * 0.01, sensors, np.zeros((steps, 1)), names, ("1",) * channels, ("m",), travel_m=travel_m
+    )
 
 
 def test_rolling_mean_is_the_mean_of_every_window():

@@ -1,0 +1,76 @@
+"""next_trial: which excitation would tell tied explanations apart best, predicted by simulating each of them on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from ee_dist.discrepancy.measured import driver_of
+from ee_dist.discrepancy.prediction import ToSensors, clean, report
+from ee_dist.discrepancy.scale import channel_scale
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands, Network
+from ee_dist.evaluation.jobs import Evaluator, Job
+from ee_dist.robots.model import Robot
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.log import Array
+
+LIBRARY = (
+    Excitation("rest", 2.0),
+    Excitation("multisine", 4.0, 0.3, 11),
+    Excitation("multisine", 4.0, 0.8, 12),
+    Excitation("fast_sines", 3.0, 0.15, 13),
+    Excitation("fast_sines", 3.0, 0.4, 14),
+    Excitation("steps", 4.0, 0.25, 15),
+    Excitation("steps", 4.0, 0.6, 16),
+    Excitation("slow_sines", 4.8, 0.9, 17),
+    Excitation("gait", 3.0, 0.5, 18),
+)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """``separation``: predicted distance of the two most similar explanations on this trial, in standard deviations of
+    its noise (all channels and rows together). Below about 4 the trial would not tell them apart either."""
+
+    excitation: Excitation
+    separation: float
+
+
+def proposals(
+    robot: Robot, tied: Sequence[Hypothesis], evaluator: Evaluator, library: Sequence[Excitation] = LIBRARY
+) -> list[Proposal]:
+    """Excitations by how well they separate the hypotheses, the best first."""
+    if len(tied) < 2:
+        return []
+    models = [apply(robot, h) for h in tied]
+    scale = channel_scale(robot, [])
+    jobs, drivers = [], []
+    for excitation in library:
+        driver = driver_of(excitation, robot)
+        drivers.append(driver)
+        jobs += [Job(_rollout(m, driver, excitation.steps(robot)), ToSensors()) for m in models]
+    found = evaluator.evaluate(jobs)
+    out = []
+    for k, (excitation, driver) in enumerate(zip(library, drivers, strict=True)):
+        logs = found[k * len(models) : (k + 1) * len(models)]
+        if isinstance(driver, Commands):
+            logs = list(np.moveaxis(report(models, np.stack(logs, axis=1), k)[0], 1, 0))
+        gaps = [_distance(a, b, scale.scale) for a, b in combinations(logs, 2)]
+        out.append(Proposal(excitation, float(min(gaps)) if np.isfinite(gaps).all() else 0.0))
+    return sorted(out, key=lambda p: -p.separation / np.sqrt(p.excitation.seconds))
+
+
+def _rollout(model: Robot, driver: Commands | Network, steps: int) -> Rollout:
+    if isinstance(driver, Network):
+        return Rollout(model, driver, steps, seed=0)
+    return Rollout(clean(model), Commands(np.ascontiguousarray(driver.values[:, list(model.wiring.source)])), steps)
+
+
+def _distance(a: Array, b: Array, scale: Array) -> float:
+    """In standard deviations; one channel and row counts at most as 6, so that a divergence late in a gait is no evidence."""
+    return float(np.sqrt((np.minimum(np.abs(a - b) / scale, 6.0) ** 2).sum()))

@@ -1,0 +1,101 @@
+"""task=online: evolution on the body alone, without a model: what the loop is measured against (the paper's Fig. 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+from rich.console import Console
+
+from ee_dist.effects.catalogue import apply
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import weight_count
+from ee_dist.evaluation.jobs import Evaluator, Job, Travel
+from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
+from ee_dist.recovery.repair import network
+from ee_dist.robots.model import Robot
+from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.tasks.wiring import build_robot, evaluator_of
+
+
+@dataclass
+class Options:
+    name: str = "online"
+    generations_before: int = 40
+    generations_after: int = 40
+
+    def __post_init__(self) -> None:
+        if min(self.generations_before, self.generations_after) < 1:
+            raise ConfigError("task.generations_before and task.generations_after must be 1 or more")
+
+
+def run(config: Config, options: Options, out: Path) -> None:
+    """Write online.html and summary.json. Every evaluation counts as a trial on the body."""
+    console, watch = Console(), Stopwatch()
+    if config.scenario is None:
+        raise ConfigError("which scenario? add one, such as +scenario=3")
+    robot = build_robot(config)
+    changed = apply(robot, config.scenario.hidden())
+    plan = config.budget.plan()
+    evaluator = evaluator_of(config)
+    first, second = np.random.SeedSequence(config.seed).spawn(2)
+    length = weight_count(len(robot.sensors), len(robot.drives))
+    before = _evolve(robot, length, None, options.generations_before, plan.repair, plan.steps, first, evaluator)
+    # The change strikes the whole population: its controllers are tried again on the changed body.
+    after = _evolve(changed, length, before[1], options.generations_after, plan.repair, plan.steps, second, evaluator)
+    intact, at_change, end = before[0][-1][1], after[0][0][1], after[0][-1][1]
+    lost = intact - at_change
+    regained = (end - at_change) / lost if lost > 0 else float("nan")
+    trials = after[0][-1][0]
+    offset = before[0][-1][0]
+    _figure(before[0], [(n + offset, d) for n, d in after[0]], config.scenario.title, out / "online.html")
+    write_summary(out, "online", config, options, watch, "", {
+        "scenario": config.scenario.number,
+        "distance_m": {"intact": intact, "after": at_change, "end": end},
+        "body_trials_after_the_change": trials,
+        "regained_of_lost": regained,
+        "best_by_trials": {"before": before[0], "after": after[0]},
+    })  # fmt: skip
+    console.print(
+        f"Evolution on the body alone, scenario {config.scenario.number} ({config.scenario.title}), seed {config.seed}:\n"
+        f"  intact {intact:.2f} m, after the change {at_change:.2f} m, after {trials:,} further trials on the body "
+        f"{end:.2f} m ({regained:.0%} of what was lost).\n  {out / 'online.html'}",
+        highlight=False,
+    )
+
+
+def _evolve(
+    body: Robot,
+    length: int,
+    seeds: Genomes | None,
+    generations: int,
+    budget: Budget,
+    steps: int,
+    seed: np.random.SeedSequence,
+    evaluator: Evaluator,
+) -> tuple[list[tuple[int, float]], Genomes]:
+    """(trials so far, best distance) of each generation, and the last population."""
+    sized = Budget(budget.population, generations, budget.tournament, budget.mutation, budget.crossovers)
+    ga = GeneticAlgorithm(length, sized, seed, seeds)
+    trials, curve = 0, []
+    while not ga.done:
+        genomes = ga.ask()
+        trials += len(genomes)
+        found = evaluator.evaluate([Job(Rollout(body, network(g), steps), Travel()) for g in genomes])
+        ga.tell(np.array(found))
+        curve.append((trials, float(ga.scores[0])))
+    return curve, ga.genomes
+
+
+def _figure(before: list[tuple[int, float]], after: list[tuple[int, float]], title: str, path: Path) -> None:
+    figure = go.Figure()
+    for name, curve in (("before the change", before), ("after the change", after)):
+        figure.add_scatter(x=[n for n, _ in curve], y=[d for _, d in curve], name=name, mode="lines+markers")
+    figure.add_vline(x=before[-1][0], line_dash="dot", annotation_text=title)
+    figure.update_layout(title="Evolution on the body alone")
+    figure.update_xaxes(title="trials on the body")
+    figure.update_yaxes(title="best forward distance (m)")
+    figure.write_html(path, include_plotlyjs=True)

@@ -1,0 +1,163 @@
+"""task=study: the table, the statistics and the figures of a sweep, from the summaries of its runs."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+from scipy.stats import mannwhitneyu
+
+from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.outcome import RESTORED
+from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.viewing.study_figures import write_figures
+
+
+@dataclass
+class Options:
+    name: str = "study"
+
+
+COLUMNS = (
+    "scenario", "metric", "seed", "engine", "budget", "intact_m", "after_m", "best_m", "last_m", "recovered",
+    "restored", "found", "true", "invented", "right", "asked", "simulated", "steps", "wall_s", "digest",
+)  # fmt: skip
+
+
+def run(config: Config, options: Options, out: Path) -> None:
+    """Write study.csv, study.md, figures and summary.json from the runs below ``config.log``. Raises ConfigError."""
+    console, watch = Console(), Stopwatch()
+    if not config.log:
+        raise ConfigError("log=: which runs? name the folder of a sweep, such as log=logs/recover/..._sweep")
+    runs = load(Path(config.log))
+    rows = [row(r) for r in runs]
+    with (out / "study.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    text = markdown(rows)
+    (out / "study.md").write_text(text, encoding="utf-8")
+    write_figures(runs, out / "figures.html")
+    _print(console, rows)
+    totals = total(rows)
+    write_summary(out, "study", config, options, watch, "", {"runs": len(rows), "totals": totals})
+    for name in ("study.csv", "study.md", "figures.html"):
+        console.print(f"  {out / name}", highlight=False, soft_wrap=True)
+
+
+def load(folder: Path) -> list[dict[str, Any]]:
+    """Summaries of all finished recover runs below a folder, in order. Raises ConfigError where there is none."""
+    found = []
+    for path in sorted(folder.rglob("summary.json")):
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise ConfigError(f"{path}: not a summary ({error})") from None
+        if content.get("task") == "recover":
+            found.append(content)
+    if not found:
+        raise ConfigError(f"log={folder}: no finished run below it; a run is finished when it has a summary.json")
+    return sorted(found, key=lambda s: (s["metric"], s["engine"], s["scenario"], s["seed"]))
+
+
+def row(summary: dict[str, Any]) -> dict[str, Any]:
+    """One run as a line of the table."""
+    trials = summary["distance_m"]["trials"]
+    evaluations = summary["evaluations"]
+    return {
+        **{k: summary[k] for k in ("scenario", "metric", "seed", "engine", "budget", "restored", "wall_s")},
+        "intact_m": summary["distance_m"]["intact"],
+        "after_m": summary["distance_m"]["after"],
+        "best_m": max(trials),
+        "last_m": trials[-1],
+        "recovered": summary["recovered_fraction"],
+        **summary["diagnosis"],
+        **{k: evaluations[k] for k in ("asked", "simulated", "steps")},
+        "digest": summary["result_digest"][:12],
+    }
+
+
+def total(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Counts over all runs, for each metric."""
+    found = {}
+    for metric in sorted({r["metric"] for r in rows}):
+        mine = [r for r in rows if r["metric"] == metric]
+        found[metric] = {
+            "runs": len(mine),
+            "restored": sum(bool(r["restored"]) for r in mine),
+            "right": sum(bool(r["right"]) for r in mine),
+            "true_among_believed": sum(r["found"] == r["true"] for r in mine),
+        }
+    return found
+
+
+def by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """A line for each scenario and metric; p is of the last trial against the one after the change (Mann-Whitney)."""
+    groups: dict[tuple[str, int], list[dict[str, Any]]] = defaultdict(list)
+    for r in rows:
+        groups[r["metric"], r["scenario"]].append(r)
+    lines = []
+    for (metric, scenario), mine in sorted(groups.items()):
+        after, last = ([r[k] for r in mine] for k in ("after_m", "last_m"))
+        p = float(mannwhitneyu(last, after, alternative="two-sided").pvalue) if len(mine) > 1 else float("nan")
+        lines.append({
+            "metric": metric,
+            "scenario": scenario,
+            "runs": len(mine),
+            **{k: float(np.mean([r[k] for r in mine])) for k in ("intact_m", "after_m", "best_m", "last_m", "recovered")},
+            "restored": sum(bool(r["restored"]) for r in mine),
+            "right": sum(bool(r["right"]) for r in mine),
+            "named": sum(r["found"] == r["true"] for r in mine),
+            "p": p,
+        })  # fmt: skip
+    return lines
+
+
+HEAD = ("case", "runs", "intact (m)", "after (m)", "best trial (m)", "trial 4 (m)", "restored", "diagnosis right", "truth named", "p")  # fmt: skip
+
+
+def cells(line: dict[str, Any]) -> list[str]:
+    n = line["runs"]
+    return [
+        str(line["scenario"]), str(n), *(f"{line[k]:.2f}" for k in ("intact_m", "after_m", "best_m", "last_m")),
+        f"{line['restored']}/{n}", f"{line['right']}/{n}", f"{line['named']}/{n}", f"{line['p']:.2g}",
+    ]  # fmt: skip
+
+
+def markdown(rows: list[dict[str, Any]]) -> str:
+    """The table for a document, each metric and the totals."""
+    parts = []
+    for metric, counts in total(rows).items():
+        lines = [x for x in by_case(rows) if x["metric"] == metric]
+        parts.append(f"### {metric}\n")
+        parts.append("| " + " | ".join(HEAD) + " |\n|" + "---|" * len(HEAD))
+        parts += ["| " + " | ".join(cells(x)) + " |" for x in lines]
+        n = counts["runs"]
+        parts.append(
+            f"\nRestored ({RESTORED:.0%} of intact or more in one of the compensating trials): {counts['restored']} of {n}. "
+            f"Diagnosis right (every true effect at its place and no other): {counts['right']} of {n}; "
+            f"all true effects named: {counts['true_among_believed']} of {n}.\n"
+        )
+    return "\n".join(parts) + "\n"
+
+
+def _print(console: Console, rows: list[dict[str, Any]]) -> None:
+    for metric, counts in total(rows).items():
+        table = Table(title=metric, box=SIMPLE, pad_edge=False, title_justify="left")
+        for name in HEAD:
+            table.add_column(name, justify="right")
+        for line in by_case(rows):
+            if line["metric"] == metric:
+                table.add_row(*cells(line))
+        console.print(table)
+        n = counts["runs"]
+        console.print(f"restored {counts['restored']}/{n}, diagnosis right {counts['right']}/{n}, "
+                      f"all true effects named {counts['true_among_believed']}/{n}", highlight=False)  # fmt: skip
