@@ -31,6 +31,8 @@ from ee_dist.trials.log import Array, SensorLog
 
 INSTANT_S = 1e-9
 """Time step at which the drive path's implicit friction is that of the instant."""
+LEAST_NOISE = 0.002
+"""Share of the force below which no difference counts, noise or not."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,11 @@ def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
 class ForceBalance:
     """Implements ``ee_dist.discrepancy.problem.Problem``. Channels are the drives.
 
-    A residual value is a force left over in units of the root mean square of the measured force, so that the error is
-    the relative force error. Segments are blocks of time.
+    A residual value is a force left over, in units of the noise of the measured force; ``natural`` makes a relative force
+    error of it. Segments are blocks of time.
     """
+
+    rugged = False
 
     def __init__(self, trials: Sequence[MeasuredTrial], robot: Robot, processing: Processing | None = None) -> None:
         self.robot, self.measured = robot, tuple(trials)
@@ -85,15 +89,26 @@ class ForceBalance:
         self.channels = robot.motor_names
         every = self.processing.keep_every
         forces = [decimated(m.torque, every) for m in self.motions]
-        self.scale = np.sqrt(np.mean(np.concatenate(forces) ** 2, axis=0))
-        if not self.scale.all():
-            raise MeasurementError(f"{self.channels[int(np.argmin(self.scale))]}: its measured torque is zero throughout")
+        self.size = np.sqrt(np.mean(np.concatenate(forces) ** 2, axis=0))
+        if not self.size.all():
+            raise MeasurementError(f"{self.channels[int(np.argmin(self.size))]}: its measured torque is zero throughout")
+        # One share for all drives, so that the sum of squares is the relative error of all of them.
+        noise = np.sqrt(np.mean([np.median(roughness(f / self.size), axis=0) / 0.455 for f in forces]))
+        self.noise_share = max(float(noise), LEAST_NOISE)
+        self.scale = self.size * self.noise_share
         self._lay_out(forces)
         p = self.processing
         self.error_definition = (
-            "relative force error: root mean square of the force left over, over that of the measured force; positions "
-            f"through a {p.low_pass}, central differences, forces decimated by {p.keep_every}; 0.01 is one per cent"
+            "root mean square of the force left over, in standard deviations of the measured force's noise "
+            f"({self.noise_share:.2%} of its root mean square); positions through a {p.low_pass}, central differences, "
+            f"forces decimated by {p.keep_every}"
         )
+
+    natural_name = "relative force error"
+
+    def natural(self, value: float) -> float:
+        """Root mean square of the force left over, as a share of that of the measured force."""
+        return value * self.noise_share
 
     def _lay_out(self, forces: Sequence[Array]) -> None:
         names: list[str] = []
@@ -113,8 +128,7 @@ class ForceBalance:
             of_trial += [k] * blocks
             seg.append(np.repeat(first + block, motors))
             chan.append(np.tile(np.arange(motors), rows))
-            noise = np.median(roughness(force / self.scale), axis=0) / 0.455
-            floor.append(np.tile(noise, rows))
+            floor.append(np.ones(rows * motors))
             self.slices.append(slice(at, at + rows * motors))
             at += rows * motors
         self.segments = tuple(names)
@@ -135,11 +149,11 @@ class ForceBalance:
         return out
 
     def noise_floor(self) -> tuple[float, str]:
-        return float(np.sqrt(self.floor.mean())), "estimated: second differences of the measured force"
+        return 1.0, "estimated: second differences of the measured force"
 
 
 def left_over(robot: Robot, motion: Motion) -> Array:
-    """(T, M): what the drives gave at the joints, less what the motion needed."""
+    """(T, M): what the drives gave at the joints, less what the motion needed, in terms of the measured force."""
     needed = joint_torques(robot, motion.position, motion.speed, motion.acceleration)
     q, qd = motion.position, motion.speed
     p, uses = _fields(robot.drives)
@@ -160,7 +174,8 @@ def left_over(robot: Robot, motion: Motion) -> Array:
         load = inertia * motion.acceleration - needed
         friction.record(-load, qd)
         torque = friction(torque, active, qd)
-    return torque - needed
+    # In terms of what was measured: a weak motor would otherwise shrink the residual along with the force.
+    return (torque - needed) / np.maximum(p["strength"], 1e-3)
 
 
 def _fields(drives: Sequence[Drive]) -> tuple[dict[str, Array], dict[str, bool]]:

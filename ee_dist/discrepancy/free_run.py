@@ -50,8 +50,7 @@ class FreeRun:
 
     rugged = True
     """Errors jump where a joint sticks or slips: fits search rather than follow a slope."""
-    least_share = 0.05
-    """Share of the mean absolute error that an effect has to take off held-out trials."""
+    natural_name = "mean absolute position error"
 
     def __init__(
         self,
@@ -71,10 +70,14 @@ class FreeRun:
         self.channels = tuple(robot.sensor_names[k] for k in columns)
         self.pieces = [p for k, t in enumerate(trials) for p in _pieces(k, t, robot, windows_s)]
         self._lay_out()
-        self.floor = np.concatenate([_floor(p.log.sensors[::every, columns]) for p in self.pieces])
-        unit = robot.sensors[columns[0]].unit
-        how = "over free runs of the whole record" if windows_s is None else f"over windows of {windows_s:g} s"
-        self.error_definition = f"square root of the mean absolute position error ({unit}) {how}, every trial counting the same"
+        self.noise = max(float(np.mean([_noise(p.log.sensors[::every, columns]) for p in self.pieces])), 1e-9)
+        self.floor = np.ones(len(self.segment_of))
+        self.unit = robot.sensors[columns[0]].unit
+        how = "free runs of the whole record" if windows_s is None else f"windows of {windows_s:g} s"
+        self.error_definition = (
+            f"square root of the mean absolute position error over {how}, every trial counting the same, in units of the "
+            f"noise of the readings ({self.noise:.2g} {self.unit})"
+        )
 
     def _lay_out(self) -> None:
         """Segments and places of all residual values. A trial's values carry equal weight in sum, whatever its length."""
@@ -106,16 +109,20 @@ class FreeRun:
             measured = self.pieces[i].log.sensors[:: self.every, list(self.columns)]
             error = measured[None] - np.stack(found[place * len(hypotheses) : (place + 1) * len(hypotheses)])
             with np.errstate(invalid="ignore"):
-                value = np.sign(error) * np.sqrt(np.abs(error) * self.weight[i])
+                value = np.sign(error) * np.sqrt(np.abs(error) * (self.weight[i] / self.noise))
             out[:, self.slices[i]] = np.where(np.isfinite(value), value, np.inf).reshape(len(hypotheses), -1)
         return out
 
     def noise_floor(self) -> tuple[float, str]:
-        return float(np.sqrt(self.floor.mean())), "estimated: second differences of the measured positions"
+        return 1.0, "estimated: second differences of the measured positions"
+
+    def natural(self, value: float) -> float:
+        """Mean absolute position error, rad or m."""
+        return value**2 * self.noise
 
     def mean_absolute(self, hypothesis: Hypothesis) -> Array:
         """(trials,) mean absolute position error of each trial, rad or m."""
-        energy = self.residuals([hypothesis])[0] ** 2 / self.weight[self.segment_of]
+        energy = self.residuals([hypothesis])[0] ** 2 * self.noise / self.weight[self.segment_of]
         trial = self.trial_of_segment[self.segment_of]
         return np.bincount(trial, weights=energy) / np.bincount(trial)
 
@@ -197,9 +204,8 @@ def _speeds(log: SensorLog, robot: Robot, dt: float) -> Array:
     return out
 
 
-def _floor(positions: Array) -> Array:
-    """Mean absolute error (n,) that the noise of the readings alone would leave."""
+def _noise(positions: Array) -> float:
+    """Mean absolute error that the noise of the readings (T, C) alone would leave."""
     if len(positions) < 3:
-        return np.zeros(positions.size)
-    second = np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2]) / np.sqrt(6.0)
-    return np.tile(np.median(second, axis=0), len(positions))
+        return 0.0
+    return float(np.median(np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2])) / np.sqrt(6.0))

@@ -106,7 +106,7 @@ class OpenLoop:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
         models = [apply(self.robot, h) for h in hypotheses]
         chosen = list(range(len(self.measured))) if trials is None else list(trials)
-        pairs = [(k, m) for k in chosen for m in models]
+        pairs = [(k, apply(m, self.measured[k].setup)) for k in chosen for m in models]
         digests = self.predictor.digests(pairs)
         out = np.zeros((len(models), len(self.segment_of)))
         for place, k in enumerate(chosen):

@@ -5,6 +5,7 @@ from ee_dist.effects import (  # noqa: F401
     calibration,
     controller_laws,
     drive,
+    fixture,
     friction,
     sensing,
     transmission,

@@ -101,9 +101,13 @@ def test_missed_touch_comes_late_and_goes_at_once(bench: Bench) -> None:
         bench.run(robot, term("missed_touch", "touch", missed_s=wait), steps=400).channel("touch") > 0
         for wait in (0.0, 0.05)
     )
-    first = int(np.argmax(on_time))
-    assert on_time[first + 60 :].all(), "it does not bounce"
-    assert int(np.argmax(late)) - first == pytest.approx(50, abs=1)
+    assert on_time.any()
+    assert not on_time[0]
+    pressed, expected = 0, []
+    for down in on_time:
+        pressed = pressed + 1 if down else 0
+        expected.append(pressed > 50)
+    np.testing.assert_array_equal(late, expected)
 
 
 def gait(bench: Bench, driver: Commands | Network, *terms: Term) -> Array:

@@ -1,0 +1,138 @@
+"""Terms and hypotheses: what is refused, what it says then, and what survives."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from effect_robots import slider
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ee_dist.effects import CATALOGUE, EffectError, Parameter, Term, apply, effect, term
+from ee_dist.effects.catalogue import from_dict
+from ee_dist.effects.targets import motors
+from ee_dist.robots.quadruped import quadruped
+
+QUADRUPED = quadruped()
+
+
+@st.composite
+def terms(draw: st.DrawFn) -> Term:
+    """Any effect at any target of the quadruped, anywhere within its useful range."""
+    entry = CATALOGUE[draw(st.sampled_from(sorted(CATALOGUE)))]
+    target = draw(st.sampled_from(entry.targets(QUADRUPED)))
+    bounds = entry.bounds(QUADRUPED, target)
+    return term(entry.name, target, **{name: draw(st.floats(*pair)) for name, pair in bounds.items()})
+
+
+@given(terms())
+def test_a_term_comes_back_from_its_dictionary(t: Term) -> None:
+    assert from_dict(t.as_dict()) == t
+    assert eval(repr(t)) == t
+
+
+@given(st.lists(terms(), max_size=4))
+def test_a_hypothesis_gives_the_same_model_each_time_and_leaves_the_robot_alone(hypothesis: list[Term]) -> None:
+    before = QUADRUPED.digest
+    try:
+        model = apply(QUADRUPED, hypothesis)
+    except EffectError as error:
+        # Two effects may contradict each other: what one takes away the other cannot take again.
+        assert "\n" not in str(error)
+        return
+    assert model == apply(QUADRUPED, hypothesis)
+    assert model.motor_names == QUADRUPED.motor_names
+    assert model.sensor_names == QUADRUPED.sensor_names
+    assert quadruped().digest == before
+
+
+@given(terms())
+def test_parameters_left_out_are_neutral(t: Term) -> None:
+    entry = CATALOGUE[t.effect]
+    assert dict(term(t.effect, t.target).values) == entry.neutral_values()
+
+
+@given(terms(), st.floats(allow_nan=True, allow_infinity=True))
+def test_a_value_is_taken_or_refused_in_one_line(t: Term, value: float) -> None:
+    for p in CATALOGUE[t.effect].parameters:
+        try:
+            found = term(t.effect, t.target, **{p.name: value})
+        except EffectError as error:
+            assert not (math.isfinite(value) and p.lower <= value <= p.upper)
+            assert p.name in str(error)
+            assert "\n" not in str(error)
+        else:
+            assert dict(found.values)[p.name] == value
+
+
+def test_an_unknown_effect_names_the_nearest() -> None:
+    with pytest.raises(EffectError, match=r"no effect named 'columb_friction'; did you mean coulomb_friction"):
+        term("columb_friction", "hip_front_left")
+    with pytest.raises(EffectError, match=r"there are: part_lost"):
+        term("zzz")
+
+
+def test_a_value_out_of_bounds_names_the_bounds() -> None:
+    with pytest.raises(EffectError, match=r"motor_weak: loss = 1.2 lies outside \[0, 1\]"):
+        term("motor_weak", "hip_front_left", loss=1.2)
+    with pytest.raises(EffectError, match=r"coulomb_friction: torque_nm = -1 lies outside \[0, inf\] N.m"):
+        term("coulomb_friction", "hip_front_left", torque_nm=-1.0)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])
+def test_a_value_that_is_no_number_is_refused(value: object) -> None:
+    with pytest.raises(EffectError, match="torque_nm must be a number"):
+        term("coulomb_friction", "hip_front_left", torque_nm=value)  # type: ignore[arg-type]
+
+
+def test_an_unknown_parameter_names_those_there_are() -> None:
+    with pytest.raises(EffectError, match="coulomb_friction has no parameter 'torque'; it has: torque_nm"):
+        from_dict({"effect": "coulomb_friction", "target": "hip_front_left", "torque": 1.0})
+
+
+def test_a_wrong_target_names_the_nearest() -> None:
+    with pytest.raises(EffectError, match=r"cannot act on 'hip_frnt_left' of quadruped; it can act on: hip_front_left"):
+        apply(QUADRUPED, (term("motor_weak", "hip_frnt_left", loss=0.1),))
+    with pytest.raises(EffectError, match="floor_tilt cannot act on 'floor' of one_joint"):
+        apply(slider(), (term("floor_tilt", "floor", sideways_deg=5.0),))
+
+
+@pytest.mark.parametrize("entry", [{}, {"target": "floor"}, "coulomb_friction", None, 3])
+def test_an_entry_that_is_no_effect_is_refused(entry: object) -> None:
+    with pytest.raises(EffectError):
+        from_dict(entry)  # type: ignore[arg-type]
+
+
+def test_taking_away_more_rotor_than_there_is_is_refused() -> None:
+    with pytest.raises(EffectError, match=r"rotor_inertia at hip_front_left .*less than none is left"):
+        apply(QUADRUPED, (term("rotor_inertia", "hip_front_left", added_kg_m2=-1.0),))
+
+
+@pytest.mark.parametrize(
+    ("facts", "message"),
+    [
+        ({"family": "magic"}, "no family 'magic'"),
+        ({"parameters": (Parameter("x", "1", 0.0, 1.0, 2.0),)}, "neutral value of x lies outside"),
+        ({"parameters": (Parameter("target", "1", 0.0, 1.0, 0.0),)}, "'target' cannot be the name of a parameter"),
+        ({"parameters": (Parameter("x", "1", 0.0, math.inf, 0.0),)}, "x has no finite bounds"),
+    ],
+)
+@pytest.mark.usefixtures("own_catalogue")
+def test_an_effect_that_contradicts_itself_is_refused(facts: dict[str, object], message: str) -> None:
+    stated = {"family": "drive", "targets": motors, "physics": "...", "signature": "..."} | facts
+    with pytest.raises(EffectError, match=message):
+        effect("own_effect", **stated)(lambda robot, target, values: robot)  # type: ignore[arg-type]
+    assert "own_effect" not in CATALOGUE
+
+
+def test_a_name_that_is_taken_is_refused() -> None:
+    with pytest.raises(EffectError, match="'motor_weak' exists already"):
+        effect("motor_weak", family="drive", targets=motors, physics="...", signature="...")(lambda r, t, v: r)
+
+
+def test_units_follow_the_kind_of_joint_and_the_channel() -> None:
+    friction, bias = CATALOGUE["viscous_friction"], CATALOGUE["sensor_bias"]
+    assert friction.unit("damping_nm_s_rad", slider(), "joint") == "N.s/m"
+    assert friction.unit("damping_nm_s_rad", QUADRUPED, "hip_front_left") == "N.m.s/rad"
+    assert bias.unit("bias", slider(), "velocity") == "m/s"
