@@ -90,6 +90,11 @@ def fit_all(
     progress: Progress = quiet,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given."""
+    if getattr(problem, "rugged", False):
+        from ee_dist.discrepancy.global_fit import effort_of, search_all
+
+        generations, seeds = effort_of(len(widths))
+        return search_all(problem, starts, before, mask, trials, generations, seeds, progress=progress)
     runs = [_Run(m, np.clip(np.asarray(u, float), m.lower, m.upper)) for m, u in starts]
 
     def evaluate(points: Sequence[tuple[_Run, Array]]) -> list[tuple[float, Array]]:

@@ -25,12 +25,14 @@ from ee_dist.engines.friction import Friction
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import LowPass, decimated
 from ee_dist.robots.inertia import felt_inertia
-from ee_dist.robots.inverse_dynamics import joint_torques
+from ee_dist.robots.inverse_dynamics import parameters, regressor, rotors
 from ee_dist.robots.model import Drive, Robot
 from ee_dist.trials.log import Array, SensorLog
 
 INSTANT_S = 1e-9
 """Time step at which the drive path's implicit friction is that of the instant."""
+KEPT = 4
+"""Geometries whose regressors are kept."""
 LEAST_NOISE = 0.002
 """Share of the force below which no difference counts, noise or not."""
 
@@ -54,6 +56,16 @@ class Motion:
     speed: Array
     acceleration: Array
     torque: Array
+    known: dict[tuple[object, ...], Array] = field(default_factory=dict)
+
+    def needed(self, robot: Robot) -> Array:
+        """(T, M) torque that the motion needs. What depends on the geometry is computed once for each."""
+        key = (robot.present_joints, robot.world, robot.start_rotation)
+        if key not in self.known:
+            if len(self.known) >= KEPT:
+                self.known.pop(next(iter(self.known)))
+            self.known[key] = regressor(robot, self.position, self.speed, self.acceleration)
+        return self.known[key] @ parameters(robot) + rotors(robot) * self.acceleration
 
 
 def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
@@ -154,7 +166,7 @@ class ForceBalance:
 
 def left_over(robot: Robot, motion: Motion) -> Array:
     """(T, M): what the drives gave at the joints, less what the motion needed, in terms of the measured force."""
-    needed = joint_torques(robot, motion.position, motion.speed, motion.acceleration)
+    needed = motion.needed(robot)
     q, qd = motion.position, motion.speed
     p, uses = _fields(robot.drives)
     active = motion.torque * p["strength"]

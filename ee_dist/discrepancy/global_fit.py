@@ -29,6 +29,11 @@ WIDTH = 0.02
 """Finite difference for the slopes at the end, as a share of the bounds."""
 
 
+def effort_of(iterations: int) -> tuple[int, tuple[int, ...]]:
+    """(generations, seeds) for as many iterations of a fit by slopes: a full fit of four is tried from three seeds."""
+    return 12 * iterations, (1, 2, 3) if iterations >= 4 else (1,)
+
+
 @dataclass(eq=False)
 class _Search:
     model: Model

@@ -12,17 +12,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.discrepancy.candidates import Candidate, known
-from ee_dist.discrepancy.explain import fit_out
 from ee_dist.discrepancy.fit import WIDTHS, Fit, Model, fit_all
-from ee_dist.discrepancy.folds import halves
-from ee_dist.discrepancy.judge import Judged
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.screen import Progress, quiet, screen
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
+INVISIBLE = 1e-6
+"""Energy of the change of a prediction below which an effect cannot show in these measurements."""
 Proposal = tuple[Candidate, ...]
 """Effects that are added in one go: mostly one, or a family whose members only work together."""
 
@@ -30,21 +30,26 @@ Proposal = tuple[Candidate, ...]
 @dataclass(frozen=True)
 class Rule:
     """When an effect has earned its place on held-out data: it takes at least ``share`` off the error, and its gain is
-    at least ``t`` standard errors over the segments. ``judged``: how many proposals are judged in a step (0: all)."""
+    at least ``t`` standard errors over the segments. ``judged``: how many proposals are judged in a step (0: all).
+    ``folds``: into how many parts the segments are cut, each held out once."""
 
     share: float = 0.05
     t: float = 2.0
     steps: int = 5
     judged: int = 0
+    folds: int = 4
 
 
 @dataclass(eq=False)
 class Verdict:
-    """A proposal on top of the model of its step. ``gain``: share of the held-out error that it takes off."""
+    """A proposal on top of the model of its step. ``gain``: share of the held-out error that it takes off; ``residual``
+    (n,): each value from the fit that had not seen it; ``u``: values fitted on the first fold."""
 
     name: str
     proposal: Proposal
-    judged: Judged
+    model: Model
+    u: Array
+    residual: Array
     error_heldout: float
     gain: float
     t: float
@@ -73,6 +78,16 @@ def natural(problem: Problem, value: float) -> float:
     return float(convert(value)) if convert is not None else value
 
 
+def folds_of(problem: Problem, count: int) -> NDArray[np.int64]:
+    """(segments,) which fold holds a segment out: whole trials take turns where there are as many as folds, else the
+    segments of each do."""
+    if len(problem.trials) >= count:
+        return np.asarray(problem.trial_of_segment) % count
+    place = np.arange(len(problem.segments))
+    first = np.array([np.flatnonzero(problem.trial_of_segment == k)[0] for k in range(len(problem.trials))])
+    return (place - first[problem.trial_of_segment]) % count
+
+
 def climb(
     problem: Problem,
     start: Hypothesis,
@@ -82,62 +97,96 @@ def climb(
 ) -> list[Rung]:
     """From the model ``start``, whose values are refitted too, to the last effect that earns its place.
 
-    The last rung's ``tried`` is repeated in an extra entry ``stopped``: what was tried on top of it and failed.
+    The last entry, ``stopped``, repeats the last rung and holds what was tried on top of it and failed.
     """
     parts = tuple(known(problem.robot, t) for t in start)
     values = [c.shares(dict(t.values)) for c, t in zip(parts, start, strict=True)]
-    u = np.concatenate(values) if values else np.zeros(0)
-    half = halves(problem)
-    fit = fit_everything(problem, Model(parts), [u], progress)
-    nothing = problem.residuals([start])[0]
-    (current,) = fit_out(problem, [(fit.model, fit.u)], nothing, (), half, 1, progress)
+    folds = folds_of(problem, rule.folds)
+    fit = fit_everything(problem, Model(parts), [np.concatenate(values) if values else np.zeros(0)], progress)
+    current = cross_fit(problem, [(fit.model, fit.u)], folds, progress)[0][1]
     rungs = [_rung(problem, "start", fit, current, [])]
-    open_ = list(proposals)
+    present = {c.name for c in parts}
+    open_ = [p for p in proposals if not present & {c.name for c in p}]
     for _ in range(rule.steps):
-        tried = judge_all(problem, rungs[-1].fit, current, open_, half, rule, progress)
+        tried = judge_all(problem, rungs[-1].fit, current, open_, folds, rule, progress)
         earned = [v for v in tried if not v.why_not]
         if not earned:
-            rungs.append(Rung("stopped", rungs[-1].fit, rungs[-1].error_fit, rungs[-1].error_heldout, tried))
-            return rungs
+            break
         best = min(earned, key=lambda v: v.error_heldout)
-        grown = fit_everything(problem, best.judged.model, [best.judged.u, _padded(rungs[-1].fit, best.proposal)], progress)
-        current = best.judged
+        grown = fit_everything(problem, best.model, [best.u, _padded(rungs[-1].fit, best.proposal)], progress)
+        current = best.residual
         rungs.append(_rung(problem, best.name, grown, current, tried))
         taken = {c.name for c in best.proposal}
         open_ = [p for p in open_ if not taken & {c.name for c in p}]
-    return rungs
+    else:
+        tried = []
+    last = rungs[-1]
+    return [*rungs, Rung("stopped", last.fit, last.error_fit, last.error_heldout, tried)]
 
 
 def judge_all(
     problem: Problem,
     fit: Fit,
-    current: Judged,
+    current: Array,
     proposals: Sequence[Proposal],
-    half: Array,
+    folds: NDArray[np.int64],
     rule: Rule,
     progress: Progress = quiet,
 ) -> list[Verdict]:
-    """Every proposal, or the most promising, fitted together with the model so far and judged on held-out segments."""
-    chosen = list(proposals)
-    if rule.judged and len(chosen) > rule.judged:
-        chosen = _promising(problem, fit, chosen, rule.judged, progress)
-    starts = [(Model((*fit.model.parts, *p)), _padded(fit, p)) for p in chosen]
-    judged = fit_out(problem, starts, current.residual, (), half, len(starts), progress)
-    before = natural(problem, error(current.residual))
+    """Every proposal, or the most promising, fitted together with the model so far and judged on held-out segments.
+
+    ``current`` (n,) is the held-out residual of the model so far. Best first.
+    """
+    chosen = _promising(problem, fit, proposals, rule.judged or len(proposals), progress)
+    models = [Model((*fit.model.parts, *p)) for p in chosen]
+    # Where a fit follows slopes, some effects are lost from a start too far away, others see no slope too near.
+    sizes = (0.05,) if getattr(problem, "rugged", False) else (0.05, 0.005)
+    starts = [(m, _padded(fit, p, size)) for size in sizes for m, p in zip(models, chosen, strict=True)]
+    found = cross_fit(problem, starts, folds, progress)
     out = []
-    for proposal, j in zip(chosen, judged, strict=True):
-        gained = np.bincount(problem.segment_of, weights=current.residual**2, minlength=len(problem.segments)) - j.held
-        spread = float(gained.std(ddof=1)) / math.sqrt(len(gained)) if len(gained) > 1 else math.inf
-        t = float(gained.mean()) / spread if spread > 0 else 0.0
-        after = natural(problem, j.error_heldout)
-        gain = 1.0 - after / before if math.isfinite(after) else -math.inf
-        why = ""
-        if gain < rule.share:
-            why = f"takes {gain:.1%} off the held-out error; {rule.share:.0%} are asked for"
-        elif t < rule.t:
-            why = f"its gain is {t:.1f} standard errors; {rule.t:g} are asked for"
-        out.append(Verdict(" + ".join(c.name for c in proposal), proposal, j, after, gain, t, why))
+    for i, proposal in enumerate(chosen):
+        fitted, residual, u = min(found[i :: len(chosen)], key=lambda f: f[0])
+        out.append(_verdict(problem, proposal, models[i], u, residual, current, rule))
     return sorted(out, key=lambda v: v.error_heldout)
+
+
+def cross_fit(
+    problem: Problem, starts: Sequence[tuple[Model, Array]], folds: NDArray[np.int64], progress: Progress = quiet
+) -> list[tuple[float, Array, Array]]:
+    """For each (model, start): energy of the fits on what they saw, held-out residual (n,), values u of the first fold."""
+    seen = np.zeros(len(starts))
+    held = [np.zeros(len(problem.segment_of)) for _ in starts]
+    values: list[Array] = []
+    for k in range(int(folds.max()) + 1):
+        out = (folds == k)[problem.segment_of]
+        if not out.any():
+            continue
+        fits = fit_all(problem, list(starts), (), ~out, widths=WIDTHS[1:], progress=progress)
+        trials = np.unique(problem.trial_of_segment[folds == k]).tolist()
+        rows = problem.residuals([f.hypothesis for f in fits], trials)
+        for i, (fit, row) in enumerate(zip(fits, rows, strict=True)):
+            seen[i] += fit.energy
+            held[i][out] = row[out]
+        values = values or [f.u for f in fits]
+    return list(zip(seen.tolist(), held, values, strict=True))
+
+
+def _verdict(
+    problem: Problem, proposal: Proposal, model: Model, u: Array, residual: Array, current: Array, rule: Rule
+) -> Verdict:
+    before, after = natural(problem, error(current)), natural(problem, error(residual))
+    count = len(problem.segments)
+    gained = np.bincount(problem.segment_of, weights=current**2 - residual**2, minlength=count)
+    spread = float(gained.std(ddof=1)) / math.sqrt(count) if count > 1 else math.inf
+    t = float(gained.mean()) / spread if spread > 0 else 0.0
+    gain = 1.0 - after / before if math.isfinite(after) else -math.inf
+    why = ""
+    if gain < rule.share:
+        why = f"takes {gain:.1%} off the held-out error; {rule.share:.0%} are asked for"
+    elif t < rule.t:
+        why = f"its gain is {t:.1f} standard errors; {rule.t:g} are asked for"
+    name = " + ".join(c.name for c in proposal)
+    return Verdict(name, proposal, model, u, residual, after, gain, t, why)
 
 
 def fit_everything(problem: Problem, model: Model, starts: Sequence[Array], progress: Progress = quiet) -> Fit:
@@ -147,18 +196,20 @@ def fit_everything(problem: Problem, model: Model, starts: Sequence[Array], prog
     return min(fits, key=lambda f: f.energy)
 
 
-def _padded(fit: Fit, proposal: Proposal) -> Array:
+def _padded(fit: Fit, proposal: Proposal, size: float = 0.05) -> Array:
     """The values so far, and a little of each new parameter: at exactly neutral some have no slope."""
-    return np.concatenate([fit.u, *(0.05 * (c.upper - (c.upper == 0)) for c in proposal)])
+    return np.concatenate([fit.u, *(np.where(c.upper > 0, size, -size) for c in proposal)])
 
 
 def _promising(problem: Problem, fit: Fit, proposals: Sequence[Proposal], count: int, progress: Progress) -> list[Proposal]:
+    """Those that change the prediction at all, the most promising first, at most ``count``."""
     pool = {c.name: c for p in proposals for c in p}
-    found = screen(problem, list(pool.values()), fit.hypothesis, (0.03, 0.1, 0.3), progress=progress)
-    promise = {s.candidate.name: s.promise for s in found}
-    return sorted(proposals, key=lambda p: -max(promise[c.name] for c in p))[:count]
+    screened = screen(problem, list(pool.values()), fit.hypothesis, (0.03, 0.1, 0.3), progress=progress)
+    found = {s.candidate.name: s for s in screened}
+    seen = [p for p in proposals if max(found[c.name].reach for c in p) > INVISIBLE]
+    return sorted(seen, key=lambda p: -max(found[c.name].promise for c in p))[:count]
 
 
-def _rung(problem: Problem, added: str, fit: Fit, current: Judged, tried: list[Verdict]) -> Rung:
-    share = math.sqrt(fit.energy / max(1, int(fit.mask.sum())))
-    return Rung(added, fit, natural(problem, share), natural(problem, current.error_heldout), tried)
+def _rung(problem: Problem, added: str, fit: Fit, current: Array, tried: list[Verdict]) -> Rung:
+    seen = math.sqrt(fit.energy / max(1, int(fit.mask.sum())))
+    return Rung(added, fit, natural(problem, seen), natural(problem, error(current)), tried)

@@ -92,7 +92,7 @@ def _channels(problem: OpenLoop, heat: Array, cells: Array, counts: Array, resid
         start = float(problem.segments[worst].rsplit("@", 1)[1][:-1])
         sensor = next((s for s in problem.robot.sensors if s.name == name), None)
         if sensor is not None:
-            values = np.concatenate([r[:, c] for r in raw]) * problem.scale.scale[c] / np.sqrt(problem.block)
+            values = np.concatenate([r[:, c] for r in raw])
             unit = sensor.unit
         else:
             values, unit = residual[problem.channel_of == c] * problem.command_scale(name), "rad"
@@ -185,13 +185,13 @@ def regimes(problem: OpenLoop, residual: Array) -> list[RegimeReport]:
     floors: dict[str, float] = {}
     excess_all, count_all = 0.0, 0
     for k in range(len(problem.trials)):
-        blocks, c = problem.blocks(k, residual), circumstances(problem, k)
+        blocks, c, floors_of = problem.blocks(k, residual), circumstances(problem, k), problem.block_floor(k)
         for i, j in enumerate(joints):
             if j is None:
                 continue
             joint = robot.joint(robot.motor_names[j])
             half, middle = (joint.upper - joint.lower) / 2, (joint.upper + joint.lower) / 2
-            e, floor = blocks[:, i] ** 2, problem.block_floor(i)
+            e, floor = blocks[:, i] ** 2, floors_of[:, i]
             moving = np.abs(c.speed[:, j]) > MOVING_SHARE * half * 10
             near = np.abs(c.position[:, j] - middle) > NEAR_LIMIT * half
             sorted_by: dict[str, Array] = {
@@ -206,8 +206,8 @@ def regimes(problem: OpenLoop, residual: Array) -> list[RegimeReport]:
                 sorted_by |= {"foot down": c.down[:, foot], "foot up": ~c.down[:, foot]}
             for name, mask in sorted_by.items():
                 gathered.setdefault(name, []).append(e[mask])
-                floors[name] = floors.get(name, 0.0) + floor * int(mask.sum())
-            excess_all += float(e.sum()) - floor * len(e)
+                floors[name] = floors.get(name, 0.0) + float(floor[mask].sum())
+            excess_all += float(e.sum() - floor.sum())
             count_all += len(e)
     out = []
     for name, parts in gathered.items():

@@ -1,7 +1,8 @@
 """The problem of a whole simulated robot: predictions on the recorded commands, compared channel by channel.
 
-A residual value is the mean over a block of rows of (measured - predicted), in units of that mean's noise, softened
-beyond six of them so that one missed contact does not outweigh a minute of agreement. Two values a window and channel
+A residual value is the mean over a block of rows of (measured - predicted), in units of what that difference would be
+from noise and from the spread of equally good models (see predictability.py), softened beyond six of them so that one
+missed contact does not outweigh a minute of agreement. Two values a window and channel
 compare how noisy and how frozen the channel is, which is all that a noisy or dropping sensor changes.
 """
 
@@ -12,11 +13,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.measured import MeasuredTrial
-from ee_dist.discrepancy.prediction import Digest, Predictor, digest, predicted_commands
+from ee_dist.discrepancy.prediction import (
+    Digest,
+    Predictor,
+    ToSensors,
+    digest,
+    predicted_commands,
+    report,
+    rollout_of,
+)
+from ee_dist.discrepancy.predictability import MEMBERS, ensemble
 from ee_dist.discrepancy.scale import channel_scale
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.drivers import Network
-from ee_dist.evaluation.jobs import Evaluator
+from ee_dist.evaluation.jobs import Evaluator, Job
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -35,11 +45,18 @@ def soften(values: Array) -> Array:
     return SOFT * np.arcsinh(values / SOFT)
 
 
+def _held_up(spread: Array) -> Array:
+    """(T, C): mean squares that vary from row to row by luck, each at least the mean of its neighbours."""
+    padded = np.pad(spread, ((1, 1), (0, 0)), mode="edge")
+    return np.asarray(np.maximum(spread, (padded[:-2] + spread + padded[2:]) / 3.0))
+
+
 class OpenLoop:
     """Implements ``ee_dist.discrepancy.problem.Problem``.
 
     ``block`` rows are averaged into a value, ``window`` rows (a multiple) are a segment. ``unmodelled`` (S,) widens the
-    scales by what a calibrated model is known to leave.
+    scales by what a calibrated model is known to leave. ``before``: what the model is believed to have; the spread
+    of ``members`` neighbours of that model weighs the residuals.
     """
 
     def __init__(
@@ -50,20 +67,45 @@ class OpenLoop:
         block: int = 4,
         window: int = 60,
         unmodelled: Array | None = None,
+        before: Hypothesis = (),
+        members: int = MEMBERS,
     ) -> None:
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
         self.block, self.window = block, window
+        self._members = members
         self.scale = channel_scale(robot, trials, unmodelled)
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self.trials = tuple(t.name for t in trials)
         self.looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
         self.channels = (*robot.sensor_names, *(f"command_{m}" for m in robot.motor_names))
         self._data = [digest(t.log.sensors, block, window) for t in trials]
+        self._weigh(before)
         self._lay_out()
         self.error_definition = (
             "root mean square over channels and time of the residual in standard deviations of its noise "
-            f"(means over {block * robot.time_step_s:g} s, softened beyond {SOFT:g}); 1 is a perfect model"
+            f"and of equally good models (means over {block * robot.time_step_s:g} s, softened beyond {SOFT:g})"
         )
+
+    def _weigh(self, before: Hypothesis) -> None:
+        """Standard deviations of block means (blocks, S) and of the log of roughness (windows, S), trial by trial."""
+        models = [apply(self.robot, before)]
+        models += ensemble(models[0], self._members)
+        pairs = [(k, apply(m, t.setup)) for k, t in enumerate(self.measured) for m in models]
+        found = self.predictor.digests(pairs)
+        tiny = (0.25 * self.scale.scale) ** 2
+        self.deviation: list[Array] = []
+        self.grain_deviation: list[Array] = []
+        for k in range(len(self.measured)):
+            mine = found[k * len(models) : (k + 1) * len(models)]
+            base, others = mine[0], [d for d in mine[1:] if d.finite]
+            noise = self.scale.scale**2 / self.block
+            spread = np.zeros_like(base.means, dtype=float)
+            grain = np.zeros_like(base.rough, dtype=float)
+            if others and base.finite:
+                spread = np.mean([(d.means.astype(float) - base.means) ** 2 for d in others], axis=0)
+                grain = np.mean([np.log((d.rough + tiny) / (base.rough + tiny)) ** 2 for d in others], axis=0)
+            self.deviation.append(np.sqrt(noise + _held_up(spread)))
+            self.grain_deviation.append(np.sqrt(2 * 1.95 / self.window + 0.01 + _held_up(grain)))
 
     def _lay_out(self) -> None:
         """Segments, channels and floors of all residual values, trial after trial."""
@@ -76,8 +118,8 @@ class OpenLoop:
         s, per = len(self.robot.sensors), self.window // self.block
         dt, at = self.robot.time_step_s, 0
         self.start_s: list[float] = []
-        tiny = (self.scale.noise / self.scale.scale) ** 2
-        texture = np.concatenate([_ROUGH_FLOOR * tiny, np.zeros(s)])
+        noisy = (self.scale.noise / self.scale.scale) ** 2
+        pure = 2 * 1.95 / self.window + 0.01
         for k, trial in enumerate(self.measured):
             blocks, windows = len(trial.log) // self.block, len(trial.log) // self.window
             first = len(names)
@@ -87,7 +129,10 @@ class OpenLoop:
             of_block = first + np.minimum(np.arange(blocks) // per, count - 1)
             seg += [np.repeat(of_block, s), np.repeat(first + np.arange(windows), 2 * s)]
             chan += [np.tile(np.arange(s), blocks), np.tile(np.arange(s), 2 * windows)]
-            floor += [np.tile(tiny * _SOFT_FLOOR, blocks), np.tile(texture, windows)]
+            share = self.scale.noise**2 / self.block / self.deviation[k] ** 2
+            grain = _ROUGH_FLOOR * noisy * pure / self.grain_deviation[k] ** 2
+            texture = np.stack([grain, np.zeros_like(grain)], axis=1)
+            floor += [share.ravel() * _SOFT_FLOOR, texture.ravel()]
             if isinstance(trial.driver, Network):
                 m = len(self.robot.drives)
                 seg.append(np.repeat(of_block, m))
@@ -111,19 +156,20 @@ class OpenLoop:
         out = np.zeros((len(models), len(self.segment_of)))
         for place, k in enumerate(chosen):
             mine = digests[place * len(models) : (place + 1) * len(models)]
-            parts = [np.stack([self._compare(self._data[k], d) for d in mine])]
+            parts = [np.stack([self._compare(k, d) for d in mine])]
             trial = self.measured[k]
             if isinstance(trial.driver, Network):
                 parts.append(self._command_residuals(trial, models))
             out[:, self.slices[k]] = np.concatenate(parts, axis=1)
         return out
 
-    def _compare(self, measured: Digest, predicted: Digest) -> Array:
+    def _compare(self, trial: int, predicted: Digest) -> Array:
+        measured = self._data[trial]
         if not predicted.finite:
             return np.full(measured.means.size + 2 * measured.rough.size, np.inf)
-        shape = (measured.means.astype(float) - predicted.means) / self.scale.scale * np.sqrt(self.block)
+        shape = (measured.means.astype(float) - predicted.means) / self.deviation[trial]
         w, tiny = self.window, (0.25 * self.scale.scale) ** 2
-        grain = np.log((measured.rough + tiny) / (predicted.rough + tiny)) / np.sqrt(2 * 1.95 / w + 0.01)
+        grain = np.log((measured.rough + tiny) / (predicted.rough + tiny)) / self.grain_deviation[trial]
         p = 0.5 * (predicted.repeated + 1 / w)
         frozen = (measured.repeated - predicted.repeated) / np.sqrt(np.maximum(p * (1 - p), 1 / w) / w + 0.0004)
         texture = np.stack([grain, frozen], axis=1)
@@ -148,14 +194,22 @@ class OpenLoop:
         return residual[self.slices[trial]][: rows * s].reshape(rows, s)
 
     def raw_blocks(self, trial: int, residual: Array) -> Array:
-        """The same before softening: in standard deviations."""
-        return np.asarray(SOFT * np.sinh(self.blocks(trial, residual) / SOFT))
+        """The same before softening, in the units of the channels."""
+        return np.asarray(SOFT * np.sinh(self.blocks(trial, residual) / SOFT) * self.deviation[trial])
 
-    def block_floor(self, channel: int) -> float:
-        """Mean square that noise leaves of a value of ``blocks``."""
-        return float((self.scale.noise[channel] / self.scale.scale[channel]) ** 2 * _SOFT_FLOOR)
+    def block_floor(self, trial: int) -> Array:
+        """(T // block, S): mean square that noise leaves of each value of ``blocks``."""
+        return np.asarray(self.scale.noise**2 / self.block / self.deviation[trial] ** 2 * _SOFT_FLOOR)
 
     def command_scale(self, channel: str) -> float:
         """What a residual of 1 is for ``command_<motor>``, rad (m)."""
         joint = self.robot.joint(channel.removeprefix("command_"))
         return COMMAND_SHARE * (joint.upper - joint.lower)
+
+    def predicted(self, hypothesis: Hypothesis) -> list[Array]:
+        """What the channels of each trial should have reported, without noise: (T, S) by trial."""
+        model = apply(self.robot, hypothesis)
+        models = [apply(model, t.setup) for t in self.measured]
+        rollouts = [rollout_of(t, m) for t, m in zip(self.measured, models, strict=True)]
+        true = self.evaluator.evaluate([Job(r, ToSensors()) for r in rollouts])
+        return [report([m], v[:, None], k)[0][:, 0] for k, (m, v) in enumerate(zip(models, true, strict=True))]

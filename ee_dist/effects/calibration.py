@@ -10,9 +10,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects import scales
+from ee_dist.effects.catalogue import Parameter, Range, effect
 from ee_dist.effects.targets import motors, motors_with_speed_limit
 from ee_dist.robots.model import Drive, Quat, Robot
+
+STABLE = 1.8
+"""Speed times this, of what stops a joint in one step: at 2 explicit damping only turns a motion round."""
 
 
 @effect(
@@ -40,11 +44,21 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, stronger)
 
 
+def _slopes(robot: Robot, target: str) -> dict[str, Range]:
+    """As far as the drive's damping, which acts on the speed at the start of a step, stays stable."""
+    drive = scales.drive_of(robot, target)
+    steepest = STABLE * scales.steady(robot, target) / robot.time_step_s - drive.kd
+    return {"change": (-0.9, min(5.0, max(0.02, steepest * drive.speed_limit / drive.torque_limit - 1.0)))}
+
+
 @effect(
     "back_emf",
     family="drive",
     targets=motors_with_speed_limit,
-    parameters=(Parameter("change", "1", -0.9, 5.0, 0.0, "change of torque lost per speed as a share of nominal", 0.02),),
+    parameters=(
+        Parameter("change", "1", -0.9, 5.0, 0.0, "change of torque lost per speed as a share of nominal", 0.02),
+    ),
+    ranges=_slopes,
     physics="The voltage that the turning motor makes against its supply is larger or smaller than nominal.",
     signature="Residual torque in proportion to speed, only while the motor is driven.",
     searchable=False,

@@ -18,7 +18,6 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
@@ -67,6 +66,23 @@ SLIDE_UNITS = {
     "kg.m^2": "kg",
 }
 """What a unit of a hinge is on a slide."""
+
+
+@dataclass(frozen=True)
+class Always:
+    """Ranges that are the same for every robot, for parameters whose hard bounds are wider."""
+
+    ranges: tuple[tuple[str, Range], ...]
+
+    def __call__(self, robot: Robot, target: str) -> Mapping[str, Range]:
+        return dict(self.ranges)
+
+
+def always(**ranges: Range) -> Ranges:
+    """``always(share=(0.0, 0.8))``: the same range of a parameter for every robot."""
+    return Always(tuple(ranges.items()))
+
+
 RESERVED = frozenset({"effect", "target", "effect_name"})
 
 
@@ -96,7 +112,9 @@ class Effect:
         for p in self.parameters:
             if p.name == name:
                 return p
-        raise EffectError(f"{self.name} has no parameter {name!r}; it has: {', '.join(p.name for p in self.parameters)}")
+        raise EffectError(
+            f"{self.name} has no parameter {name!r}; it has: {', '.join(p.name for p in self.parameters)}"
+        )
 
     def neutral_values(self) -> dict[str, float]:
         return {p.name: p.neutral for p in self.parameters}
@@ -184,15 +202,6 @@ def effect(
     return register
 
 
-def always(**ranges: Range) -> Ranges:
-    """Ranges that are the same for every robot, for parameters whose hard bounds are wider."""
-    return partial(_given, ranges)
-
-
-def _given(ranges: Mapping[str, Range], robot: Robot, target: str) -> Mapping[str, Range]:
-    return ranges
-
-
 def find(name: str) -> Effect:
     """The effect of that name. Raises EffectError with the nearest names."""
     if name in _registry:
@@ -234,7 +243,9 @@ def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
         allowed = entry.targets(robot)
         if t.target not in allowed:
             near = difflib.get_close_matches(t.target, allowed, n=3, cutoff=0.4) or allowed
-            raise EffectError(f"{t.effect} cannot act on {t.target!r} of {robot.name}; it can act on: {', '.join(near)}")
+            raise EffectError(
+                f"{t.effect} cannot act on {t.target!r} of {robot.name}; it can act on: {', '.join(near)}"
+            )
         try:
             robot = entry.transform(robot, t.target, dict(t.values))
         except RobotError as error:

@@ -75,7 +75,9 @@ def speed_limit(robot: Robot, target: str, values: Mapping[str, float]) -> Robot
     "supply_sag",
     family="drive",
     targets=supply,
-    parameters=(Parameter("share", "1", 0.0, 0.9, 0.0, "share of the voltage lost when all motors give their most", 0.02),),
+    parameters=(
+        Parameter("share", "1", 0.0, 0.9, 0.0, "share of the voltage lost when all motors give their most", 0.02),
+    ),
     physics="Battery and wires have resistance: the more torque all motors give together, the less voltage is left for each.",
     signature="All joints lag at once, in the moments when the sum of torques is large; one joint moved alone hardly shows it.",
     reference=MOTORS,
@@ -174,7 +176,9 @@ def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     family="drive",
     targets=motors,
     parameters=(
-        Parameter("added_kg_m2", "kg.m^2", -math.inf, math.inf, 0.0, "rotor inertia at the joint on top of nominal", 1e-4),
+        Parameter(
+            "added_kg_m2", "kg.m^2", -math.inf, math.inf, 0.0, "rotor inertia at the joint on top of nominal", 1e-4
+        ),
     ),
     physics="The spinning rotor behind the gear is heavier than modelled: it resists acceleration of the joint, not its position.",
     signature="Residual torque proportional to joint acceleration, not to speed or position; steps rise late and overshoot.",

@@ -22,5 +22,7 @@ def _whole(robot: Robot) -> tuple[str, ...]:
     searchable=False,
 )
 def on_stand(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    world = replace(robot.world, has_floor=False, tilt_x_rad=0.0, tilt_y_rad=0.0, push_x_n=0.0, push_y_n=0.0, drag_n_s_m=0.0)
+    world = replace(
+        robot.world, has_floor=False, tilt_x_rad=0.0, tilt_y_rad=0.0, push_x_n=0.0, push_y_n=0.0, drag_n_s_m=0.0
+    )
     return replace(robot, world=world, free_base=False)

@@ -12,7 +12,9 @@ from ee_dist.effects.targets import motors
 from ee_dist.robots.model import Drive, Robot
 
 SURVEY = "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7)"
-SERVOS = "Duclusaud, Passault, Padois and Ly 2025, Extended Friction Models for the Physics Simulation of Servo Actuators"
+SERVOS = (
+    "Duclusaud, Passault, Padois and Ly 2025, Extended Friction Models for the Physics Simulation of Servo Actuators"
+)
 DRY_SHARE = 0.5
 """Of its torque limit, how much a drive may lose to dry friction in the range worth trying: at 1 it would not move."""
 
@@ -29,7 +31,9 @@ def _viscous_range(robot: Robot, target: str) -> dict[str, Range]:
     "viscous_friction",
     family="drive",
     targets=motors,
-    parameters=(Parameter("damping_nm_s_rad", "N.m.s/rad", 0.0, math.inf, 0.0, "torque for each unit of speed", 0.002),),
+    parameters=(
+        Parameter("damping_nm_s_rad", "N.m.s/rad", 0.0, math.inf, 0.0, "torque for each unit of speed", 0.002),
+    ),
     physics="Grease and bearings resist in proportion to speed.",
     signature="Residual torque is a straight line through zero against speed; the joint lags when it moves, not at rest.",
     reference=SURVEY,
@@ -70,7 +74,10 @@ def _stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
     "stribeck_friction",
     family="drive",
     targets=motors,
-    parameters=(Parameter("torque_nm", "N.m", 0.0, math.inf, 0.0, "friction at rest on top of that when moving", 0.005), _SPEED),
+    parameters=(
+        Parameter("torque_nm", "N.m", 0.0, math.inf, 0.0, "friction at rest on top of that when moving", 0.005),
+        _SPEED,
+    ),
     physics="Lubricant is squeezed out at rest: breaking loose takes more torque than moving on, falling as exp(-speed/scale).",
     signature="Residual torque peaks around zero speed and fades within the scale; slow motions go stick and slip.",
     reference=SURVEY,
@@ -106,7 +113,9 @@ def load_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
     family="drive",
     targets=motors,
     parameters=(
-        Parameter("share", "1", -2.0, 2.0, 0.0, "friction as a share of the external torque, on top of load friction", 0.01),
+        Parameter(
+            "share", "1", -2.0, 2.0, 0.0, "friction as a share of the external torque, on top of load friction", 0.01
+        ),
     ),
     physics="A gear is not equally good both ways: what the load puts in costs a different share than what the motor puts in.",
     signature="Like load friction, but lifting a weight and letting it down disagree with one share; it is seen best where the "
@@ -126,7 +135,11 @@ def _quadratic_range(robot: Robot, target: str) -> dict[str, Range]:
     "quadratic_friction",
     family="drive",
     targets=motors,
-    parameters=(Parameter("per_nm", "1/(N.m)", 0.0, math.inf, 0.0, "friction over the square of the torque through the gear", 0.01),),
+    parameters=(
+        Parameter(
+            "per_nm", "1/(N.m)", 0.0, math.inf, 0.0, "friction over the square of the torque through the gear", 0.01
+        ),
+    ),
     physics="Plastic teeth and shafts bend under load and rub out of line: friction grows with the square of the torque through "
     "the gear.",
     signature="Like load friction, but bent: hardly there at small loads and steep at large ones.",
@@ -174,7 +187,9 @@ def _asymmetry_range(robot: Robot, target: str) -> dict[str, Range]:
     family="drive",
     targets=motors,
     parameters=(
-        Parameter("dry_nm", "N.m", -math.inf, math.inf, 0.0, "dry friction more when moving up, less when moving down", 0.005),
+        Parameter(
+            "dry_nm", "N.m", -math.inf, math.inf, 0.0, "dry friction more when moving up, less when moving down", 0.005
+        ),
         Parameter("viscous_nm_s_rad", "N.m.s/rad", -math.inf, math.inf, 0.0, "the same for viscous friction", 0.002),
     ),
     physics="Friction differs between the directions of motion: a preloaded screw, brushes or seals set at an angle. Neither "

@@ -1,8 +1,8 @@
 """Model files: a base robot and the effects that it is believed to have. To add an effect is to append a line ::
 
-    robot: servo_pendulum            # a name, a file beside this one (.yaml, .urdf), or a description
-    effects:
-      - {effect: viscous_friction, target: servo, damping_nm_s_rad: 0.005}
+robot: servo_pendulum            # a name, a file beside this one (.yaml, .urdf), or a description
+effects:
+  - {effect: viscous_friction, target: servo, damping_nm_s_rad: 0.005}
 """
 
 from __future__ import annotations
@@ -78,7 +78,10 @@ def write_model(path: str | Path, source: Any, folder: Path, terms: Hypothesis, 
     lines = [f"# {line}" for note in notes for line in note.splitlines()]
     lines.append(yaml.safe_dump({"robot": source}, sort_keys=False, default_flow_style=None, width=120).rstrip())
     lines.append("effects:" if terms else "effects: []")
-    lines += [f"  - {yaml.safe_dump(t.as_dict(), default_flow_style=True, sort_keys=False, width=1000).strip()}" for t in terms]
+    lines += [
+        f"  - {yaml.safe_dump(t.as_dict(), default_flow_style=True, sort_keys=False, width=1000).strip()}"
+        for t in terms
+    ]
     partial = file.with_name(file.name + ".part")
     partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
     partial.replace(file)

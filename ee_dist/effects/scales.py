@@ -39,10 +39,14 @@ def speed(robot: Robot, joint: str) -> float:
     return limit if 0 < limit < math.inf else 4.0 * travel(robot, joint)
 
 
+def steady(robot: Robot, joint: str) -> float:
+    """The inertia with which all joints can be stopped at once, kg.m^2 (kg)."""
+    return float(steady_inertia(robot)[robot.motor_names.index(joint)])
+
+
 def stiffest(robot: Robot, joint: str) -> float:
     """The stiffest spring on the joint that its time step resolves, some twelve steps a period; N.m/rad (N/m)."""
-    least = float(steady_inertia(robot)[robot.motor_names.index(joint)])
-    return 0.25 * least / robot.time_step_s**2
+    return 0.25 * steady(robot, joint) / robot.time_step_s**2
 
 
 def weight(robot: Robot) -> float:

@@ -116,7 +116,9 @@ def _quanta(robot: Robot, target: str) -> dict[str, Range]:
     "sensor_quantisation",
     family="sensing",
     targets=continuous_sensors,
-    parameters=(Parameter("step", "channel", 0.0, math.inf, 0.0, "distance between two readings that it can tell apart", 0.005),),
+    parameters=(
+        Parameter("step", "channel", 0.0, math.inf, 0.0, "distance between two readings that it can tell apart", 0.005),
+    ),
     physics="A sensor has few steps: it reports the nearest of them.",
     signature="One channel moves in equal stairs; the residual is a saw tooth of half a step.",
     reference="Widrow and Kollar 2008, Quantization Noise",
@@ -131,7 +133,9 @@ def sensor_quantisation(robot: Robot, target: str, values: Mapping[str, float]) 
     family="sensing",
     targets=sensors,
     parameters=(
-        Parameter("share", "1", 0.0, 1.0, 0.0, "share of its movement that it does not report; at 1 it is frozen", 0.02),
+        Parameter(
+            "share", "1", 0.0, 1.0, 0.0, "share of its movement that it does not report; at 1 it is frozen", 0.02
+        ),
         Parameter("from_s", "s", 0.0, math.inf, 0.0, "time from which on it sticks", 0.05),
     ),
     physics="A sensor sticks at the value it had: wholly, or so that it follows only a part of the movement since then.",

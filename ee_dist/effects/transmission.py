@@ -34,7 +34,9 @@ def _gaps(robot: Robot, target: str) -> dict[str, Range]:
     "backlash",
     family="drive",
     targets=motors,
-    parameters=(Parameter("gap_rad", "rad", 0.0, math.inf, 0.0, "free play of the joint when the motor stands still", 0.002),),
+    parameters=(
+        Parameter("gap_rad", "rad", 0.0, math.inf, 0.0, "free play of the joint when the motor stands still", 0.002),
+    ),
     physics="Teeth have play: after a reversal the motor first crosses the gap, then takes the joint along. The position sensor "
     "of the controller is on the motor's side.",
     signature="After each reversal the joint waits, then follows late and lands hard; within the gap it hangs to the side of its "
@@ -55,7 +57,9 @@ def _twists(robot: Robot, target: str) -> dict[str, Range]:
     family="drive",
     targets=motors,
     parameters=(
-        Parameter("compliance_rad_nm", "rad/(N.m)", 0.0, math.inf, 0.0, "twist between motor and joint for each N.m", 0.001),
+        Parameter(
+            "compliance_rad_nm", "rad/(N.m)", 0.0, math.inf, 0.0, "twist between motor and joint for each N.m", 0.001
+        ),
     ),
     physics="Belts, flexible gears and long shafts twist under torque; the controller's sensor is before the twist.",
     signature="The joint is off by compliance times torque, also at rest under load, and swings on after quick moves.",

@@ -36,7 +36,9 @@ def floor_tilt(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     "floor_friction",
     family="world",
     targets=floor,
-    parameters=(Parameter("change", "1", -0.95, 2.0, 0.0, "change of the friction coefficient, as a share of it", 0.02),),
+    parameters=(
+        Parameter("change", "1", -0.95, 2.0, 0.0, "change of the friction coefficient, as a share of it", 0.02),
+    ),
     physics="The floor is slicker or grippier than modelled: a foot slides at a smaller or larger share of its load.",
     signature="Feet slip where the model holds, or hold where it slips: joints agree, the body's motion does not.",
     reference="Stewart and Trinkle 1996, Int. J. Numer. Meth. Engng 39(15)",

@@ -72,9 +72,13 @@ class DrivePath:
         self.inertia = _each(robots, felt_inertia).reshape(shape)
         self.transmission: Transmission | None = None
         self.friction: Friction | None = None
+        self.at_stop = self.inertia
         elastic = self.uses["backlash"] or self.uses["compliance"]
-        if elastic or Friction.needed(self.uses):
+        jammed = np.array([[r.joint(d.joint).freedom != 1.0 for d in r.drives] for r in robots]).reshape(shape)
+        if elastic or Friction.needed(self.uses) or jammed.any():
             steady = _each(robots, steady_inertia).reshape(shape)
+            # A jammed joint is at a stop all the time: the stop must not shake the joints that move with it.
+            self.at_stop = np.where(jammed, steady, self.inertia)
             if elastic:
                 self.transmission = Transmission(self.p, steady, self.dt)
             if Friction.needed(self.uses):
@@ -196,7 +200,7 @@ class DrivePath:
         past_upper, past_lower = ahead > self.upper, ahead < self.lower
         if not (past_upper | past_lower).any():
             return torque
-        scale = STOP_SHARE * self.inertia / dt
+        scale = STOP_SHARE * self.at_stop / dt
         highest, lowest = STOP_SHARE * (self.upper - q) / dt, STOP_SHARE * (self.lower - q) / dt
         over = np.where(past_upper, np.maximum(np.maximum(torque, 0.0) + scale * (qd - highest), 0.0), 0.0)
         under = np.where(past_lower, np.minimum(np.minimum(torque, 0.0) + scale * (qd - lowest), 0.0), 0.0)

@@ -63,7 +63,7 @@ class SensingPath:
             # A worn switch closes only after it was pressed for a while.
             down = self.touch & (value > 0)
             self.pressed_s = np.where(down, self.pressed_s + self.dt, 0.0)
-            value = np.where(down & (self.pressed_s <= p["missed_touch"]), LIFTED, value)
+            value = np.where(down & (self.pressed_s <= p["missed_touch"] + 1e-9), LIFTED, value)
         if self.uses["gain"]:
             value = value * p["gain"]
         if self.uses["bias"]:

@@ -31,12 +31,14 @@ import yaml
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.model import Drive, Joint, Robot, RobotError, Sensor, Wiring, World
 from ee_dist.robots.quadruped import quadruped
+from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.robots.serial import robot_from_dict
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.robots.urdf import UrdfBody, read_urdf
 
 BUILT_IN: dict[str, Callable[..., Robot]] = {
     "quadruped": quadruped,
+    "quadruped_lab": quadruped_lab,
     "servo_pendulum": servo_pendulum,
     "linear_stage": linear_stage,
 }

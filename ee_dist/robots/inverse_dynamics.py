@@ -1,12 +1,14 @@
 """Torques that a measured motion needs: inverse dynamics of a robot on a fixed base, for a whole series at once.
 
-Recursive Newton-Euler (Luh, Walker, Paul 1980; Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 5), in the
-frame of the world, with arrays (T, ...) over the rows of a record.
+Newton-Euler in the frame of the world (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 5), with arrays (T, ...)
+over the rows of a record, in the form that is linear in the masses: what depends on the motion is computed once, and a
+model with other masses then costs one product.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,73 +25,121 @@ def gravity(robot: Robot) -> Array:
     return np.array([g * math.sin(b) * math.cos(a), -g * math.sin(a), -g * math.cos(b) * math.cos(a)])
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Where the parts of a robot are and how they move, in the frame of the world: arrays (T, ...) by part, axes by joint.
+
+    ``pull`` is the acceleration of a part's frame less gravity; ``arm`` leads from the parent's frame to the part's.
+    """
+
+    order: tuple[Joint, ...]
+    turn: dict[str, Array]
+    spin: dict[str, Array]
+    spin_rate: dict[str, Array]
+    pull: dict[str, Array]
+    arm: dict[str, Array]
+    axis: dict[str, Array]
+
+
 def joint_torques(robot: Robot, position: Array, speed: Array, acceleration: Array) -> Array:
     """(T, M) torque (force for a slide) at each drive's joint for a motion (T, M) in the order of ``robot.drives``.
 
     Rotor inertia counts as mass on its own joint. Raises RobotError for a free base and for a moving joint without a drive.
     """
+    return regressor(robot, position, speed, acceleration) @ parameters(robot) + rotors(robot) * acceleration
+
+
+def parameters(robot: Robot) -> Array:
+    """(10 P,) of the carried parts: mass, mass * centre (3), inertia about the part's frame (xx, yy, zz, xy, xz, yz)."""
+    found: list[float] = []
+    for joint in _parents_first(robot):
+        part = robot.part(joint.child)
+        m, (x, y, z) = part.mass_kg, part.com_m
+        shift = (y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z)
+        found += [m, m * x, m * y, m * z, *(i + m * s for i, s in zip(part.inertia_kg_m2, shift, strict=True))]
+    return np.array(found)
+
+
+def rotors(robot: Robot) -> Array:
+    """(M,) rotor inertia of each drive at its joint."""
+    return np.array([d.rotor_inertia for d in robot.drives])
+
+
+def regressor(robot: Robot, position: Array, speed: Array, acceleration: Array) -> Array:
+    """(T, M, 10 P): what each of the ``parameters`` adds to the torques, which are linear in them (Atkeson, An, Hollerbach
+    1986). It depends on the robot's geometry and gravity only. Raises RobotError as ``joint_torques`` does."""
     if robot.free_base:
         raise RobotError(f"{robot.name}: its base moves freely: the torques of its joints alone do not decide its motion")
     column = {d.joint: k for k, d in enumerate(robot.drives)}
     for j in robot.present_joints:
         if j.kind != "fixed" and j.name not in column:
             raise RobotError(f"{robot.name}: joint {j.name!r} has no drive, so its motion was not measured")
-    rows = len(position)
-    turns = {robot.root.name: np.broadcast_to(rotation_matrix(robot.start_rotation), (rows, 3, 3))}
-    origins = {robot.root.name: np.zeros((rows, 3))}
-    spins = {robot.root.name: np.zeros((rows, 3))}
-    spins_rate = {robot.root.name: np.zeros((rows, 3))}
-    pulls = {robot.root.name: np.broadcast_to(-gravity(robot), (rows, 3))}
+    course = course_of(robot, position, speed, acceleration)
+    carrier = {j.child: j for j in course.order}
+    out = np.zeros((*acceleration.shape, 10 * len(course.order)))
+    for place, joint in enumerate(course.order):
+        force, moment = _unit_loads(course, joint.child)
+        at: Joint | None = joint
+        while at is not None:
+            k = column.get(at.name)
+            if k is not None:
+                load = force if at.kind == "slide" else moment
+                out[:, k, 10 * place : 10 * place + 10] = np.einsum("ti,tip->tp", course.axis[at.name], load)
+            moment = moment + np.cross(course.arm[at.child][:, :, None], force, axis=1)
+            at = carrier.get(at.parent)
+    return out
+
+
+def _unit_loads(course: Course, part: str) -> tuple[Array, Array]:
+    """Force and moment about the part's frame, (T, 3, 10) each, for one unit of each parameter of the part."""
+    turn, w, dw, pull = course.turn[part], course.spin[part], course.spin_rate[part], course.pull[part]
+    rows = len(turn)
+    force, moment = np.zeros((rows, 3, 10)), np.zeros((rows, 3, 10))
+    force[:, :, 0] = pull
+    # In the axes of the part, where centre and inertia are constant.
+    inside = np.swapaxes(turn, 1, 2)
+    w_in, dw_in, pull_in = (np.einsum("tij,tj->ti", inside, v) for v in (w, dw, pull))
+    for i in range(3):
+        unit = np.eye(3)[i]
+        force[:, :, 1 + i] = np.einsum("tij,tj->ti", turn, np.cross(dw_in, unit) + np.cross(w_in, np.cross(w_in, unit)))
+        moment[:, :, 1 + i] = np.einsum("tij,tj->ti", turn, np.cross(unit, pull_in))
+    for i, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+        tensor = np.zeros((3, 3))
+        tensor[a, b] = tensor[b, a] = 1.0
+        moment[:, :, 4 + i] = np.einsum("tij,tj->ti", turn, dw_in @ tensor + np.cross(w_in, w_in @ tensor))
+    return force, moment
+
+
+def course_of(robot: Robot, position: Array, speed: Array, acceleration: Array) -> Course:
+    """The motion of all parts from that of the joints, root first (Luh, Walker, Paul 1980)."""
+    column = {d.joint: k for k, d in enumerate(robot.drives)}
+    rows, root = len(position), robot.root.name
+    turn = {root: np.broadcast_to(rotation_matrix(robot.start_rotation), (rows, 3, 3))}
+    spin, rate = {root: np.zeros((rows, 3))}, {root: np.zeros((rows, 3))}
+    pull = {root: np.broadcast_to(-gravity(robot), (rows, 3))}
+    arms: dict[str, Array] = {}
     axes: dict[str, Array] = {}
     order = _parents_first(robot)
     for joint in order:
-        up, away = turns[joint.parent], joint.parent
+        up, part = turn[joint.parent], joint.child
         arm = np.einsum("tij,j->ti", up, np.array(joint.position_m))
-        turn = up @ rotation_matrix(joint.rotation)
-        axis = np.einsum("tij,j->ti", turn, np.array(joint.axis) / np.linalg.norm(joint.axis))
-        w, dw = spins[away], spins_rate[away]
+        facing = up @ rotation_matrix(joint.rotation)
+        axis = np.einsum("tij,j->ti", facing, np.array(joint.axis) / np.linalg.norm(joint.axis))
+        w, dw = spin[joint.parent], rate[joint.parent]
         k = column.get(joint.name)
         q, v, a = (x[:, k, None] if k is not None else np.zeros((rows, 1)) for x in (position, speed, acceleration))
         if joint.kind == "slide":
             arm = arm + q * axis
-        pull = pulls[away] + np.cross(dw, arm) + np.cross(w, np.cross(w, arm))
+        drag = pull[joint.parent] + np.cross(dw, arm) + np.cross(w, np.cross(w, arm))
+        spin[part], rate[part] = w, dw
         if joint.kind == "hinge":
-            turn = _about(axis, q) @ turn
-            spins_rate[joint.child] = dw + a * axis + np.cross(w, v * axis)
-            spins[joint.child] = w + v * axis
-        else:
-            if joint.kind == "slide":
-                pull = pull + a * axis + 2 * np.cross(w, v * axis)
-            spins[joint.child], spins_rate[joint.child] = w, dw
-        origins[joint.child], turns[joint.child], pulls[joint.child] = origins[away] + arm, turn, pull
-        axes[joint.name] = axis
-    return _gather(robot, order, origins, turns, spins, spins_rate, pulls, axes, column, acceleration)
-
-
-def _gather(robot, order, origins, turns, spins, rates, pulls, axes, column, acceleration):  # type: ignore[no-untyped-def]
-    """Forces and moments from the tips to the root; what falls on each joint's axis."""
-    force: dict[str, Array] = {}
-    moment: dict[str, Array] = {}
-    for part in robot.present_parts:
-        turn, w, dw = turns[part.name], spins[part.name], rates[part.name]
-        com = np.einsum("tij,j->ti", turn, np.array(part.com_m))
-        xx, yy, zz, xy, xz, yz = part.inertia_kg_m2
-        inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ np.swapaxes(turn, 1, 2)
-        f = part.mass_kg * (pulls[part.name] + np.cross(dw, com) + np.cross(w, np.cross(w, com)))
-        spin = np.einsum("tij,tj->ti", inertia, w)
-        force[part.name] = f
-        moment[part.name] = np.einsum("tij,tj->ti", inertia, dw) + np.cross(w, spin) + np.cross(com, f)
-    out = np.zeros_like(acceleration)
-    for joint in reversed(order):
-        f, n = force[joint.child], moment[joint.child]
-        k = column.get(joint.name)
-        if k is not None:
-            out[:, k] = np.einsum("ti,ti->t", axes[joint.name], f if joint.kind == "slide" else n)
-            out[:, k] += robot.drives[k].rotor_inertia * acceleration[:, k]
-        arm = origins[joint.child] - origins[joint.parent]
-        force[joint.parent] = force[joint.parent] + f
-        moment[joint.parent] = moment[joint.parent] + n + np.cross(arm, f)
-    return out
+            facing = _about(axis, q) @ facing
+            rate[part] = dw + a * axis + np.cross(w, v * axis)
+            spin[part] = w + v * axis
+        elif joint.kind == "slide":
+            drag = drag + a * axis + 2 * np.cross(w, v * axis)
+        turn[part], pull[part], arms[part], axes[joint.name] = facing, drag, arm, axis
+    return Course(tuple(order), turn, spin, rate, pull, arms, axes)
 
 
 def _about(axis: Array, angle: Array) -> Array:

@@ -14,7 +14,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from ee_dist.tasks.config import Config, ConfigError, check_keys, one_of
 
-TASKS = ("recover", "view", "online", "study", "trial", "compare", "explain", "improve", "import")
+TASKS = ("recover", "view", "online", "study", "trial", "compare", "explain", "improve", "reveal", "import")
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([0-9, ]+)$")
 
 

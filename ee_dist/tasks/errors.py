@@ -12,9 +12,10 @@ from ee_dist.evaluation.ray_actors import EvaluatorError
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError
+from ee_dist.trials.excitation import ExcitationError
 from ee_dist.trials.log import LogError
 
-USER_ERRORS = (ConfigError, EffectError, EngineError, EvaluatorError, LogError, RecordingError, RobotError)
+USER_ERRORS = (ConfigError, EffectError, EngineError, EvaluatorError, LogError, RecordingError, RobotError, ExcitationError)
 
 
 def hydra_message(error: HydraException) -> str:

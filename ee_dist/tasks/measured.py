@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,17 +12,18 @@ from typing import Any
 import numpy as np
 import yaml
 
-from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.measured import MeasuredTrial, setup_of
 from ee_dist.discrepancy.open_loop import OpenLoop
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import HARDWARE, RunRecord
+from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array, LogError, SensorLog
-from ee_dist.trials.noise import channel_range
 
 FEWEST_ROWS = 60
 
@@ -51,9 +53,13 @@ def load(config: Config) -> Measurements:
         found = [t for t in run.trials if t.source == HARDWARE]
         if not found:
             raise LogError(f"{file}: no hardware trial in it; expected a log of task=trial or task=import")
-        trials += [MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver) for t in found]
+        held = [setup_of(Excitation(**e)) for e in json.loads(run.metadata.get("trials", "[]"))]
+        for t in found:
+            setup = held[t.index] if t.index < len(held) else ()
+            trials.append(MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup))
     if config.model is None:
-        return Measurements(robot, tuple(trials), tuple(files), (), robot, Path.cwd())
+        source = robot.name if robot.name in BUILT_IN else robot
+        return Measurements(robot, tuple(trials), tuple(files), (), source, Path.cwd())
     believed = read_model(config.model)
     if believed.robot.motor_names != robot.motor_names:
         raise ConfigError(f"model={config.model}: it is of {believed.robot.name}, the log of {robot.name}")
@@ -143,9 +149,6 @@ def _calibration(path: Path, robot: Robot) -> Array | None:
 
 def problem_of(measured: Measurements, evaluator: Evaluator, **settings: Any) -> OpenLoop:
     """The problem that the measurements make."""
-    return OpenLoop(measured.trials, measured.robot, evaluator, unmodelled=measured.unmodelled, **settings)
-
-
-def resolution(robot: Robot) -> Array:
-    """(S,) ranges of the channels."""
-    return np.array([channel_range(robot, s) for s in robot.sensors])
+    return OpenLoop(
+        measured.trials, measured.robot, evaluator, unmodelled=measured.unmodelled, before=measured.model, **settings
+    )

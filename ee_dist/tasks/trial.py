@@ -17,7 +17,7 @@ from rich.table import Table
 from ee_dist.discrepancy.candidates import candidate
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.measured import driver_of
-from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
+from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, apply, find, from_dict, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recording.reader import read_run
@@ -70,16 +70,20 @@ def run(config: Config, options: Options, out: Path) -> None:
         "engine": config.engine.name,
         "noise": str(config.noise or options.noise),
         "seal": digest,
-        "excitations": json.dumps([e.as_dict() for e in plan]),
+        "trials": json.dumps([e.as_dict() for e in plan * options.repeats]),
     }
-    hardware = PhysicalRobot(engine, robot, hidden, noise_seed)
+    floor_seed, stand_seed = noise_seed.spawn(2)
+    hardware = {
+        "floor": PhysicalRobot(engine, robot, hidden, floor_seed),
+        "stand": PhysicalRobot(engine, robot, (*hidden, term("on_stand")), stand_seed),
+    }
     path, sums = out / "trial.mcap", hashlib.sha256()
     table = Table(title=f"Trials of {robot.name}, hidden change sealed", title_justify="left")
     for column in ("trial", "what was done", "seconds", "rows"):
         table.add_column(column)
     with RunWriter(path, robot, metadata) as writer:
         for k, excitation in enumerate(plan * options.repeats):
-            log, record = one_trial(hardware, excitation, robot, k)
+            log, record = one_trial(hardware[excitation.fixture], excitation, robot, k)
             writer.trial(record)
             sums.update(np.ascontiguousarray(log.sensors).tobytes())
             table.add_row(str(k + 1), str(excitation), f"{excitation.seconds:g}", str(len(log)))
@@ -112,7 +116,7 @@ def one_trial(
         # What reached the drives behind faulty wiring is not known to who sent the commands.
         log = replace(log, commands=np.array(driver.values[: len(log)]))
     log = replace(log, torques=None)
-    return log, TrialRecord(index, excitation.kind, HARDWARE, driver, log)
+    return log, TrialRecord(index, f"{excitation.kind} {excitation.fixture}", HARDWARE, driver, log)
 
 
 def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypothesis:
@@ -122,7 +126,7 @@ def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypoth
     if asked == "random":
         return (draw(robot, np.random.default_rng(seed))[1],)
     if isinstance(asked, str):
-        return tuple(_by_name(robot, part) for part in asked.split("+hidden=")[-1].split(";"))
+        return tuple(_by_name(robot, part) for part in asked.split(";"))
     if isinstance(asked, Mapping):
         asked = [asked]
     if not isinstance(asked, (list, tuple)):
@@ -132,10 +136,8 @@ def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypoth
     return tuple(from_dict(e) if isinstance(e, Mapping) else _by_name(robot, str(e)) for e in asked)
 
 
-def _by_name(robot: Robot, text: str):  # type: ignore[no-untyped-def]
+def _by_name(robot: Robot, text: str) -> Term:
     name, _, target = text.strip().partition("@")
-    from ee_dist.effects.catalogue import find
-
     targets = find(name).targets(robot)
     if not targets:
         raise EffectError(f"{name} cannot act on {robot.name}: it has no place for it")

@@ -13,8 +13,8 @@ from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.ray_actors import RayEvaluator
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.model import Robot
-from ee_dist.robots.quadruped import quadruped
-from ee_dist.tasks.config import Config, one_of
+from ee_dist.robots.describe import robot_of
+from ee_dist.tasks.config import Config
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,8 @@ def engine_maker(config: Config, alone: bool) -> EngineMaker:
 
 
 def build_robot(config: Config) -> Robot:
-    """The robot by name. Raises ConfigError for an unknown one."""
-    one_of("robot", config.robot.name, ("quadruped",))
-    return quadruped()
+    """The robot by name. Raises RobotError for an unknown one."""
+    return robot_of(config.robot.name, config.robot.urdf, config.robot.drives)[0]
 
 
 _kept: dict[object, Evaluator] = {}

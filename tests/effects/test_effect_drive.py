@@ -59,7 +59,9 @@ def test_supply_sag_takes_its_share_at_full_torque_and_half_at_half(bench: Bench
 
 
 def test_command_gain_scales_where_the_joint_goes(bench: Bench) -> None:
-    assert settled(bench, slider(**SERVO), term("command_gain", "joint", change=0.25), command=0.2) == pytest.approx(0.25)
+    assert settled(bench, slider(**SERVO), term("command_gain", "joint", change=0.25), command=0.2) == pytest.approx(
+        0.25
+    )
 
 
 @pytest.mark.parametrize("steps", [7, 50])
@@ -82,7 +84,9 @@ def test_command_delay_of_half_a_step_is_half_way(bench: Bench) -> None:
 
 
 def test_zero_offset_shifts_the_joint(bench: Bench) -> None:
-    assert settled(bench, slider(**SERVO), term("zero_offset", "joint", offset_rad=0.05), command=0.2) == pytest.approx(0.15)
+    assert settled(bench, slider(**SERVO), term("zero_offset", "joint", offset_rad=0.05), command=0.2) == pytest.approx(
+        0.15
+    )
 
 
 @pytest.mark.parametrize("command", [0.3, -0.3])
@@ -183,9 +187,7 @@ def test_offset_torque_accelerates_by_torque_over_mass(bench: Bench) -> None:
 
 def test_a_released_drive_neither_pushes_nor_brakes(bench: Bench) -> None:
     robot = slider(kp=400.0, kd=60.0, torque_limit=100.0, speed_limit=1.0)
-    braked, free = (
-        bench.run(robot, speed=0.5, steps=200, command=9.0, enabled=np.full(200, on)) for on in (1.0, 0.0)
-    )
+    braked, free = (bench.run(robot, speed=0.5, steps=200, command=9.0, enabled=np.full(200, on)) for on in (1.0, 0.0))
     np.testing.assert_array_equal(free.channel("velocity"), np.full(200, 0.5))
     assert abs(braked.channel("velocity")[-1] - 0.5) > 0.1
     untouched = bench.run(robot, speed=0.5, steps=200, command=9.0)

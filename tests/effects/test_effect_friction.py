@@ -22,9 +22,7 @@ def acceleration(speed: Array, steps: int = 50, dt: float = 0.001) -> float:
 
 @pytest.mark.parametrize("step_s", [0.001, 0.01])
 def test_coulomb_friction_slows_a_slide_by_torque_over_mass_and_then_holds_it(bench: Bench, step_s: float) -> None:
-    log = bench.run(
-        slider(step_s), term("coulomb_friction", "joint", torque_nm=4.0), steps=int(1 / step_s), speed=1.0
-    )
+    log = bench.run(slider(step_s), term("coulomb_friction", "joint", torque_nm=4.0), steps=int(1 / step_s), speed=1.0)
     speed, stop = log.channel("velocity"), int(0.5 / step_s)
     assert acceleration(speed, stop // 2, step_s) == pytest.approx(-4.0 / MASS_KG, rel=0.01)
     assert (speed >= -1e-9).all(), "friction reversed the motion that it stopped"

@@ -12,6 +12,7 @@ from engine_robots import BOX_HALF_M, RADIUS_M, at, ball, calm_commands, loose_d
 
 from ee_dist.engines.contract import EngineError, Rollout
 from ee_dist.engines.drivers import Commands
+from ee_dist.engines.mujoco.bodies import Group
 from ee_dist.engines.mujoco.contact import IMPEDANCE, contact
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.mujoco.model import Model, structure_key
@@ -78,6 +79,23 @@ def test_threads_change_no_bit(threads: int) -> None:
         assert a.base_pose is not None
         assert b.base_pose is not None
         assert a.base_pose.tobytes() == b.base_pose.tobytes()
+
+
+def test_a_rollout_is_what_mj_step_makes_of_its_torques() -> None:
+    for robot in (quadruped(), quadruped().with_part("body", mass_kg=2.0).with_world(friction=0.4, tilt_x_rad=0.1)):
+        (log,) = MuJoCoEngine(threads=1).rollout([Rollout(robot, network(4), 150, pose=True)])
+        assert log.torques is not None
+        assert log.joints is not None
+        assert log.base_pose is not None
+        group = Group(Model(robot), [Rollout(robot, network(4), 150)], threads=1)
+        model = group.batch.get_model(0)
+        data = mujoco.MjData(model)
+        data.qpos[:] = group.positions[0]
+        for row in range(150):
+            assert data.qpos[7:].tobytes() == log.joints[row].tobytes()
+            assert data.qpos[:3].tobytes() == log.base_pose[row, :3].tobytes()
+            data.qfrc_applied[6:] = log.torques[row]
+            mujoco.mj_step(model, data)
 
 
 def test_a_robot_that_blows_up_says_so_and_harms_no_other(

@@ -30,7 +30,7 @@ class MuJoCoEngine:
 
     name = "mujoco"
 
-    def __init__(self, threads: int | None = None, largest_batch: int = 128) -> None:
+    def __init__(self, threads: int | None = None, largest_batch: int = 256) -> None:
         self.threads = threads or os.cpu_count() or 1
         self.largest_batch = largest_batch
         self._models: OrderedDict[Hashable, Model] = OrderedDict()

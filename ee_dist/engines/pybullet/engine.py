@@ -78,61 +78,66 @@ class BulletBodies:
     def __init__(self, engine: PyBulletEngine, placed: list[tuple[World, list[int]]], batch: Sequence[Rollout]) -> None:
         self.engine = engine
         self.worlds = [world for world, _ in placed]
-        count, motors = len(batch), len(batch[0].model.drives)
-        self.joints, self.speeds = np.zeros((count, motors)), np.zeros((count, motors))
+        self.motors = len(batch[0].model.drives)
         self.touches = len(placed[0][0].touch_links)
-        self.robots = []
-        self.feet = []
+        self.robots: list[tuple[int, int, int, list[int]]] = []
+        """Row, client, body and links of each robot, in the order in which they are asked."""
+        self.columns: dict[int, list[int]] = {}
+        """Motors whose joint is present, of the rows that lost one."""
+        self.feet: list[tuple[int, int, dict[tuple[int, int], int]]] = []
         self.frame_in_com: dict[int, tuple[tuple[float, ...], tuple[float, ...]] | None] = {}
         for world, rows in placed:
             columns = [k for k, link in enumerate(world.links) if link >= 0]
             links = [world.links[k] for k in columns]
             feet = {}
             for row, body in zip(rows, world.bodies, strict=True):
-                self.robots.append(
-                    (row, world.client, body, links, None if links and len(links) == motors else columns)
-                )
-                feet.update({(body, link): (row, k) for k, link in enumerate(world.touch_links)})
+                self.robots.append((row, world.client, body, links))
+                if not links or len(links) < self.motors:
+                    self.columns[row] = columns
+                feet.update({(body, link): row * self.touches + k for k, link in enumerate(world.touch_links)})
                 root = batch[row].model.root
                 self.frame_in_com[row] = _inverse(root.com_m, world.frames[root.name][1])
             self.feet.append((world.client, world.floor, feet))
+        order = [row for row, *_ in self.robots]
+        self.order: slice | list[int] = slice(None) if order == sorted(order) else list(np.argsort(order))
 
     def read(self, touch: bool, pose: bool, twist: bool) -> Truth:
-        states = p.getJointStates
-        joints, speeds = self.joints, self.speeds
-        for row, client, body, links, columns in self.robots:
-            if columns is None:
-                positions, rates, _, _ = zip(*states(body, links, client), strict=True)
-                joints[row] = positions
-                speeds[row] = rates
-            elif links:
-                positions, rates, _, _ = zip(*states(body, links, client), strict=True)
-                joints[row, columns] = positions
-                speeds[row, columns] = rates
-        truth = Truth(joints.copy(), speeds.copy())
+        states, columns = p.getJointStates, self.columns
+        positions, rates = [], []
+        for row, client, body, links in self.robots:
+            if row in columns:
+                some = states(body, links, client) if links else ()
+                at, speed = [0.0] * self.motors, [0.0] * self.motors
+                for k, state in zip(columns[row], some, strict=True):
+                    at[k], speed[k] = state[:2]
+            else:
+                at, speed, _, _ = zip(*states(body, links, client))
+            positions.append(at)
+            rates.append(speed)
+        truth = Truth(np.array(positions)[self.order], np.array(rates)[self.order])
         if touch:
             truth.touch = self._touch()
         if pose:
             truth.base_pose = self._poses()
         if twist:
             truth.base_twist = np.empty((len(self.robots), 6))
-            for row, client, body, _, _ in self.robots:
+            for row, client, body, _ in self.robots:
                 truth.base_twist[row] = np.concatenate(p.getBaseVelocity(body, physicsClientId=client))
         return truth
 
     def _touch(self) -> NDArray[np.bool_]:
-        down = np.zeros((len(self.robots), self.touches), dtype=bool)
+        down = np.zeros(len(self.robots) * self.touches, dtype=bool)
+        pressed = []
         for client, floor, feet in self.feet:
             for contact in p.getContactPoints(floor, physicsClientId=client):
                 if contact[9] > 0:
-                    place = feet.get((contact[2], contact[4]))
-                    if place is not None:
-                        down[place] = True
-        return down
+                    pressed.append(feet.get((contact[2], contact[4]), -1))
+        down[[k for k in pressed if k >= 0]] = True
+        return down.reshape(-1, self.touches)
 
     def _poses(self) -> Array:
         out = np.empty((len(self.robots), 7))
-        for row, client, body, _, _ in self.robots:
+        for row, client, body, _ in self.robots:
             position, turn = p.getBasePositionAndOrientation(body, physicsClientId=client)
             shift = self.frame_in_com[row]
             if shift is not None:
@@ -143,9 +148,11 @@ class BulletBodies:
 
     def step(self, torques: Array, force: Array | None) -> None:
         send, simulate, mode = p.setJointMotorControlArray, p.stepSimulation, p.TORQUE_CONTROL
-        rows = torques.tolist()
-        for row, client, body, links, columns in self.robots:
-            values = rows[row] if columns is None else [rows[row][k] for k in columns]
+        rows, columns = torques.tolist(), self.columns
+        for row, client, body, links in self.robots:
+            values = rows[row]
+            if row in columns:
+                values = [values[k] for k in columns[row]]
             if links:
                 send(body, links, mode, forces=values, physicsClientId=client)
             if force is not None and force[row].any():

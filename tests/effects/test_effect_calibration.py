@@ -1,0 +1,50 @@
+"""Nominal numbers that a fit puts straight, and how a robot is held, do what they say."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from effect_robots import ARM_M, MASS_KG, Bench, G, lever, slider
+
+from ee_dist.effects import term
+from ee_dist.robots.quadruped import quadruped
+
+HOLD_NM = MASS_KG * G * ARM_M
+
+
+@pytest.mark.parametrize("change", [-0.5, 1.0])
+def test_motor_gain_scales_the_torque_and_leaves_the_back_emf(bench: Bench, change: float) -> None:
+    robot = slider(kp=1e4, torque_limit=10.0, speed_limit=1.0)
+    log = bench.run(robot, term("motor_gain", "joint", change=change), command=9.0, steps=2000)
+    assert log.torques is not None
+    assert log.torques[0, 0] == pytest.approx((1 + change) * 10.0)
+    # The same back-EMF eats a larger torque at a higher speed.
+    assert log.channel("velocity")[-1] == pytest.approx(1 + change, rel=0.01)
+
+
+def test_back_emf_lowers_the_speed_without_load(bench: Bench) -> None:
+    robot = slider(kp=1e4, torque_limit=10.0, speed_limit=1.0)
+    log = bench.run(robot, term("back_emf", "joint", change=1.0), command=9.0, steps=2000)
+    assert log.channel("velocity")[-1] == pytest.approx(0.5, rel=0.01)
+
+
+def test_position_gain_divides_the_sag(bench: Bench) -> None:
+    robot = lever(kp=100.0, kd=10.0)
+    log = bench.run(robot, term("position_gain", "joint", factor=2.0), steps=2000)
+    angle = float(log.channel("position")[-1])
+    assert 200.0 * angle == pytest.approx(HOLD_NM * math.cos(angle), rel=1e-3)
+
+
+def test_encoder_zero_turns_the_load_along_the_position_axis(bench: Bench) -> None:
+    log = bench.run(lever(kp=100.0, kd=10.0), term("encoder_zero", "joint", offset=0.1), steps=2000)
+    angle = float(log.channel("position")[-1])
+    assert 100.0 * angle == pytest.approx(HOLD_NM * math.cos(angle - 0.1), rel=1e-3)
+
+
+def test_on_stand_nothing_is_touched_and_the_body_stays(bench: Bench) -> None:
+    log = bench.run(quadruped(), term("on_stand"), steps=100, command=0.3)
+    assert log.base_pose is not None
+    assert (log.base_pose == log.base_pose[0]).all()
+    assert (log.sensors[:, :4] == -1).all()
+    assert abs(log.channel("angle_front_left")[-1]) > 0.1
