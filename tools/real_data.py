@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from real_emps import run as run_emps
-from real_xl330 import run as run_xl330
 from real_tables import Page
+from real_xl330 import run as run_xl330
 
 
 def main() -> int:
@@ -32,7 +32,9 @@ def main() -> int:
     args = parser.parse_args()
     out = args.out or Path("logs") / "real_data" / args.which
     out.mkdir(parents=True, exist_ok=True)
-    command = " ".join(["python tools/real_data.py", args.which, "--data", "PATH", *(["--quick"] if args.quick else [])])
+    command = " ".join(
+        ["python tools/real_data.py", args.which, "--data", "PATH", *(["--quick"] if args.quick else [])]
+    )
     page = Page(out / "tables.md", f"made by: {command}")
     try:
         if args.which == "emps":

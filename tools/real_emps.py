@@ -38,7 +38,9 @@ def run(data: Path, out: Path, page: Page) -> None:
     """The whole account. Raises MeasurementError where the data cannot be read."""
     begin = time.monotonic()
     model = read_model(EXAMPLES / "emps_model.yaml")
-    record, seen = import_file(data / "train.csv" if data.is_dir() else data, read_mapping(EXAMPLES / "emps.yaml"), model.robot)
+    record, seen = import_file(
+        data / "train.csv" if data.is_dir() else data, read_mapping(EXAMPLES / "emps.yaml"), model.robot
+    )
     page.text(report([seen]))
     trial = MeasuredTrial(record.name, record.log)
     problem = ForceBalance([trial], model.robot)
@@ -64,7 +66,9 @@ def run(data: Path, out: Path, page: Page) -> None:
         ("effect", "held out, %", "gain", "why not"),
         [(v.name, f"{100 * v.error_heldout:.3f}", f"{v.gain:+.1%}", v.why_not) for v in rungs[-1].tried],
     )
-    write_model(out / "model.yaml", model.source, model.folder, rungs[-1].hypothesis, ["found by tools/real_data.py emps"])
+    write_model(
+        out / "model.yaml", model.source, model.folder, rungs[-1].hypothesis, ["found by tools/real_data.py emps"]
+    )
     fits = _published(problem, model, page)
     _parameters(fits, model, page)
     _simulations(fits, model, trial, page)

@@ -20,9 +20,9 @@ from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import ModelFile, read_model, write_model
 from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import describe, import_file
 from ee_dist.measurements.mapping import read_mapping
-from ee_dist.measurements.errors import MeasurementError
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "examples"
 JOINT = "servo"
@@ -78,11 +78,15 @@ def _held_out(
     begin = time.monotonic()
     own = [t for t in trials if _gain(t) == hold]
     if not own:
-        raise MeasurementError(f"--hold {hold}: no recording at that gain; there are: {sorted({_gain(t) for t in trials})}")
+        raise MeasurementError(
+            f"--hold {hold}: no recording at that gain; there are: {sorted({_gain(t) for t in trials})}"
+        )
     evaluator = SerialEvaluator(OneJointEngine(1024), 1024)
     problem = FreeRun([t for t in trials if _gain(t) != hold], model.robot, evaluator, 50 if quick else 5)
     held = FreeRun(own, model.robot, evaluator, 50 if quick else 5)
-    page.text(f"## kp {hold} held out", "", f"error: {problem.natural_name} over free runs, every recording counting the same")
+    page.text(
+        f"## kp {hold} held out", "", f"error: {problem.natural_name} over free runs, every recording counting the same"
+    )
     families = {c.name: c for c in candidates(model.robot) if c.effect.family in ("drive", "world", "body") and c.size}
     proposals = [(c,) for c in families.values()]
     proposals.append((families[f"load_friction@{JOINT}"], families[f"quadratic_friction@{JOINT}"]))
@@ -118,7 +122,15 @@ def _ladder(hold: int, rungs: Sequence[Rung], problem: FreeRun, held: FreeRun, p
     for r in rungs[:-1]:
         best = next((v for v in r.tried if v.name == r.added), None)
         gain = ("", "") if best is None else (f"{best.gain:.0%}", f"{best.t:.1f}")
-        rows.append((r.added, f"{_mrad(problem, r.hypothesis):.1f}", f"{1e3 * r.error_heldout:.1f}", *gain, f"{_mrad(held, r.hypothesis):.1f}"))
+        rows.append(
+            (
+                r.added,
+                f"{_mrad(problem, r.hypothesis):.1f}",
+                f"{1e3 * r.error_heldout:.1f}",
+                *gain,
+                f"{_mrad(held, r.hypothesis):.1f}",
+            )
+        )
     page.table(
         f"The ladder, kp {hold} held out, mrad",
         ("step", "fitted gains", "trajectories held out", "gain there", "t", f"kp {hold}"),

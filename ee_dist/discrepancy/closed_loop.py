@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ee_dist.discrepancy.free_run import released
-from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.measured import MeasuredTrial, released
 from ee_dist.effects.catalogue import apply
 from ee_dist.engines.contract import Engine, Rollout
 from ee_dist.engines.drivers import Commands
@@ -44,12 +43,22 @@ def closed_loop(
     """
     log, smooth = trial.log, low_pass or LowPass(cutoff_hz=100.0)
     if log.joints is None or log.torques is None:
-        raise MeasurementError(f"trial {trial.name!r}: joint positions and torques are needed for a closed-loop comparison")
+        raise MeasurementError(
+            f"trial {trial.name!r}: joint positions and torques are needed for a closed-loop comparison"
+        )
     dt = float(np.median(np.diff(log.times_s)))
     commands, enabled = released(log.commands)
     begin = State(log.joints[0].copy(), np.zeros(len(log.motor_names)))
     rollouts = [
-        Rollout(apply(m, trial.setup), Commands(commands), len(log), start=begin, supply_v=log.supply_v, enabled=enabled, pose=True)
+        Rollout(
+            apply(m, trial.setup),
+            Commands(commands),
+            len(log),
+            start=begin,
+            supply_v=log.supply_v,
+            enabled=enabled,
+            pose=True,
+        )
         for m in models
     ]
     position = np.stack([smooth(q, dt) for q in log.joints.T], axis=1)

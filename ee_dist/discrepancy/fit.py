@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.discrepancy.candidates import Candidate
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.screen import Progress, quiet
 from ee_dist.effects.catalogue import Hypothesis
-from ee_dist.discrepancy.candidates import Candidate
 from ee_dist.trials.log import Array
 
 LENGTHS = (1.0, 0.5, 0.2)

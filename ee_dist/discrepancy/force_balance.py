@@ -103,7 +103,9 @@ class ForceBalance:
         forces = [decimated(m.torque, every) for m in self.motions]
         self.size = np.sqrt(np.mean(np.concatenate(forces) ** 2, axis=0))
         if not self.size.all():
-            raise MeasurementError(f"{self.channels[int(np.argmin(self.size))]}: its measured torque is zero throughout")
+            raise MeasurementError(
+                f"{self.channels[int(np.argmin(self.size))]}: its measured torque is zero throughout"
+            )
         # One share for all drives, so that the sum of squares is the relative error of all of them.
         noise = np.sqrt(np.mean([np.median(roughness(f / self.size), axis=0) / 0.455 for f in forces]))
         self.noise_share = max(float(noise), LEAST_NOISE)
@@ -158,6 +160,19 @@ class ForceBalance:
                 left = left_over(apply(self.models[k], hypothesis), self.motions[k])
                 kept = decimated(left, self.processing.keep_every) if np.isfinite(left).all() else None
                 out[row, self.slices[k]] = np.inf if kept is None else (kept / self.scale).ravel()
+        return out
+
+    def series(self, hypothesis: Hypothesis) -> list[tuple[str, str, Array, Array, Array]]:
+        """(trial and drive, unit, times, measured force, force that the model accounts for) of every trial."""
+        left = self.residuals([hypothesis])[0]
+        kinds = {j.name: j.kind for j in self.robot.joints}
+        out = []
+        for k, (trial, motion) in enumerate(zip(self.trials, self.motions, strict=True)):
+            force = decimated(motion.torque, self.processing.keep_every)
+            rest = left[self.slices[k]].reshape(force.shape) * self.scale
+            for c, name in enumerate(self.channels):
+                unit = "N" if kinds[name] == "slide" else "N.m"
+                out.append((f"{trial}, {name}", unit, self.times_s[k], force[:, c], (force - rest)[:, c]))
         return out
 
     def noise_floor(self) -> tuple[float, str]:

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.measured import MeasuredTrial, released, speeds_of
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -57,7 +58,7 @@ class FreeRun:
         trials: Sequence[MeasuredTrial],
         robot: Robot,
         evaluator: Evaluator,
-        every: int = 5,
+        every: int = 3,
         windows_s: float | None = None,
     ) -> None:
         self.robot, self.measured, self.evaluator, self.every = robot, tuple(trials), evaluator, every
@@ -84,7 +85,7 @@ class FreeRun:
         width = len(self.columns)
         sizes = [len(p.log.sensors[:: self.every]) * width for p in self.pieces]
         starts = np.concatenate([[0], np.cumsum(sizes)])
-        self.slices = [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)]
+        self.slices = [slice(int(a), int(b)) for a, b in pairwise(starts)]
         self.segments = tuple(f"{self.trials[p.trial]}@{p.start_s:.1f}s" for p in self.pieces)
         self.trial_of_segment = np.array([p.trial for p in self.pieces])
         self.segment_of = np.repeat(np.arange(len(sizes)), sizes)
@@ -120,6 +121,21 @@ class FreeRun:
         """Mean absolute position error, rad or m."""
         return value**2 * self.noise
 
+    def series(self, hypothesis: Hypothesis) -> list[tuple[str, str, Array, Array, Array]]:
+        """(trial and channel, unit, times, measured, predicted) of every stretch, as far as residuals were taken."""
+        signed = self.residuals([hypothesis])[0]
+        out = []
+        for i, p in enumerate(self.pieces):
+            value = signed[self.slices[i]].reshape(-1, len(self.columns))
+            error = np.sign(value) * value**2 * (self.noise / self.weight[i])
+            measured = p.log.sensors[:: self.every, list(self.columns)]
+            times = p.start_s + p.log.times_s[:: self.every] - p.log.times_s[0]
+            for c, name in enumerate(self.channels):
+                out.append(
+                    (f"{self.trials[p.trial]}, {name}", self.unit, times, measured[:, c], (measured - error)[:, c])
+                )
+        return out
+
     def mean_absolute(self, hypothesis: Hypothesis) -> Array:
         """(trials,) mean absolute position error of each trial, rad or m."""
         energy = self.residuals([hypothesis])[0] ** 2 * self.noise / self.weight[self.segment_of]
@@ -141,13 +157,17 @@ class Piece:
     def rollout(self, model: Robot, steps: int, switched: bool) -> Rollout:
         """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
         enabled = np.ones(len(self.log)) if self.enabled is None and switched else self.enabled
-        return Rollout(model, Commands(self.commands), steps, start=self.start, supply_v=self.log.supply_v, enabled=enabled)
+        return Rollout(
+            model, Commands(self.commands), steps, start=self.start, supply_v=self.log.supply_v, enabled=enabled
+        )
 
 
 def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None) -> list[Piece]:
     log = trial.log
     if log.joints is None:
-        raise MeasurementError(f"trial {trial.name!r}: no joint positions in its log: nothing to start a simulation from")
+        raise MeasurementError(
+            f"trial {trial.name!r}: no joint positions in its log: nothing to start a simulation from"
+        )
     if log.motor_names != robot.motor_names or log.sensor_names != robot.sensor_names:
         raise MeasurementError(
             f"trial {trial.name!r} is of another robot: its channels are {', '.join(log.sensor_names)}; "
@@ -159,7 +179,7 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
             f"trial {trial.name!r} has a row every {dt:g} s, {robot.name} a time step of {robot.time_step_s:g} s; import it at "
             f"{1 / robot.time_step_s:g} Hz"
         )
-    speeds = _speeds(log, robot, dt)
+    speeds = speeds_of(log, robot)
     commands, enabled = released(log.commands)
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
     found = []
@@ -178,30 +198,6 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
             )
         )
     return found
-
-
-def released(commands: Array) -> tuple[Array, Array | None]:
-    """Commands (T, M) with numbers everywhere, and (T,) 0 where the drives were released, if they were.
-
-    A released drive obeys no command: its command is NaN in the log.
-    """
-    gone = ~np.isfinite(commands).all(axis=1)
-    if not gone.any():
-        return commands, None
-    rows = np.where(gone, 0, np.arange(len(commands)))
-    first = int(np.argmin(gone))
-    return np.nan_to_num(commands[np.maximum(np.maximum.accumulate(rows), first)]), (~gone).astype(float)
-
-
-def _speeds(log: SensorLog, robot: Robot, dt: float) -> Array:
-    """Measured speeds (T, M); differences of the positions where a joint has no sensor for it."""
-    assert log.joints is not None
-    out = np.gradient(log.joints, dt, axis=0)
-    for k, motor in enumerate(robot.motor_names):
-        for c, sensor in enumerate(robot.sensors):
-            if sensor.kind == "velocity" and sensor.target == motor:
-                out[:, k] = log.sensors[:, c]
-    return out
 
 
 def _noise(positions: Array) -> float:

@@ -31,7 +31,7 @@ WIDTH = 0.02
 
 def effort_of(iterations: int) -> tuple[int, tuple[int, ...]]:
     """(generations, seeds) for as many iterations of a fit by slopes: a full fit of four is tried from three seeds."""
-    return 12 * iterations, (1, 2, 3) if iterations >= 4 else (1,)
+    return 10 * iterations, (1, 2, 3) if iterations >= 4 else (1,)
 
 
 @dataclass(eq=False)

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from ee_dist.discrepancy.candidates import Candidate, known
-from ee_dist.discrepancy.explain import Effort, Explanation, explain, fit_out
+from ee_dist.discrepancy.explain import STANDARD_EFFORT, Effort, Explanation, explain, fit_out
 from ee_dist.discrepancy.fit import WIDTHS, Fit, Model, fit_all
 from ee_dist.discrepancy.folds import bootstrap, halves
 from ee_dist.discrepancy.judge import LEAST_SHARE, Judged, least_energy
@@ -68,7 +68,7 @@ def improve(
     pool: Sequence[Candidate],
     before: Hypothesis = (),
     wanted: Sequence[Candidate] | None = None,
-    effort: Effort = Effort(),
+    effort: Effort = STANDARD_EFFORT,
     most: int = 6,
     progress: Progress = quiet,
 ) -> Improvement:

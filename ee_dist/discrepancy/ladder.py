@@ -145,7 +145,7 @@ def judge_all(
     found = cross_fit(problem, starts, folds, progress)
     out = []
     for i, proposal in enumerate(chosen):
-        fitted, residual, u = min(found[i :: len(chosen)], key=lambda f: f[0])
+        _, residual, u = min(found[i :: len(chosen)], key=lambda f: f[0])
         out.append(_verdict(problem, proposal, models[i], u, residual, current, rule))
     return sorted(out, key=lambda v: v.error_heldout)
 
@@ -201,7 +201,9 @@ def _padded(fit: Fit, proposal: Proposal, size: float = 0.05) -> Array:
     return np.concatenate([fit.u, *(np.where(c.upper > 0, size, -size) for c in proposal)])
 
 
-def _promising(problem: Problem, fit: Fit, proposals: Sequence[Proposal], count: int, progress: Progress) -> list[Proposal]:
+def _promising(
+    problem: Problem, fit: Fit, proposals: Sequence[Proposal], count: int, progress: Progress
+) -> list[Proposal]:
     """Those that change the prediction at all, the most promising first, at most ``count``."""
     pool = {c.name: c for p in proposals for c in p}
     screened = screen(problem, list(pool.values()), fit.hypothesis, (0.03, 0.1, 0.3), progress=progress)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands, Driver, Network
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
-from ee_dist.trials.log import SensorLog
+from ee_dist.trials.log import Array, SensorLog, State
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,3 +36,34 @@ def driver_of(excitation: Excitation, robot: Robot) -> Commands | Network:
 def setup_of(excitation: Excitation) -> Hypothesis:
     """How the robot is held."""
     return (term("on_stand"),) if excitation.fixture == "stand" else ()
+
+
+def released(commands: Array) -> tuple[Array, Array | None]:
+    """Commands (T, M) with numbers everywhere, and (T,) 0 where the drives were released, if they were.
+
+    A released drive obeys no command: its command is NaN in the log.
+    """
+    gone = ~np.isfinite(commands).all(axis=1)
+    if not gone.any():
+        return commands, None
+    rows = np.where(gone, 0, np.arange(len(commands)))
+    first = int(np.argmin(gone))
+    return np.nan_to_num(commands[np.maximum(np.maximum.accumulate(rows), first)]), (~gone).astype(float)
+
+
+def start_of(log: SensorLog, robot: Robot) -> State | None:
+    """Where a measured robot on a fixed base began; None where it stood at position zero, or that is not known."""
+    if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
+        return None
+    return State(log.joints[0].copy(), speeds_of(log, robot)[0])
+
+
+def speeds_of(log: SensorLog, robot: Robot) -> Array:
+    """Measured speeds (T, M); differences of the positions where a joint has no sensor for it."""
+    assert log.joints is not None
+    out = np.gradient(log.joints, float(np.median(np.diff(log.times_s))), axis=0)
+    for k, motor in enumerate(robot.motor_names):
+        for c, sensor in enumerate(robot.sensors):
+            if sensor.kind == "velocity" and sensor.target == motor:
+                out[:, k] = log.sensors[:, c]
+    return out

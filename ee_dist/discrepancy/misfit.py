@@ -60,5 +60,7 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
             slow_z = (slow[:, c].sum() - mean_floor[:, c].sum()) / sd if windows else 0.0
             z = max(quick_z, slow_z)
             if z > limit:
-                found.append(Leftover(trial, problem.channels[c], float(z), float(energy[c] - floor[c]), bool(slow_z >= quick_z)))
+                found.append(
+                    Leftover(trial, problem.channels[c], float(z), float(energy[c] - floor[c]), bool(slow_z >= quick_z))
+                )
     return sorted(found, key=lambda g: -g.z)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.predictability import MEMBERS, ensemble
 from ee_dist.discrepancy.prediction import (
     Digest,
     Predictor,
@@ -22,7 +23,6 @@ from ee_dist.discrepancy.prediction import (
     report,
     rollout_of,
 )
-from ee_dist.discrepancy.predictability import MEMBERS, ensemble
 from ee_dist.discrepancy.scale import channel_scale
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.drivers import Network
@@ -106,6 +106,10 @@ class OpenLoop:
                 grain = np.mean([np.log((d.rough + tiny) / (base.rough + tiny)) ** 2 for d in others], axis=0)
             self.deviation.append(np.sqrt(noise + _held_up(spread)))
             self.grain_deviation.append(np.sqrt(2 * 1.95 / self.window + 0.01 + _held_up(grain)))
+
+        quiet = np.array([s.kind != "touch" for s in self.robot.sensors])
+        alone = self.scale.scale**2 / self.block
+        self.trust = tuple(float(1.0 / np.mean((d**2 / alone)[:, quiet])) for d in self.deviation)
 
     def _lay_out(self) -> None:
         """Segments, channels and floors of all residual values, trial after trial."""

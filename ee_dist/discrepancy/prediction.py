@@ -11,11 +11,11 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from ee_dist.discrepancy.measured import MeasuredTrial, released, start_of
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands, Controllers, Network, scaling
 from ee_dist.engines.sensing import SensingPath
 from ee_dist.evaluation.jobs import Evaluator, Job
-from ee_dist.discrepancy.measured import MeasuredTrial
 from ee_dist.robots.model import Robot, Sensor, Wiring
 from ee_dist.trials.log import Array, SensorLog
 
@@ -106,13 +106,19 @@ def wired_commands(trial: MeasuredTrial, model: Robot) -> Commands:
 
 def rollout_of(trial: MeasuredTrial, model: Robot) -> Rollout:
     """The physics of a model on the trial's own commands, with clean sensors."""
-    return Rollout(clean(model), wired_commands(trial, model), len(trial.log), supply_v=trial.log.supply_v)
+    commands, enabled = released(wired_commands(trial, model).values)
+    start = start_of(trial.log, model)
+    return Rollout(
+        clean(model), Commands(commands), len(trial.log), start=start, supply_v=trial.log.supply_v, enabled=enabled
+    )
 
 
 class Predictor:
     """Predictions for many models at once. ``block``, ``window``: rows a mean and a window span."""
 
-    def __init__(self, trials: Sequence[MeasuredTrial], base: Robot, evaluator: Evaluator, block: int, window: int) -> None:
+    def __init__(
+        self, trials: Sequence[MeasuredTrial], base: Robot, evaluator: Evaluator, block: int, window: int
+    ) -> None:
         self.trials, self.base, self.evaluator = trials, base, evaluator
         self.block, self.window = block, window
 

@@ -63,7 +63,7 @@ def _points(screened: Screened, index: int) -> list[Array]:
     c = screened.candidate
     if not c.size:
         return [np.zeros(0)]
-    points = [u for u in screened.starts]
+    points = list(screened.starts)
     if c.size == 1:
         side = np.sign(screened.starts[0][0]) if len(screened.starts) and screened.starts[0][0] else 1.0
         sides = {side} | {np.sign(u[0]) for u in screened.starts[:2] if u[0]}

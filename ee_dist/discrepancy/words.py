@@ -43,7 +43,9 @@ def explanation_text(found: Explanation, robot: Robot, next_trial: Proposal | No
     ]
     best = found.best
     if found.verdict == NOTHING_MISSING:
-        lines.append("Nothing is missing: no candidate takes more off the residual than luck, and no channel stands out.")
+        lines.append(
+            "Nothing is missing: no candidate takes more off the residual than luck, and no channel stands out."
+        )
     elif found.verdict == EFFECT and best is not None:
         term = best.hypothesis[-1]
         entry = CATALOGUE[term.effect]
@@ -54,7 +56,9 @@ def explanation_text(found: Explanation, robot: Robot, next_trial: Proposal | No
             lines.append(f"These measurements cannot tell it from: {names}.")
     else:
         lines.append("Unexplained: something is left that no effect of the catalogue earns its place by.")
-        lines += [f"Nearest, but not good enough: {told(c.hypothesis[-1], robot)}; {c.why_not}." for c in found.candidates[:1]]
+        lines += [
+            f"Nearest, but not good enough: {told(c.hypothesis[-1], robot)}; {c.why_not}." for c in found.candidates[:1]
+        ]
     if found.left:
         lines.append(left_text(found.left, found.verdict == EFFECT))
     elif found.verdict == EFFECT:

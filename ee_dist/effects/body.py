@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from ee_dist.effects.catalogue import Parameter, Range, always, effect
+from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.scales import Range, always
 from ee_dist.effects.targets import carried_parts, parts
 from ee_dist.robots.model import Robot
 

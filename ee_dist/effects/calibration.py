@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ee_dist.effects import scales
-from ee_dist.effects.catalogue import Parameter, Range, effect
+from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import motors, motors_with_speed_limit
 from ee_dist.robots.model import Drive, Quat, Robot
 

@@ -24,6 +24,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ee_dist.effects.laws import LAWS
+from ee_dist.effects.scales import Range, Ranges
 from ee_dist.robots.model import Robot, RobotError
 
 FAMILIES = ("body", "world", "drive", "sensing", "wiring")
@@ -52,8 +53,6 @@ class Parameter:
 
 
 Transform = Callable[[Robot, str, Mapping[str, float]], Robot]
-Range = tuple[float, float]
-Ranges = Callable[[Robot, str], Mapping[str, Range]]
 
 SLIDE_UNITS = {
     "rad": "m",
@@ -66,23 +65,6 @@ SLIDE_UNITS = {
     "kg.m^2": "kg",
 }
 """What a unit of a hinge is on a slide."""
-
-
-@dataclass(frozen=True)
-class Always:
-    """Ranges that are the same for every robot, for parameters whose hard bounds are wider."""
-
-    ranges: tuple[tuple[str, Range], ...]
-
-    def __call__(self, robot: Robot, target: str) -> Mapping[str, Range]:
-        return dict(self.ranges)
-
-
-def always(**ranges: Range) -> Ranges:
-    """``always(share=(0.0, 0.8))``: the same range of a parameter for every robot."""
-    return Always(tuple(ranges.items()))
-
-
 RESERVED = frozenset({"effect", "target", "effect_name"})
 
 
@@ -275,7 +257,7 @@ def load_plugin(path: str | Path) -> None:
     before, laws = dict(_registry), dict(LAWS)
     for registry in (_registry, LAWS):
         for key in [k for k, v in registry.items() if getattr(v, "transform", v).__module__ == name]:
-            del registry[key]  # type: ignore[attr-defined]
+            del registry[key]
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:

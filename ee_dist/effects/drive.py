@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, Range, effect
+from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import motors, motors_with_speed_limit, motors_with_torque_limit, supply
 from ee_dist.robots.model import Drive, Robot, RobotError
 
@@ -156,7 +157,7 @@ def _widths(robot: Robot, target: str) -> dict[str, Range]:
         Parameter("half_width_rad", "rad", 0.0, math.inf, 0.0, "error on either side that the drive ignores", 0.002),
     ),
     physics="The controller does nothing about small errors, so as not to hum; beyond, it sees the error less the band.",
-    signature="The joint stops short of its target by up to the half width, on the side it came from; slow, small commands are lost.",
+    signature="The joint stops short of its target by up to the half width, on the side it came from; small commands are lost.",
     ranges=_widths,
 )
 def deadband(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
@@ -180,7 +181,7 @@ def _rotors(robot: Robot, target: str) -> dict[str, Range]:
             "added_kg_m2", "kg.m^2", -math.inf, math.inf, 0.0, "rotor inertia at the joint on top of nominal", 1e-4
         ),
     ),
-    physics="The spinning rotor behind the gear is heavier than modelled: it resists acceleration of the joint, not its position.",
+    physics="The spinning rotor behind the gear is heavier than modelled: it resists acceleration, not position.",
     signature="Residual torque proportional to joint acceleration, not to speed or position; steps rise late and overshoot.",
     reference="Featherstone 2008, Rigid Body Dynamics Algorithms, section 9.6",
     ranges=_rotors,

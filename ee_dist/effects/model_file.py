@@ -76,7 +76,8 @@ def write_model(path: str | Path, source: Any, folder: Path, terms: Hypothesis, 
     elif isinstance(source, Mapping) and "urdf" in source:
         source = {**source, "urdf": os.path.relpath(folder / str(source["urdf"]), file.parent)}
     lines = [f"# {line}" for note in notes for line in note.splitlines()]
-    lines.append(yaml.safe_dump({"robot": source}, sort_keys=False, default_flow_style=None, width=120).rstrip())
+    flow = None if not isinstance(source, str) else False
+    lines.append(yaml.safe_dump({"robot": source}, sort_keys=False, default_flow_style=flow, width=120).rstrip())
     lines.append("effects:" if terms else "effects: []")
     lines += [
         f"  - {yaml.safe_dump(t.as_dict(), default_flow_style=True, sort_keys=False, width=1000).strip()}"

@@ -3,9 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
 from ee_dist.robots.model import Drive, Robot
+
+Range = tuple[float, float]
+Ranges = Callable[[Robot, str], Mapping[str, Range]]
+
+
+@dataclass(frozen=True)
+class Always:
+    """Ranges that are the same for every robot and target."""
+
+    ranges: tuple[tuple[str, Range], ...]
+
+    def __call__(self, robot: Robot, target: str) -> Mapping[str, Range]:
+        return dict(self.ranges)
+
+
+def always(**ranges: Range) -> Ranges:
+    """``always(share=(0.0, 0.8))``: for parameters whose hard bounds are wider than what is worth trying."""
+    return Always(tuple(ranges.items()))
 
 
 def drive_of(robot: Robot, joint: str) -> Drive:

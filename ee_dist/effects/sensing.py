@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, Range, always, effect
+from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.scales import Range, always
 from ee_dist.effects.targets import continuous_sensors, sensors, touch_sensors
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.noise import channel_range
@@ -30,7 +31,7 @@ def _span(robot: Robot, name: str) -> float:
     targets=sensors,
     parameters=(Parameter("loss", "1", 0.0, 1.0, 0.0, "share of the signal that is lost", 0.02),),
     physics="A sensor reports only a part of what it senses; at a loss of 1 it is dead.",
-    signature="One channel is a scaled copy of the prediction; other channels change only through what the controller makes of it.",
+    signature="One channel is a scaled copy of the prediction; others change only through what the controller makes of it.",
     reference=PAPER,
 )
 def sensor_failing(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:

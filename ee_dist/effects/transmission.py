@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, Range, effect
+from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import motors
 from ee_dist.robots.model import Drive, Robot
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, Range, always, effect
+from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.scales import Range, always
 from ee_dist.effects.targets import base, floor
 from ee_dist.robots.model import Robot
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.effects.laws import LAWS, LawContext, LawFunction, drive_law, find_law
 from ee_dist.engines.friction import Friction
@@ -73,16 +74,22 @@ class DrivePath:
         self.transmission: Transmission | None = None
         self.friction: Friction | None = None
         self.at_stop = self.inertia
-        elastic = self.uses["backlash"] or self.uses["compliance"]
-        jammed = np.array([[r.joint(d.joint).freedom != 1.0 for d in r.drives] for r in robots]).reshape(shape)
-        if elastic or Friction.needed(self.uses) or jammed.any():
-            steady = _each(robots, steady_inertia).reshape(shape)
-            # A jammed joint is at a stop all the time: the stop must not shake the joints that move with it.
-            self.at_stop = np.where(jammed, steady, self.inertia)
-            if elastic:
-                self.transmission = Transmission(self.p, steady, self.dt)
-            if Friction.needed(self.uses):
-                self.friction = Friction(self.p, self.uses, steady, self.dt)
+        jammed = np.array([[r.joint(d.joint).freedom != 1.0 for d in r.drives] for r in robots], dtype=bool).reshape(
+            shape
+        )
+        elastic, rubbing = Transmission.rows(self.p), Friction.rows(self.p)
+        special = jammed | elastic | rubbing
+        if not special.any():
+            return
+        some: NDArray[np.bool_] = np.any(special, axis=1)
+        steady = self.inertia.copy()
+        steady[some] = _each([r for r, wanted in zip(robots, some.tolist(), strict=True) if wanted], steady_inertia)
+        # A jammed joint is at a stop all the time: the stop must not shake the joints that move with it.
+        self.at_stop = np.where(jammed, steady, self.inertia)
+        if elastic.any():
+            self.transmission = Transmission(self.p, steady, self.dt)
+        if rubbing.any():
+            self.friction = Friction(self.p, self.uses, steady, self.dt)
 
     def _prepare_laws(self, robots: Sequence[Robot]) -> None:
         groups: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, tuple[float, ...]]]] = {}

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.trials.log import Array
 
@@ -45,10 +46,7 @@ class Friction:
         self.per_step = inertia / dt
         self.loaded = any(uses[n] for n in LOADED)
         self.most_gear = GEAR_LIMIT * p["torque_limit"]
-        rubbing = np.zeros(inertia.shape, dtype=bool)
-        for name in (*DRY, *LOADED, *SIDED, *SLOPED):
-            rubbing |= p[name] != 0
-        self.rubbing = rubbing
+        self.rubbing = self.rows(p)
         self.electric = p["back_emf"] * p["strength"]
         self.uses_viscous = any(uses[n] for n in (*SLOPED, "viscous_asymmetry"))
         self.backdriving = np.maximum(p["load_friction"] + p["backdrive_friction"], 0.0)
@@ -56,8 +54,9 @@ class Friction:
         self.last_torque = np.zeros(inertia.shape)
 
     @staticmethod
-    def needed(uses: Mapping[str, bool]) -> bool:
-        return any(uses[n] for n in (*DRY, *LOADED, *SIDED, *SLOPED))
+    def rows(p: Mapping[str, Array]) -> NDArray[np.bool_]:
+        """Joints (B, M) that have any friction."""
+        return np.logical_or.reduce([p[name] != 0 for name in (*DRY, *LOADED, *SIDED, *SLOPED)])
 
     def __call__(self, torque: Array, motor: Array, speed: Array, enabled: Array | None = None) -> Array:
         """Torque at the joint less friction, from torque at the joint, torque of the motor, speed: all (B, M).

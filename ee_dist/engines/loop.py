@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.engines.contract import Bodies, Rollout, Truth
 from ee_dist.engines.drive import DrivePath
@@ -132,28 +133,29 @@ class _Channels:
         first = robots[0]
         motor = {name: k for k, name in enumerate(first.motor_names)}
         self.shape = (len(robots), len(first.sensors))
-        self.by_kind: dict[str, tuple[list[int], list[int]]] = {}
+        by_kind: dict[str, tuple[list[int], list[int]]] = {}
         touches = 0
         for k, sensor in enumerate(first.sensors):
-            columns, sources = self.by_kind.setdefault(sensor.kind, ([], []))
+            columns, sources = by_kind.setdefault(sensor.kind, ([], []))
             columns.append(k)
             if sensor.kind == "touch":
                 sources.append(touches)
                 touches += 1
             else:
                 sources.append(motor.get(sensor.target, 0))
-        self.middle = np.array([s[0] for s in scales])
-        self.half = np.array([s[1] for s in scales])
-        self.present = np.array([[n in {j.name for j in r.present_joints} for n in first.motor_names] for r in robots])
+        self.by_kind = [(kind, _places(columns), _places(sources)) for kind, (columns, sources) in by_kind.items()]
+        angles = _places(by_kind["angle"][1]) if "angle" in by_kind else slice(0)
+        self.middle = np.array([s[0] for s in scales])[:, angles].copy()
+        self.half = np.array([s[1] for s in scales])[:, angles].copy()
 
     def __call__(self, truth: Truth, torque: Array) -> Array:
         out = np.empty(self.shape)
-        for kind, (columns, sources) in self.by_kind.items():
+        for kind, columns, sources in self.by_kind:
             if kind == "touch":
                 assert truth.touch is not None
                 out[:, columns] = np.where(truth.touch[:, sources], TOUCHING, LIFTED)
             elif kind == "angle":
-                out[:, columns] = ((truth.joints - self.middle) / self.half)[:, sources]
+                out[:, columns] = (truth.joints[:, sources] - self.middle) / self.half
             elif kind == "position":
                 out[:, columns] = truth.joints[:, sources]
             elif kind == "velocity":
@@ -163,6 +165,14 @@ class _Channels:
             else:
                 out[:, columns] = _of_base(kind, truth)[:, None]
         return out
+
+
+def _places(places: list[int]) -> slice | NDArray[np.intp]:
+    """The places as a slice where they are evenly spaced: NumPy then needs no list of addresses."""
+    apart = places[1] - places[0] if len(places) > 1 else 1
+    if apart > 0 and places == list(range(places[0], places[-1] + 1, apart)):
+        return slice(places[0], places[-1] + 1, apart)
+    return np.array(places, dtype=np.intp)
 
 
 def _of_base(kind: str, truth: Truth) -> Array:

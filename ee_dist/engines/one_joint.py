@@ -41,7 +41,9 @@ class OneJointEngine:
         """Logs in the order asked. Raises EngineError for a robot that has more than one joint or moves about."""
         for r in rollouts:
             if not fits(r.model):
-                raise EngineError(f"one_joint cannot simulate {r.model.name!r}: it is for one driven joint on a fixed base")
+                raise EngineError(
+                    f"one_joint cannot simulate {r.model.name!r}: it is for one driven joint on a fixed base"
+                )
         return in_batches(rollouts, OneJointBodies, self.largest_batch)
 
     def close(self) -> None:
@@ -56,7 +58,9 @@ class OneJointBodies:
         self.dt = batch[0].model.time_step_s
         terms = {id(r.model): r.model for r in batch}
         known = {key: _dynamics(robot) for key, robot in terms.items()}
-        self.inertia, self.constant, self.cosine, self.sine = np.array([known[id(r.model)] for r in batch]).T[:, :, None]
+        self.inertia, self.constant, self.cosine, self.sine = np.array([known[id(r.model)] for r in batch]).T[
+            :, :, None
+        ]
         self.q, self.qd = np.zeros((count, 1)), np.zeros((count, 1))
         for i, r in enumerate(batch):
             if r.start is not None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.trials.log import Array
 
@@ -31,7 +32,7 @@ class Transmission:
         self.play = p["backlash"] / 2
         self.compliance = p["compliance"]
         self.loose = self.play > 0
-        self.elastic = self.loose | (self.compliance > 0)
+        self.elastic = self.rows(p)
         self.rotor = np.maximum(p["rotor_inertia"], LIGHTEST_ROTOR * inertia)
         self.landing = np.minimum(self.rotor, inertia)
         self.side = np.zeros(inertia.shape)
@@ -39,6 +40,11 @@ class Transmission:
         self.position: Array | None = None
         self.speed = np.zeros(inertia.shape)
         self.carried = np.zeros(inertia.shape)
+
+    @staticmethod
+    def rows(p: Mapping[str, Array]) -> NDArray[np.bool_]:
+        """Joints (B, M) with play or twist."""
+        return (p["backlash"] > 0) | (p["compliance"] > 0)
 
     def motor_side(self, q: Array, qd: Array) -> tuple[Array, Array]:
         """Position and speed of the motor (B, M), in units of the joint."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import socket
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -28,8 +30,10 @@ class _Worker:
     def __init__(self, make_engine: EngineMaker) -> None:
         self.engine = make_engine()
 
-    def run(self, jobs: list[Job], chunk: int) -> list[Any]:
-        return run_jobs(self.engine, jobs, chunk)
+    def run(self, jobs: list[Job], chunk: int) -> tuple[list[Any], float]:
+        """Results, and the seconds that they took."""
+        began = time.perf_counter()
+        return run_jobs(self.engine, jobs, chunk), time.perf_counter() - began
 
     def pid(self) -> int:
         return os.getpid()
@@ -79,11 +83,44 @@ def _unreachable(address: str, why: str) -> EvaluatorError:
     )
 
 
+WORTH_A_CALL = 24
+"""Jobs below which a step costs nearly as much for the batch as for its robots: no call carries fewer unless there are
+too few for all workers."""
+NEWEST = 0.3
+"""Weight of the newest measurement of a worker's speed."""
+
+
+class Shares:
+    """How many jobs each worker gets at a time, by the speed measured of it. Changes when results come, never what.
+
+    A large lot goes out in ever smaller helpings, so that all finish together; a small one in one helping each, since
+    a batch of half the size is nearly as slow as a whole one.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.speed: list[float | None] = [None] * workers
+
+    def measured(self, who: int, steps: int, seconds: float) -> None:
+        """``steps`` robot-steps took ``seconds``."""
+        now, before = steps / max(seconds, 1e-9), self.speed[who]
+        self.speed[who] = now if before is None else before + NEWEST * (now - before)
+
+    def size(self, who: int, left: int, total: int) -> int:
+        """Jobs for worker ``who`` when ``left`` of ``total`` are still to be given out."""
+        known = [s for s in self.speed if s is not None]
+        usual = sum(known) / len(known) if known else 1.0
+        mine = self.speed[who]
+        share = (usual if mine is None else mine) / sum(usual if s is None else s for s in self.speed)
+        whole = math.ceil(total * share)
+        if whole <= 2 * WORTH_A_CALL:
+            return min(left, whole)
+        return min(left, max(WORTH_A_CALL, math.ceil(left * share / 2)))
+
+
 class RayEvaluator:
     """Implements ``ee_dist.evaluation.jobs.Evaluator`` with ``workers`` actors (0: one a core).
 
-    ``chunk`` is how many jobs a call carries (0: an even share of what is asked, in two helpings, so that an early
-    finisher takes over from a late one). Results do not depend on either.
+    ``chunk`` is how many jobs a call carries (0: by the measured speed of the workers). Results do not depend on either.
     """
 
     def __init__(self, make_engine: EngineMaker, workers: int = 0, chunk: int = 0, address: str | None = None) -> None:
@@ -92,6 +129,7 @@ class RayEvaluator:
         self.workers = workers or (os.cpu_count() or 1)
         self.chunk = chunk
         self.counts = Counts()
+        self.shares = Shares(self.workers)
         start_ray(address, self.workers)
         actor = ray.remote(num_cpus=1 if not workers else 0.01, max_restarts=-1, max_task_retries=-1)(_Worker)
         self.actors = [actor.remote(make_engine) for _ in range(self.workers)]
@@ -102,22 +140,24 @@ class RayEvaluator:
         self.counts.asked_steps += steps
         self.counts.simulated += len(jobs)
         self.counts.steps += steps
-        size = self.chunk or max(1, -(-len(jobs) // (2 * self.workers)))
-        pending = [(k, list(jobs[k : k + size])) for k in range(0, len(jobs), size)]
         results: list[Any] = [None] * len(jobs)
-        running: dict[Any, tuple[int, int]] = {}
+        running: dict[Any, tuple[int, int, int]] = {}
         idle = list(range(self.workers))
-        while pending or running:
-            while pending and idle:
-                first, some = pending.pop(0)
+        given = 0
+        while given < len(jobs) or running:
+            while given < len(jobs) and idle:
                 who = idle.pop(0)
-                running[self.actors[who].run.remote(some, size)] = (first, who)
+                size = self.chunk or self.shares.size(who, len(jobs) - given, len(jobs))
+                some = list(jobs[given : given + size])
+                running[self.actors[who].run.remote(some, size)] = (given, len(some), who)
+                given += len(some)
             done, _ = ray.wait(list(running), num_returns=1)
             for reference in done:
-                first, who = running.pop(reference)
+                first, count, who = running.pop(reference)
                 idle.append(who)
-                found = ray.get(reference)
-                results[first : first + len(found)] = found
+                found, seconds = ray.get(reference)
+                self.shares.measured(who, sum(j.rollout.steps for j in jobs[first : first + count]), seconds)
+                results[first : first + count] = found
         return results
 
     def process_ids(self) -> list[int]:

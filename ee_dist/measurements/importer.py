@@ -146,7 +146,9 @@ class _Import:
         step = self.robot.time_step_s if self.mapping.rate_hz is None else 1.0 / self.mapping.rate_hz
         length = float(self.times_s[-1] - self.times_s[0])
         if length < step:
-            raise MeasurementError(f"{table.path}: {length:g} s long, less than a step of {step:g} s; are the times in another unit?")
+            raise MeasurementError(
+                f"{table.path}: {length:g} s long, less than a step of {step:g} s; are the times in another unit?"
+            )
         self.step_s = step
         self.as_is = timing.even and abs(timing.median_s / step - 1) < SAME_RATE
         self.at_s = np.arange(len(raw)) * step if self.as_is else grid(self.times_s, step)
@@ -154,7 +156,9 @@ class _Import:
         report.rate_read_hz, report.rate_hz = 1 / timing.median_s, 1 / step
         report.even, report.resampled, report.gaps = timing.even, not self.as_is, list(timing.gaps)
         if not self.as_is:
-            how = "even" if timing.even else f"uneven ({1e3 * timing.shortest_s:.3g} to {1e3 * timing.longest_s:.3g} ms)"
+            how = (
+                "even" if timing.even else f"uneven ({1e3 * timing.shortest_s:.3g} to {1e3 * timing.longest_s:.3g} ms)"
+            )
             report.done.append(
                 f"{how} sampling every {1e3 * timing.median_s:.4g} ms brought to {1e3 * step:.4g} ms: "
                 "states by straight lines, commands held"
@@ -184,7 +188,9 @@ class _Import:
             half, whole = 2.0 ** (column.signed_bits - 1), 2.0**column.signed_bits
             wrapped = int(np.sum(raw >= half))
             raw = np.where(raw >= half, raw - whole, raw)
-            self.report.done.append(f"{name}: {wrapped} rows of an unsigned {column.signed_bits}-bit counter read as negative")
+            self.report.done.append(
+                f"{name}: {wrapped} rows of an unsigned {column.signed_bits}-bit counter read as negative"
+            )
         values = (column.sign * column.scale * raw + column.offset) * size
         if column.unwrap:
             values = np.unwrap(values)
@@ -220,7 +226,9 @@ class _Import:
                 self.channels[name] = low_pass.speed(self.channels[column.speed_of], self.step_s)
                 values = self.channels[name]
                 self.report.ranges[name] = (float(values.min()), float(values.max()), sensors[name].unit)
-                self.report.done.append(f"{name}: estimated from {column.speed_of}: central differences behind a {low_pass}")
+                self.report.done.append(
+                    f"{name}: estimated from {column.speed_of}: central differences behind a {low_pass}"
+                )
         return positions
 
     def _motor_columns(self, columns: Any, units: dict[str, str], what: str) -> Array | None:
@@ -249,7 +257,9 @@ class _Import:
         for s in self.robot.sensors:
             if s.kind == "position":
                 joint = self.robot.joint(s.target)
-                report.suspicious += _some([unit_suspicion(s.name, self.channels[s.name], joint.lower, joint.upper, s.unit)])
+                report.suspicious += _some(
+                    [unit_suspicion(s.name, self.channels[s.name], joint.lower, joint.upper, s.unit)]
+                )
             elif s.kind == "velocity" and s.target in position_of:
                 note = speed_suspicion(s.name, self.channels[s.name], position_of[s.target], self.step_s)
                 report.suspicious += _some([note])

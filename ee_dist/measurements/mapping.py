@@ -126,9 +126,12 @@ def mapping_of(data: Any, file: Path) -> Mapping:
         robot=data.get("robot"),
         time=_column(data["time"], f"{where}: time", "s"),
         sensors=sensors,
-        commands={k: _column(v, f"{where}: commands: {k}") for k, v in _table(data["commands"], f"{where}: commands").items()},
+        commands={
+            k: _column(v, f"{where}: commands: {k}") for k, v in _table(data["commands"], f"{where}: commands").items()
+        },
         torques={
-            k: _column(v, f"{where}: torques: {k}") for k, v in _table(data.get("torques") or {}, f"{where}: torques").items()
+            k: _column(v, f"{where}: torques: {k}")
+            for k, v in _table(data.get("torques") or {}, f"{where}: torques").items()
         },
         supply=single.get("supply"),
         enabled=single.get("enabled"),
@@ -198,5 +201,7 @@ def _setting(value: Any, where: str) -> Setting:
         elif isinstance(entry, (int, float)) and not isinstance(entry, bool):
             values[str(key)] = float(entry)
         else:
-            raise MeasurementError(f"{where}: {key}: expected a number or {{header: key, scale: number}}, not {entry!r}")
+            raise MeasurementError(
+                f"{where}: {key}: expected a number or {{header: key, scale: number}}, not {entry!r}"
+            )
     return Setting(str(value["effect"]), str(value.get("target", "")), values)

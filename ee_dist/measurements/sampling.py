@@ -71,7 +71,7 @@ def held(at_s: Array, times_s: Array, values: Array, lead_s: float = 0.0) -> Arr
 
 def smoothed(values: Array, step_s: float, window_s: float) -> Array:
     """Centred mean over ``window_s``, ends held: for a reading noisier than what it reads (a supply voltage)."""
-    width = int(round(window_s / step_s)) | 1
+    width = round(window_s / step_s) | 1
     padded = np.pad(values, width // 2, mode="edge")
     return np.convolve(padded, np.ones(width) / width, "valid")
 
@@ -90,7 +90,9 @@ class LowPass:
         """Filtered series (T,). Raises MeasurementError for a cut-off beyond the Nyquist frequency or too short a series."""
         share = 2 * self.cutoff_hz * step_s
         if not 0 < share < 1:
-            raise MeasurementError(f"low-pass: cut-off {self.cutoff_hz:g} Hz must lie below half the rate, {0.5 / step_s:g} Hz")
+            raise MeasurementError(
+                f"low-pass: cut-off {self.cutoff_hz:g} Hz must lie below half the rate, {0.5 / step_s:g} Hz"
+            )
         b, a = signal.butter(self.order, share)
         if len(values) <= 3 * max(len(a), len(b)):
             raise MeasurementError(f"low-pass: {len(values)} rows are too few for a filter of order {self.order}")

@@ -45,9 +45,13 @@ def suspicions(name: str, values: Array) -> list[str]:
 def time_suspicion(median_s: float, length_s: float, declared: str) -> str | None:
     """Whether the time column looks as if its unit were another one."""
     if median_s >= 0.5:
-        return f"time: a row every {median_s:g} s and {length_s:g} s in all: is the column in ms rather than {declared!r}?"
+        return (
+            f"time: a row every {median_s:g} s and {length_s:g} s in all: is the column in ms rather than {declared!r}?"
+        )
     if median_s < 2e-6:
-        return f"time: a row every {median_s:g} s and {length_s:g} s in all: is the column in s rather than {declared!r}?"
+        return (
+            f"time: a row every {median_s:g} s and {length_s:g} s in all: is the column in s rather than {declared!r}?"
+        )
     return None
 
 

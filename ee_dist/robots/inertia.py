@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 
@@ -12,12 +11,14 @@ from numpy.typing import NDArray
 
 from ee_dist.robots.model import Drive, Joint, Robot, RobotError, Wiring
 
+Array = NDArray[np.float64]
+
 POSES = 4
 """Poses beside position zero at which ``steady_inertia`` looks."""
 _PLAIN = Drive("", kp=0.0, ki=0.0, kd=0.0, torque_limit=0.0, speed_limit=0.0)
 
 
-def rotation_matrix(quaternion: tuple[float, float, float, float]) -> NDArray[np.float64]:
+def rotation_matrix(quaternion: tuple[float, float, float, float]) -> Array:
     """(3, 3) of a unit quaternion, scalar last."""
     x, y, z, w = quaternion
     return np.array(
@@ -29,71 +30,70 @@ def rotation_matrix(quaternion: tuple[float, float, float, float]) -> NDArray[np
     )
 
 
-def mass_matrix(
-    robot: Robot, positions: Mapping[str, float] | None = None, rotor_on_part: bool = False
-) -> NDArray[np.float64]:
-    """Generalised mass matrix (n, n): six rows of the root if it is free, then the joints that move.
+def mass_matrix(robot: Robot) -> Array:
+    """Generalised mass matrix at joint position zero, (n, n): six rows of the root if it is free, then the joints that move.
 
-    ``positions`` are joint positions by name (rad or m), zero where not given. Sums J^T I J over the parts
-    (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6), rotor inertia added: on the joint, as it is, or with
-    ``rotor_on_part`` on the part that the joint moves, where an engine without rotors puts it.
+    Sums J^T I J over the parts (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6), rotor inertia added.
     """
-    at = positions or {}
-    joints = [j for j in robot.present_joints if j.kind != "fixed"]
-    carrier = {j.child: j.name for j in joints}
+    return mass_matrices(robot, np.zeros((1, len(_moving(robot)))))[0, 0]
+
+
+def mass_matrices(robot: Robot, positions: Array) -> Array:
+    """Mass matrices (2, P, n, n) at joint positions (P, joints that move), for both ways in which engines count rotors.
+
+    The first counts a rotor's inertia on its joint, as it is. The second counts it on the part that the joint moves,
+    where an engine that knows no rotors puts it.
+    """
+    joints, count = _moving(robot), len(positions)
     free = 6 if robot.free_base else 0
     n = free + len(joints)
-    place = {robot.root.name: (np.zeros(3), np.eye(3))}
-    path: dict[str, tuple[str, ...]] = {robot.root.name: ()}
-    axes: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]] = {}
+    column = {j.name: free + i for i, j in enumerate(joints)}
+    axes, pivots = np.zeros((count, n, 3)), np.zeros((count, n, 3))
+    place = {robot.root.name: (np.zeros((count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3)))}
+    path: dict[str, list[int]] = {robot.root.name: list(range(free))}
+    slides = np.zeros(n, dtype=bool)
+    slides[: free // 2] = True
+    axes[:, :free] = np.eye(3)[np.arange(free) % 3]
     for joint in _parents_first(robot):
         origin, turn = place[joint.parent]
         here, facing = origin + turn @ np.array(joint.position_m), turn @ rotation_matrix(joint.rotation)
-        axis, moved = facing @ np.array(joint.axis), at.get(joint.name, 0.0)
-        if moved and joint.kind == "slide":
-            here = here + moved * axis
-        elif moved and joint.kind == "hinge":
-            half = np.array(joint.axis) * math.sin(moved / 2)
-            facing = facing @ rotation_matrix((*half.tolist(), math.cos(moved / 2)))
+        path[joint.child] = path[joint.parent]
+        if joint.kind != "fixed":
+            c = column[joint.name]
+            path[joint.child] = [*path[joint.parent], c]
+            moved = positions[:, c - free]
+            axes[:, c], pivots[:, c] = facing @ np.array(joint.axis), here
+            slides[c] = joint.kind == "slide"
+            if slides[c]:
+                here = here + moved[:, None] * axes[:, c]
+            elif moved.any():
+                facing = facing @ _turned(np.array(joint.axis), moved)
         place[joint.child] = (here, facing)
-        path[joint.child] = (*path[joint.parent], *(() if joint.kind == "fixed" else (joint.name,)))
-        axes[joint.name] = (here, axis, joint.kind)
-    column = {j.name: free + i for i, j in enumerate(joints)}
     rotor = {d.joint: d.rotor_inertia for d in robot.drives}
-    on_part = {j.child: rotor.get(j.name, 0.0) for j in joints} if rotor_on_part else {}
-    matrix = np.zeros((n, n))
+    carrier = {j.child: j for j in joints}
+    plain, extra = np.zeros((count, n, n)), np.zeros((count, n, n))
     for part in robot.present_parts:
         here, facing = place[part.name]
         com = here + facing @ np.array(part.com_m)
-        mass, extra = part.mass_kg, on_part.get(part.name, 0.0)
         xx, yy, zz, xy, xz, yz = part.inertia_kg_m2
-        inertia = facing @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ facing.T
-        if extra:
-            _, axis, kind = axes[carrier[part.name]]
-            if kind == "slide":
-                mass = mass + extra
-            else:
-                inertia = inertia + extra * np.outer(axis, axis)
-        linear, angular = np.zeros((3, n)), np.zeros((3, n))
-        if free:
-            linear[:, :3] = np.eye(3)
-            angular[:, 3:6] = np.eye(3)
-            for k in range(3):
-                linear[:, 3 + k] = np.cross(np.eye(3)[k], com)
-        for name in path[part.name]:
-            pivot, axis, kind = axes[name]
-            if kind == "slide":
-                linear[:, column[name]] = axis
-            else:
-                linear[:, column[name]] = np.cross(axis, com - pivot)
-                angular[:, column[name]] = axis
-        matrix += mass * linear.T @ linear + angular.T @ inertia @ angular
-    for name, c in column.items():
-        matrix[c, c] += 0.0 if rotor_on_part else rotor.get(name, 0.0)
-    return matrix
+        inertia = facing @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ facing.swapaxes(1, 2)
+        ways = np.array(path[part.name], dtype=int)
+        axis, along = axes[:, ways], slides[ways][:, None]
+        linear = np.where(along, axis, _cross(axis, com[:, None] - pivots[:, ways]))
+        angular = np.where(along, 0.0, axis)
+        block = np.ix_(np.arange(count), ways, ways)
+        plain[block] += part.mass_kg * linear @ linear.swapaxes(1, 2) + angular @ inertia @ angular.swapaxes(1, 2)
+        joint_of = carrier.get(part.name)
+        if joint_of is not None and rotor.get(joint_of.name):
+            c = column[joint_of.name]
+            share = linear if slides[c] else (angular @ axes[:, c, :, None])
+            extra[block] += rotor[joint_of.name] * share @ share.swapaxes(1, 2)
+    on_joint = np.zeros(n)
+    on_joint[free:] = [rotor.get(j.name, 0.0) for j in joints]
+    return np.stack([plain + np.diag(on_joint), plain + extra])
 
 
-def felt_inertia(robot: Robot) -> NDArray[np.float64]:
+def felt_inertia(robot: Robot) -> Array:
     """Inertia that a torque on each drive's joint meets with the rest of the robot free to move, (M,): 1 / (M^-1)_jj.
 
     Read-only.
@@ -101,7 +101,7 @@ def felt_inertia(robot: Robot) -> NDArray[np.float64]:
     return _felt(_body(robot))
 
 
-def steady_inertia(robot: Robot) -> NDArray[np.float64]:
+def steady_inertia(robot: Robot) -> Array:
     """Inertia (M,) with which all joints can be stopped at once in one step without any being thrown back. Read-only.
 
     With D = diag(d), stopping every joint by a torque d * speed / dt turns speeds v into (1 - M^-1 D) v. The row sums
@@ -120,32 +120,32 @@ def _body(robot: Robot) -> Robot:
 
 
 @lru_cache(maxsize=2048)
-def _felt(robot: Robot) -> NDArray[np.float64]:
-    joints = [j.name for j in robot.present_joints if j.kind != "fixed"]
+def _felt(robot: Robot) -> Array:
     inverse = np.linalg.inv(mass_matrix(robot))
     free = 6 if robot.free_base else 0
-    felt = {name: 1.0 / float(inverse[free + i, free + i]) for i, name in enumerate(joints)}
+    felt = {j.name: 1.0 / float(inverse[free + i, free + i]) for i, j in enumerate(_moving(robot))}
     return _fixed(np.array([felt.get(d.joint, 1.0) for d in robot.drives]))
 
 
 @lru_cache(maxsize=2048)
-def _steady(robot: Robot) -> NDArray[np.float64]:
-    joints = [j for j in robot.present_joints if j.kind != "fixed"]
-    driven = {d.joint for d in robot.drives}
+def _steady(robot: Robot) -> Array:
+    joints, driven = _moving(robot), {d.joint for d in robot.drives}
     free = 6 if robot.free_base else 0
     rows = [free + i for i, j in enumerate(joints) if j.name in driven]
-    names = [j.name for j in joints if j.name in driven]
-    least = np.full(len(names), np.inf)
-    rng = np.random.default_rng(0)
-    some_rotor = any(d.rotor_inertia for d in robot.drives)
     # The inertia of a single joint on a bolted base does not depend on where it stands.
-    for k in range(1 + POSES * (free + len(joints) > 1)):
-        place = {j.name: 0.0 if k == 0 else rng.uniform(*_reach(j)) for j in joints}
-        for rotor_on_part in (False, True) if some_rotor else (False,):
-            inverse = np.linalg.inv(mass_matrix(robot, place, rotor_on_part))[np.ix_(rows, rows)]
-            least = np.minimum(least, 1.0 / np.abs(inverse).sum(axis=1))
-    steady = dict(zip(names, least.tolist(), strict=True))
+    poses = 1 + POSES * (free + len(joints) > 1)
+    rng = np.random.default_rng(0)
+    positions = np.zeros((poses, len(joints)))
+    for k, joint in enumerate(joints):
+        positions[1:, k] = rng.uniform(*_reach(joint), poses - 1)
+    inverse = np.linalg.inv(mass_matrices(robot, positions))[..., rows, :][..., rows]
+    least = (1.0 / np.abs(inverse).sum(axis=-1)).min(axis=(0, 1))
+    steady = dict(zip((joints[r - free].name for r in rows), least.tolist(), strict=True))
     return _fixed(np.array([steady.get(d.joint, 1.0) for d in robot.drives]))
+
+
+def _moving(robot: Robot) -> list[Joint]:
+    return [j for j in robot.present_joints if j.kind != "fixed"]
 
 
 def _reach(joint: Joint) -> tuple[float, float]:
@@ -166,6 +166,20 @@ def _parents_first(robot: Robot) -> list[Joint]:
     return order
 
 
-def _fixed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turned(axis: Array, angle: Array) -> Array:
+    """Rotation matrices (P, 3, 3) about one axis (Rodrigues)."""
+    x, y, z = axis / np.linalg.norm(axis)
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    return np.eye(3) + s * k + (1.0 - c) * (k @ k)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    x, y, z = np.moveaxis(a, -1, 0)
+    u, v, w = np.moveaxis(b, -1, 0)
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
+
+
+def _fixed(values: Array) -> Array:
     values.setflags(write=False)
     return values

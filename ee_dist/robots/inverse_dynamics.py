@@ -69,7 +69,9 @@ def regressor(robot: Robot, position: Array, speed: Array, acceleration: Array) 
     """(T, M, 10 P): what each of the ``parameters`` adds to the torques, which are linear in them (Atkeson, An, Hollerbach
     1986). It depends on the robot's geometry and gravity only. Raises RobotError as ``joint_torques`` does."""
     if robot.free_base:
-        raise RobotError(f"{robot.name}: its base moves freely: the torques of its joints alone do not decide its motion")
+        raise RobotError(
+            f"{robot.name}: its base moves freely: the torques of its joints alone do not decide its motion"
+        )
     column = {d.joint: k for k, d in enumerate(robot.drives)}
     for j in robot.present_joints:
         if j.kind != "fixed" and j.name not in column:
@@ -156,7 +158,9 @@ def _parents_first(robot: Robot) -> list[Joint]:
     while waiting:
         ready = [j for j in waiting if j.parent in placed]
         if not ready:
-            raise RobotError(f"{robot.name}: joint {waiting[0].name!r} hangs on {waiting[0].parent!r}, which no joint carries")
+            raise RobotError(
+                f"{robot.name}: joint {waiting[0].name!r} hangs on {waiting[0].parent!r}, which no joint carries"
+            )
         order += ready
         placed |= {j.child for j in ready}
         waiting = [j for j in waiting if j.child not in placed]

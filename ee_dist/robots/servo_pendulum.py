@@ -34,7 +34,7 @@ def servo_pendulum(
     mass_kg: float = 0.49,
     length_m: float = 0.1,
     viscous: float = 0.0,
-    time_step_s: float = 0.002,
+    time_step_s: float = 0.004,
 ) -> Robot:
     """The pendulum hanging down at position 0 (rad). ``viscous`` N.m.s/rad. Raises RobotError for lengths or masses <= 0."""
     if mass_kg <= 0 or length_m <= 0:

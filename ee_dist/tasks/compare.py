@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ee_dist.discrepancy.locate import Comparison, compare
+from ee_dist.tasks import measured_robot
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measured import Measurements, load, problem_of
 from ee_dist.tasks.pictures import compare_page, write_pictures
@@ -23,11 +24,15 @@ from ee_dist.viewing.report import write_page
 @dataclass
 class Options:
     name: str = "compare"
+    by: str = "open_loop"
     rerun: bool = True
 
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Write report.html, compare.rrd and summary.json into ``out``. Raises ConfigError, LogError, RecordingError."""
+    if measured_robot.elsewhere(options.by):
+        measured_robot.run_compare(config, options, out)
+        return
     console, watch = Console(), Stopwatch()
     measured = load(config)
     problem = problem_of(measured, evaluator_of(config))
@@ -39,7 +44,9 @@ def run(config: Config, options: Options, out: Path) -> None:
         write_pictures(problem, measured.model, out / "compare.rrd", "compare")
     _print(console, found, measured)
     digest = hashlib.sha256(np.ascontiguousarray(residual).tobytes()).hexdigest()
-    write_summary(out, "compare", config, options, watch, digest, {**summary(found), "model": hypothesis_list(measured.model)})
+    write_summary(
+        out, "compare", config, options, watch, digest, {**summary(found), "model": hypothesis_list(measured.model)}
+    )
     names = ("report.html", "compare.rrd", "summary.json") if options.rerun else ("report.html", "summary.json")
     for file in names:
         console.print(f"  {os.path.relpath(out / file)}", highlight=False, soft_wrap=True)

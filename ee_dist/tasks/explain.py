@@ -16,6 +16,7 @@ from ee_dist.discrepancy.explain import Explanation, explain
 from ee_dist.discrepancy.separate import Proposal, proposals
 from ee_dist.discrepancy.words import explanation_text, told
 from ee_dist.robots.model import Robot
+from ee_dist.tasks import measured_robot
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measured import load, problem_of
 from ee_dist.tasks.pictures import explain_page, write_pictures
@@ -28,17 +29,23 @@ from ee_dist.viewing.report import write_page
 @dataclass
 class Options:
     name: str = "explain"
+    by: str = "open_loop"
     without: list[str] = field(default_factory=list)
     rerun: bool = True
 
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Write report.html, explain.rrd and summary.json into ``out``. Raises ConfigError, LogError, RecordingError."""
+    if measured_robot.elsewhere(options.by):
+        measured_robot.run_explain(config, options, out)
+        return
     console, watch = Console(), Stopwatch()
     measured = load(config)
     evaluator = evaluator_of(config)
     pool = candidates(measured.robot, options.without)
-    console.print(f"{len(measured.trials)} trials of {measured.robot.name}; {len(pool)} candidate explanations.", highlight=False)
+    console.print(
+        f"{len(measured.trials)} trials of {measured.robot.name}; {len(pool)} candidate explanations.", highlight=False
+    )
     with SearchProgress(console) as progress:
         problem = problem_of(measured, evaluator)
         found = explain(problem, pool, measured.model, progress=progress)
@@ -84,7 +91,14 @@ def summary(found: Explanation, words: list[str], ahead: Proposal | None) -> dic
 def _print(console: Console, found: Explanation, words: list[str], robot: Robot) -> None:
     if found.candidates:
         table = Table(title="Candidate effects, judged on data they were not fitted to", title_justify="left")
-        for column, side in (("", "right"), ("effect", "left"), ("error", "right"), ("gain", "right"), ("95 % interval", "right"), ("", "left")):
+        for column, side in (
+            ("", "right"),
+            ("effect", "left"),
+            ("error", "right"),
+            ("gain", "right"),
+            ("95 % interval", "right"),
+            ("", "left"),
+        ):
             table.add_column(column, justify=side)  # type: ignore[arg-type]
         ties = set(found.best.tied_with) if found.best else set()
         for c in found.candidates:

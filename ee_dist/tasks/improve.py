@@ -20,6 +20,7 @@ from ee_dist.discrepancy.open_loop import OpenLoop
 from ee_dist.discrepancy.words import left_text, told
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
+from ee_dist.tasks import measured_robot
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.measured import load, problem_of
 from ee_dist.tasks.pictures import improve_page, write_pictures
@@ -33,6 +34,7 @@ from ee_dist.viewing.report import write_page
 @dataclass
 class Options:
     name: str = "improve"
+    by: str = "open_loop"
     without: list[str] = field(default_factory=list)
     most: int = 6
     calibrate: bool = False
@@ -45,6 +47,9 @@ class Options:
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Write model.yaml, report.html, improve.rrd and summary.json into ``out``. Raises ConfigError, EffectError, LogError."""
+    if measured_robot.elsewhere(options.by):
+        measured_robot.run_improve(config, options, out)
+        return
     console, watch = Console(), Stopwatch()
     measured = load(config)
     evaluator = evaluator_of(config)
@@ -65,7 +70,9 @@ def run(config: Config, options: Options, out: Path) -> None:
         write_pictures(problem, found.terms, out / "improve.rrd", "improve")
     _print(console, found, words, measured.robot)
     digest = hashlib.sha256(repr([(r.terms, r.error_heldout) for r in found.ladder]).encode()).hexdigest()
-    write_summary(out, "improve", config, options, watch, digest, {**summary(found), "model": str(path), "words": words})
+    write_summary(
+        out, "improve", config, options, watch, digest, {**summary(found), "model": str(path), "words": words}
+    )
     for file in sorted(p.name for p in out.iterdir() if p.is_file()):
         console.print(f"  {os.path.relpath(out / file)}", highlight=False, soft_wrap=True)
 
@@ -84,7 +91,9 @@ def improvement_text(found: Improvement, robot: Robot) -> list[str]:
     first, last = found.ladder[0], found.ladder[-1]
     lines = []
     if len(found.ladder) == 1:
-        lines.append(f"Nothing was added: {found.stopped}. Error {first.error_heldout:.3f}, noise floor {found.noise_floor:.3f}.")
+        lines.append(
+            f"Nothing was added: {found.stopped}. Error {first.error_heldout:.3f}, noise floor {found.noise_floor:.3f}."
+        )
     else:
         added = "; ".join(told(t, robot) for t in found.terms[-sum(len(r.added) for r in found.ladder) :])
         lines.append(f"Added: {added}.")
@@ -104,9 +113,13 @@ def write_calibration(problem: OpenLoop, residual: Array, path: Path) -> None:
     raw = [problem.raw_blocks(k, residual) for k in range(len(problem.trials))]
     square = np.concatenate([r**2 for r in raw]).mean(axis=0) - problem.scale.noise**2 / problem.block
     entries = {
-        s.name: {"deviation": float(np.sqrt(max(v, 0.0))), "unit": s.unit} for s, v in zip(problem.robot.sensors, square, strict=True)
+        s.name: {"deviation": float(np.sqrt(max(v, 0.0))), "unit": s.unit}
+        for s, v in zip(problem.robot.sensors, square, strict=True)
     }
-    path.write_text("# What the model beside this file leaves on an untouched robot.\n" + yaml.safe_dump({"unmodelled": entries}), encoding="utf-8")
+    path.write_text(
+        "# What the model beside this file leaves on an untouched robot.\n" + yaml.safe_dump({"unmodelled": entries}),
+        encoding="utf-8",
+    )
 
 
 def summary(found: Improvement) -> dict[str, Any]:
@@ -115,7 +128,13 @@ def summary(found: Improvement) -> dict[str, Any]:
     def rung(index: int) -> dict[str, Any]:
         r = found.ladder[index]
         first = hypothesis_list(r.added)[0] if r.added else {"effect": None, "target": None, "values": {}}
-        return {**first, "added": hypothesis_list(r.added), "error_fit": r.error_fit, "error_heldout": r.error_heldout, "interval": list(r.interval)}
+        return {
+            **first,
+            "added": hypothesis_list(r.added),
+            "error_fit": r.error_fit,
+            "error_heldout": r.error_heldout,
+            "interval": list(r.interval),
+        }
 
     return {
         "ladder": [rung(k) for k in range(len(found.ladder))],
@@ -123,7 +142,13 @@ def summary(found: Improvement) -> dict[str, Any]:
         "noise_floor_source": found.floor_source,
         "model_terms": hypothesis_list(found.terms),
         "parameters": [
-            {**hypothesis_list(found.terms)[p.term], "name": p.name, "value": p.value, "interval": [p.low, p.high], "flag": p.flag}
+            {
+                **hypothesis_list(found.terms)[p.term],
+                "name": p.name,
+                "value": p.value,
+                "interval": [p.low, p.high],
+                "flag": p.flag,
+            }
             for p in found.parameters
         ],
         "stopped": found.stopped,
@@ -143,6 +168,10 @@ def _print(console: Console, found: Improvement, words: Sequence[str], robot: Ro
     console.print(table)
     for p in found.parameters:
         interval = f"[{p.low:.4g}, {p.high:.4g}]"
-        console.print(f"  {told(found.terms[p.term]).split(' (')[0]}: {p.name} = {p.value:.4g}, 95 % {interval} {p.flag}", highlight=False, markup=False)
+        console.print(
+            f"  {told(found.terms[p.term]).split(' (')[0]}: {p.name} = {p.value:.4g}, 95 % {interval} {p.flag}",
+            highlight=False,
+            markup=False,
+        )
     for paragraph in words:
         console.print(paragraph, highlight=False)

@@ -55,7 +55,8 @@ def load(config: Config) -> Measurements:
             raise LogError(f"{file}: no hardware trial in it; expected a log of task=trial or task=import")
         held = [setup_of(Excitation(**e)) for e in json.loads(run.metadata.get("trials", "[]"))]
         for t in found:
-            setup = held[t.index] if t.index < len(held) else ()
+            # What an import says about a trial (a gain, a payload) comes on top of how it was held.
+            setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
             trials.append(MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup))
     if config.model is None:
         source = robot.name if robot.name in BUILT_IN else robot
@@ -107,7 +108,7 @@ def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
             raise LogError(
                 f"{where}: {sensor.name} is not a number in {int(bad.sum())} rows, first at {log.times_s[row]:g} s"
             )
-    if not np.isfinite(log.commands).all():
+    if np.isnan(log.commands).any(axis=1).all() or np.isinf(log.commands).any():
         raise LogError(f"{where}: commands hold values that are not numbers")
     step = np.diff(log.times_s)
     if abs(float(np.median(step)) - robot.time_step_s) > 1e-6 or float(np.ptp(step)) > 1e-6:

@@ -17,7 +17,7 @@ from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recovery.repair import network
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.wiring import build_robot, evaluator_of
 
 
@@ -52,7 +52,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     trials = after[0][-1][0]
     offset = before[0][-1][0]
     _figure(before[0], [(n + offset, d) for n, d in after[0]], config.scenario.title, out / "online.html")
-    write_summary(out, "online", config, options, watch, "", {
+    write_summary(out, "online", config, options, watch, digest_of((before[0], after[0])), {
         "scenario": config.scenario.number,
         "distance_m": {"intact": intact, "after": at_change, "end": end},
         "body_trials_after_the_change": trials,

@@ -42,7 +42,9 @@ def write_pictures(problem: OpenLoop, model: Hypothesis, path: Path, task: str) 
     write_rrd(run, path)
 
 
-def overlay_section(problem: OpenLoop, residual: Array, before: Hypothesis, after: Hypothesis | None, most: int = 6) -> Section:
+def overlay_section(
+    problem: OpenLoop, residual: Array, before: Hypothesis, after: Hypothesis | None, most: int = 6
+) -> Section:
     """The trials and channels with most to see."""
     energy = []
     for k in range(len(problem.trials)):
@@ -67,7 +69,10 @@ def overlay_section(problem: OpenLoop, residual: Array, before: Hypothesis, afte
                 None if better is None else better[k][:, c],
             )
         )
-    caption = "The channels with most to explain, each in the trial where it shows most. Left what was measured and said, right the difference."
+    caption = (
+        "The channels with most to explain, each in the trial where it shows most. "
+        "Left what was measured and said, right the difference."
+    )
     return Section("Measured and predicted", caption, figures.overlays(items))
 
 
@@ -77,9 +82,14 @@ def heat_section(problem: OpenLoop, residual: Array) -> Section:
     np.add.at(cells, (problem.segment_of, problem.channel_of), residual**2)
     np.add.at(counts, (problem.segment_of, problem.channel_of), 1.0)
     heat = np.sqrt(np.divide(cells, counts, out=np.zeros_like(cells), where=counts > 0))
-    names = [f"{problem.trials[k]} {s.rsplit('@', 1)[1]}" for k, s in zip(problem.trial_of_segment, problem.segments, strict=True)]
+    names = [
+        f"{problem.trials[k]} {s.rsplit('@', 1)[1]}"
+        for k, s in zip(problem.trial_of_segment, problem.segments, strict=True)
+    ]
     unique = [f"{n}{' ' * names[:i].count(n)}" for i, n in enumerate(names)]
-    caption = "Each cell is the error of one channel in one window of time. Pale is noise, red is what the model gets wrong."
+    caption = (
+        "Each cell is the error of one channel in one window of time. Pale is noise, red is what the model gets wrong."
+    )
     return Section("Where it fails, channel by time", caption, figures.heat_map(heat, unique, problem.channels))
 
 
@@ -97,14 +107,22 @@ def signature_section(problem: OpenLoop, residual: Array, most: int = 3) -> Sect
         around = [circumstances(problem, k) for k in range(len(problem.trials))]
         y = np.concatenate(raw)
         columns: list[tuple[str, Array, Array]] = []
-        for label, key in (("position (rad)", "position"), ("commanded speed (rad/s)", "speed"), ("command (rad)", "command"), ("load (N.m)", "load")):
+        for label, key in (
+            ("position (rad)", "position"),
+            ("commanded speed (rad/s)", "speed"),
+            ("command (rad)", "command"),
+            ("load (N.m)", "load"),
+        ):
             x = np.concatenate([getattr(a, key)[:, j] for a in around])
             if np.isfinite(x).all():
                 columns.append((label, x, y))
         panels.append((plain(problem.channels[i]), columns))
     if not panels:
         return None
-    caption = "A law that is missing draws a line here: friction a step at zero speed, a spring a slope over position, play a gap at zero load."
+    caption = (
+        "A law that is missing draws a line here: friction a step at zero speed, a spring a slope over position, "
+        "play a gap at zero load."
+    )
     return Section("Residual against what the joint did", caption, figures.signatures(panels))
 
 
@@ -148,9 +166,20 @@ def compare_page(problem: OpenLoop, measured: Measurements, found: Comparison, r
     signature = signature_section(problem, residual)
     if signature is not None:
         page.sections.append(signature)
-    rows = [[plain(c.name), f"{c.rmse:.4g} {c.unit}", f"{c.normalised:.2f}", c.worst_trial, f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"] for c in found.channels]
+    rows = [
+        [
+            plain(c.name),
+            f"{c.rmse:.4g} {c.unit}",
+            f"{c.normalised:.2f}",
+            c.worst_trial,
+            f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s",
+        ]
+        for c in found.channels
+    ]
     table = Table(["channel", "rmse", "error", "worst trial", "when"], rows, (1, 2))
-    page.sections.append(Section("By channel", "Root mean square in the channel's own unit, and in standard deviations.", None, table))
+    page.sections.append(
+        Section("By channel", "Root mean square in the channel's own unit, and in standard deviations.", None, table)
+    )
     return page
 
 
@@ -172,7 +201,10 @@ def explain_page(problem: OpenLoop, measured: Measurements, found: Explanation, 
     )
     if found.candidates:
         tied = set(best.tied_with) if best else set()
-        kinds = ["best" if best and c is best else "tied" if c.name in tied else "earned" if c.earned else "not" for c in found.candidates]
+        kinds = [
+            "best" if best and c is best else "tied" if c.name in tied else "earned" if c.earned else "not"
+            for c in found.candidates
+        ]
         names = [plain(c.name.replace("@", " at ")) for c in found.candidates]
         rows = [
             [str(c.rank), told(c.hypothesis[-1], problem.robot), f"{c.error_heldout:.3f}", f"{c.gain:.1%}",
@@ -184,8 +216,12 @@ def explain_page(problem: OpenLoop, measured: Measurements, found: Explanation, 
             Section(
                 "Candidate effects, ranked",
                 "Share of the squared residual that each takes off data it was not fitted to, with its 95 % interval.",
-                figures.ranking(names, [c.gain for c in found.candidates], [c.interval for c in found.candidates], kinds),
-                Table(["rank", "effect", "error held out", "gain", "95 % interval", "judgement"], rows, (0, 2, 3, 4), lead),
+                figures.ranking(
+                    names, [c.gain for c in found.candidates], [c.interval for c in found.candidates], kinds
+                ),
+                Table(
+                    ["rank", "effect", "error held out", "gain", "95 % interval", "judgement"], rows, (0, 2, 3, 4), lead
+                ),
             )
         )
     after = None if best is None else (*found.before, *best.hypothesis)
@@ -197,10 +233,15 @@ def explain_page(problem: OpenLoop, measured: Measurements, found: Explanation, 
     return page
 
 
-def improve_page(problem: OpenLoop, measured: Measurements, found: Improvement, words: Sequence[str], base: Array) -> Page:
+def improve_page(
+    problem: OpenLoop, measured: Measurements, found: Improvement, words: Sequence[str], base: Array
+) -> Page:
     """The page of improve."""
     first, last = found.ladder[0], found.ladder[-1]
-    names = ["model as it was", *(" + ".join(plain(f"{t.effect} at {t.target}") for t in r.added) for r in found.ladder[1:])]
+    names = [
+        "model as it was",
+        *(" + ".join(plain(f"{t.effect} at {t.target}") for t in r.added) for r in found.ladder[1:]),
+    ]
     page = Page(
         f"Improve: {problem.robot.name}",
         f"{len(problem.trials)} trials, {', '.join(p.name for p in measured.files)}; model: {_model(measured.model)}",
@@ -219,10 +260,21 @@ def improve_page(problem: OpenLoop, measured: Measurements, found: Improvement, 
         Section(
             "The ladder",
             "Error of each model on data that it was not fitted to. Everything is fitted anew at each step.",
-            figures.ladder(steps, [r.error_fit for r in found.ladder], [r.error_heldout for r in found.ladder], found.noise_floor),
+            figures.ladder(
+                steps, [r.error_fit for r in found.ladder], [r.error_heldout for r in found.ladder], found.noise_floor
+            ),
         )
     )
-    rows = [[told(found.terms[p.term]).split(" (")[0], plain(p.name), f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}", p.flag] for p in found.parameters]
+    rows = [
+        [
+            told(found.terms[p.term]).split(" (")[0],
+            plain(p.name),
+            f"{p.value:.4g}",
+            f"{p.low:.4g} to {p.high:.4g}",
+            p.flag,
+        ]
+        for p in found.parameters
+    ]
     table = Table(["effect", "parameter", "value", "95 % interval", "note"], rows, (2, 3))
     page.sections.append(Section("The model", "What was added, with the interval of each value.", None, table))
     page.sections.append(overlay_section(problem, base, measured.model, found.terms))

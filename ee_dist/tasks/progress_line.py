@@ -34,4 +34,6 @@ class SearchProgress:
         if self.status:
             spent = now - self.stage_began
             left = spent * (1 - share) / share if share > 0 else 0.0
-            self.status.update(f"{what} {share:.0%}, about {left:.0f} s left of this stage, {now - self.began:.0f} s so far")
+            self.status.update(
+                f"{what} {share:.0%}, about {left:.0f} s left of this stage, {now - self.began:.0f} s so far"
+            )

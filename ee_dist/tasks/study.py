@@ -17,7 +17,7 @@ from scipy.stats import mannwhitneyu
 
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.outcome import RESTORED
-from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.viewing.study_figures import write_figures
 
 
@@ -48,7 +48,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     write_figures(runs, out / "figures.html")
     _print(console, rows)
     totals = total(rows)
-    write_summary(out, "study", config, options, watch, "", {"runs": len(rows), "totals": totals})
+    write_summary(out, "study", config, options, watch, digest_of(rows), {"runs": len(rows), "totals": totals})
     for name in ("study.csv", "study.md", "figures.html"):
         console.print(f"  {out / name}", highlight=False, soft_wrap=True)
 

@@ -43,6 +43,11 @@ def config_digest(config: Config, options: Any) -> str:
     return hashlib.sha256(OmegaConf.to_yaml(tree, sort_keys=True).encode()).hexdigest()
 
 
+def digest_of(result: Any) -> str:
+    """Digest of a result that is plain data."""
+    return hashlib.sha256(repr(result).encode()).hexdigest()
+
+
 class Stopwatch:
     """Wall and processor time (s) since it was made, children included."""
 

@@ -26,7 +26,7 @@ from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.seal import FILE, sealed
-from ee_dist.tasks.summary import Stopwatch, config_digest, package_version, write_summary
+from ee_dist.tasks.summary import Stopwatch, package_version, write_summary
 from ee_dist.tasks.wiring import build_robot, engine_maker
 from ee_dist.trials.excitation import Excitation, parse
 from ee_dist.trials.log import SensorLog

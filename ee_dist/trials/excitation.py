@@ -1,4 +1,4 @@
-"""What to make a robot do so that its faults show: excitations as data, each a series of commands or a controller once it knows the robot.
+"""What to make a robot do so that its faults show: excitations as data, each commands or a controller once it knows it.
 
 Amplitudes are shares of half a joint's range, so that an excitation fits any robot and stays within its limits. All
 begin at the middle of the range and rise over the first half second: a robot at rest is not kicked.
@@ -24,6 +24,7 @@ KINDS = {
     "slow_sines": "one joint after the other: what moves is what is tested",
     "steps": "held random poses: friction, play and drive errors at rest, and the rise between them",
     "fast_sines": "all joints, small and quick: inertia, delay, speed limits",
+    "sway": "all joints together, slowly and a little, feet planted: how weight rests on the legs",
     "gait": "the network controller walks: contacts, wiring, sensors in the loop",
 }
 
@@ -109,6 +110,11 @@ def _multisine(t: Array, motors: int, rng: np.random.Generator) -> Array:
     return total
 
 
+def _sway(t: Array, motors: int, rng: np.random.Generator) -> Array:
+    f = rng.uniform(0.25, 0.6, motors)
+    return np.sin(2 * math.pi * f * t[:, None] + rng.uniform(0, 2 * math.pi, motors))
+
+
 def _fast_sines(t: Array, motors: int, rng: np.random.Generator) -> Array:
     f = rng.uniform(1.5, 3.0, motors)
     return np.sin(2 * math.pi * f * t[:, None] + rng.uniform(0, 2 * math.pi, motors))
@@ -134,6 +140,7 @@ _SHAPES = {
     "rest": _rest,
     "multisine": _multisine,
     "fast_sines": _fast_sines,
+    "sway": _sway,
     "slow_sines": _slow_sines,
     "steps": _steps,
 }
@@ -166,11 +173,11 @@ def gait_weights(robot: Robot, amplitude: float, seed: int) -> tuple[float, ...]
 
 STANDARD = (
     Excitation("multisine", 4.2, 0.8, 1, "stand"),
-    Excitation("steps", 4.2, 0.9, 2, "stand"),
-    Excitation("gait", 2.4, 0.7, 3, "stand"),
-    Excitation("multisine", 1.8, 0.5, 4),
-    Excitation("steps", 1.8, 0.35, 5),
-    Excitation("fast_sines", 1.2, 0.3, 6),
-    Excitation("gait", 1.8, 0.35, 7),
+    Excitation("steps", 3.6, 0.9, 2, "stand"),
+    Excitation("gait", 1.8, 0.7, 3, "stand"),
+    Excitation("sway", 4.2, 0.1, 1),
+    Excitation("sway", 3.0, 0.14, 8),
+    Excitation("multisine", 1.8, 0.25, 4),
+    Excitation("gait", 1.8, 0.2, 7),
 )
 """What ``task=trial`` runs unless told otherwise."""

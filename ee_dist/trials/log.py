@@ -69,7 +69,8 @@ class SensorLog:
     @property
     def finite(self) -> bool:
         """Whether every value is a number: a model can be too stiff for its time step."""
-        return bool(np.isfinite(self.sensors).all() and np.isfinite(self.commands).all())
+        known = (self.sensors, self.commands, self.base_pose, self.joints)
+        return all(bool(np.isfinite(values).all()) for values in known if values is not None)
 
     def head(self, steps: int) -> SensorLog:
         """The first ``steps`` rows."""

@@ -13,7 +13,8 @@ from plotly.offline import get_plotlyjs
 _CSS = """
 :root { --ink: #1d2733; --soft: #5d6b7a; --line: #dfe5ec; --paper: #ffffff; --wash: #f4f6f9; --accent: #1769aa; }
 * { box-sizing: border-box; }
-body { margin: 0; background: var(--wash); color: var(--ink); font: 15px/1.55 "Inter", "Segoe UI", "Helvetica Neue", Arial, sans-serif; }
+body { margin: 0; background: var(--wash); color: var(--ink);
+  font: 15px/1.55 "Inter", "Segoe UI", "Helvetica Neue", Arial, sans-serif; }
 main { max-width: 1180px; margin: 0 auto; padding: 32px 24px 64px; }
 h1 { font-size: 26px; margin: 0 0 4px; letter-spacing: -0.01em; }
 h2 { font-size: 18px; margin: 0 0 4px; }
@@ -78,7 +79,9 @@ def write_page(page: Page, path: str | Path) -> Path:
     words = "".join(f"<p>{html.escape(w)}</p>" for w in page.words)
     body.append(f"<section class='verdict {page.tone}'>{words}</section>")
     if page.tiles:
-        tiles = "".join(f"<div class='tile'><b>{html.escape(n)}</b><span>{html.escape(w)}</span></div>" for n, w in page.tiles)
+        tiles = "".join(
+            f"<div class='tile'><b>{html.escape(n)}</b><span>{html.escape(w)}</span></div>" for n, w in page.tiles
+        )
         body.append(f"<div class='tiles'>{tiles}</div>")
     for k, section in enumerate(page.sections):
         parts = [f"<h2>{html.escape(section.heading)}</h2>"]

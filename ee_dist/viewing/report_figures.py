@@ -88,7 +88,9 @@ def heat_map(heat: Array, segments: Sequence[str], channels: Sequence[str], floo
     return figure
 
 
-def ranking(names: Sequence[str], gains: Sequence[float], intervals: Sequence[tuple[float, float]], kinds: Sequence[str]) -> go.Figure:
+def ranking(
+    names: Sequence[str], gains: Sequence[float], intervals: Sequence[tuple[float, float]], kinds: Sequence[str]
+) -> go.Figure:
     """Gain on held-out data with its interval, in percent. ``kinds``: best, tied, earned or not."""
     colours = {"best": "#1769aa", "tied": "#67a9d8", "earned": "#a9b8c6", "not": "#dde3e9"}
     low = [max(0.0, 100 * (g - i[0])) for g, i in zip(gains, intervals, strict=True)]
@@ -99,7 +101,14 @@ def ranking(names: Sequence[str], gains: Sequence[float], intervals: Sequence[tu
             y=list(names),
             orientation="h",
             marker_color=[colours[k] for k in kinds],
-            error_x={"type": "data", "array": high, "arrayminus": low, "color": "#5d6b7a", "thickness": 1.2, "width": 4},
+            error_x={
+                "type": "data",
+                "array": high,
+                "arrayminus": low,
+                "color": "#5d6b7a",
+                "thickness": 1.2,
+                "width": 4,
+            },
             hovertemplate="%{y}: %{x:.1f} %<extra></extra>",
         )
     )
@@ -116,7 +125,9 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
     figure = go.Figure()
     figure.add_scatter(x=list(names), y=list(heldout), name="held out", mode="lines+markers+text", line={"color": MEASURED, "width": 3},
                        marker={"size": 10}, text=[f"{v:.2f}" for v in heldout], textposition="top center")  # fmt: skip
-    figure.add_scatter(x=list(names), y=list(fit), name="fitted", mode="lines+markers", line={"color": PREDICTED, "dash": "dot"})
+    figure.add_scatter(
+        x=list(names), y=list(fit), name="fitted", mode="lines+markers", line={"color": PREDICTED, "dash": "dot"}
+    )
     figure.add_hline(y=floor, line={"color": IMPROVED, "dash": "dash"}, annotation_text=f"noise floor {floor:.2f}",
                      annotation_position="bottom left")  # fmt: skip
     _styled(figure, 340)

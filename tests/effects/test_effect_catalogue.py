@@ -6,7 +6,6 @@ import inspect
 import math
 import pickle
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -44,12 +43,12 @@ def neutral(effect: Effect, target: str) -> Term:
 
 
 @pytest.fixture(scope="module")
-def logs(pybullet: PyBulletEngine) -> Iterator[dict[Term, SensorLog]]:
+def logs(pybullet: PyBulletEngine) -> dict[Term, SensorLog]:
     """The quadruped walking on one network under every corner of every effect at every target, in one go."""
     robot = quadruped()
     terms = [t for e in CATALOGUE.values() for target in e.targets(robot) for t in corners(e, robot, target)]
     found = pybullet.rollout([Rollout(apply(robot, (t,)), Network(WEIGHTS), STEPS, 1, pose=True) for t in terms])
-    yield dict(zip(terms, found, strict=True))
+    return dict(zip(terms, found, strict=True))
 
 
 @pytest.fixture(scope="module")

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 from effect_robots import MASS_KG, Bench, lever, slider
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ee_dist.effects import Term, apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drive import DrivePath
 from ee_dist.engines.drivers import Commands
-from ee_dist.robots.inertia import felt_inertia, mass_matrix, steady_inertia
+from ee_dist.robots.inertia import felt_inertia, mass_matrices, mass_matrix, steady_inertia
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.trials.log import Array
@@ -75,6 +75,7 @@ def test_a_standing_robot_with_dry_joints_stands_still(bench: Bench) -> None:
 POSITIVE = st.floats(0.0, 20.0)
 
 
+@settings(deadline=None, max_examples=60)
 @given(
     coulomb=POSITIVE,
     viscous=st.floats(0.0, 1e4),
@@ -105,6 +106,7 @@ def test_friction_alone_never_speeds_a_joint_up_nor_turns_it_round(
         assert qd.item() * before >= -1e-12
 
 
+@settings(deadline=None, max_examples=40)
 @given(push=st.floats(-30.0, 30.0), coulomb=st.floats(0.1, 20.0), heavier=st.floats(1.0, 50.0))
 def test_a_joint_that_is_heavier_than_it_seems_still_stops_and_holds(
     push: float, coulomb: float, heavier: float
@@ -132,16 +134,14 @@ def test_the_inertia_of_one_joint_on_a_bolted_base_is_exact() -> None:
     assert steady_inertia(lever(rotor_inertia=0.1)) == pytest.approx([MASS_KG * 0.09 + 0.1])
 
 
-@pytest.mark.parametrize("rotor_on_part", [False, True])
-def test_no_combination_of_joints_is_lighter_than_steady_inertia(rotor_on_part: bool) -> None:
+def test_no_combination_of_joints_is_lighter_than_steady_inertia() -> None:
     robot, rng = quadruped(), np.random.default_rng(5)
     d: Array = steady_inertia(robot)
     assert (d <= felt_inertia(robot)).all()
-    for _ in range(10):
-        pose = {j: rng.uniform(-0.8, 0.8) for j in robot.motor_names}
-        inverse = np.linalg.inv(mass_matrix(robot, pose, rotor_on_part))[6:, 6:]
-        heaviest = np.linalg.eigvalsh(np.sqrt(d)[:, None] * inverse * np.sqrt(d)).max()
-        assert heaviest < 4 / 3, "beyond this, friction on all joints at once would throw them about"
+    for matrix in mass_matrices(robot, rng.uniform(-0.8, 0.8, (10, 8))).reshape(-1, 14, 14):
+        inverse = np.linalg.inv(matrix)[6:, 6:]
+        largest = np.linalg.eigvalsh(np.sqrt(d)[:, None] * inverse * np.sqrt(d)).max()
+        assert largest < 4 / 3, "beyond this, friction on all joints at once would throw them about"
 
 
 def test_a_part_that_hangs_on_a_joint_listed_later_counts_all_the_same() -> None:

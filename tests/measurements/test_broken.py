@@ -102,11 +102,20 @@ def test_files_of_another_kind(tmp_path: Path, name: str, content: bytes, messag
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"sensors": {"position": {"column": "position_m", "unit": "deg"}}}, "unit 'deg' is a unit of angle; expected one of length"),
+        (
+            {"sensors": {"position": {"column": "position_m", "unit": "deg"}}},
+            "unit 'deg' is a unit of angle; expected one of length",
+        ),
         ({"sensors": {"position": {"column": "position_m", "unit": "metre"}}}, "no unit 'metre'"),
         ({"time": {"column": "t", "unit": "m"}}, "unit 'm' is a unit of length; expected one of time"),
-        ({"sensors": {"positoin": {"column": "position_m", "unit": "m"}}}, "linear_stage has no 'positoin'; did you mean position"),
-        ({"commands": {"carrige": {"column": "r", "unit": "m"}}}, "commands: linear_stage has no 'carrige'; did you mean carriage"),
+        (
+            {"sensors": {"positoin": {"column": "position_m", "unit": "m"}}},
+            "linear_stage has no 'positoin'; did you mean position",
+        ),
+        (
+            {"commands": {"carrige": {"column": "r", "unit": "m"}}},
+            "commands: linear_stage has no 'carrige'; did you mean carriage",
+        ),
         ({"sensors": {"position": {"column": "position_m", "unt": "m"}}}, "unknown key 'unt'; did you mean unit"),
         ({"sensors": {"position": {"unit": "m"}}}, "missing key 'column'"),
         ({"sensors": {"position": {"column": "position_m", "scale": "two"}}}, "scale: cannot be 'two'"),

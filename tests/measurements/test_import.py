@@ -16,7 +16,7 @@ from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
 STAGE = linear_stage()
-PENDULUM = servo_pendulum()
+PENDULUM = servo_pendulum(time_step_s=0.002)
 
 
 def stage_mapping(**changes: object) -> Mapping:

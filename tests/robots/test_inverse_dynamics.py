@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ee_dist.effects.catalogue import apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.one_joint import OneJointEngine, fits
 from ee_dist.engines.pybullet.engine import PyBulletEngine
-from ee_dist.effects.catalogue import apply, term
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.linear_stage import linear_stage
@@ -60,7 +60,9 @@ def test_what_it_cannot_do() -> None:
         joint_torques(replace(robot, drives=robot.drives[1:]), *(np.zeros((1, 2)),) * 3)
 
 
-@pytest.mark.parametrize("robot", [servo_pendulum(viscous=0.005).with_drive("servo", coulomb=0.01), linear_stage(viscous=200.0)])
+@pytest.mark.parametrize(
+    "robot", [servo_pendulum(viscous=0.005).with_drive("servo", coulomb=0.01), linear_stage(viscous=200.0)]
+)
 def test_three_engines_agree_on_one_joint(robot) -> None:  # type: ignore[no-untyped-def]
     t = np.arange(800) * robot.time_step_s
     commands = 0.1 * np.sin(5 * t)[:, None]

@@ -153,7 +153,10 @@ def test_broken_xml_names_the_line(tmp_path: Path) -> None:
         ("urdf: ARM\ndrives: {elbow: {kd: 1}}", "elbow: expected at least 'kp'"),
         ("urdf: ARM\ndrives: {elbow: {kp: strong}}", "elbow: kp: expected a number, not 'strong'"),
         ("urdf: ARM\ndrives: {elbow: {kp: 1, damping: 2}}", "unknown key 'damping'"),
-        ("urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: position, target: turn}]", "no driven joint named 'turn'"),
+        (
+            "urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: position, target: turn}]",
+            "no driven joint named 'turn'",
+        ),
         ("urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: smell}]", "no sensor kind 'smell'"),
         ("urdf: ARM\nfree_bas: true", "unknown key 'free_bas'; did you mean free_base"),
         ("urdf: ARM\ntime_step_s: 2", "seconds, not milliseconds"),

@@ -78,50 +78,56 @@ class BulletBodies:
     def __init__(self, engine: PyBulletEngine, placed: list[tuple[World, list[int]]], batch: Sequence[Rollout]) -> None:
         self.engine = engine
         self.worlds = [world for world, _ in placed]
-        self.motors = len(batch[0].model.drives)
         self.touches = len(placed[0][0].touch_links)
-        self.robots: list[tuple[int, int, int, list[int]]] = []
-        """Row, client, body and links of each robot, in the order in which they are asked."""
-        self.columns: dict[int, list[int]] = {}
-        """Motors whose joint is present, of the rows that lost one."""
+        self.robots: list[tuple[int, int, int, list[int], tuple[float, ...]]] = []
+        """Row, client, body and links of each robot, and a zero for each joint that it lost."""
         self.feet: list[tuple[int, int, dict[tuple[int, int], int]]] = []
         self.frame_in_com: dict[int, tuple[tuple[float, ...], tuple[float, ...]] | None] = {}
+        columns: list[list[int]] = []
         for world, rows in placed:
-            columns = [k for k, link in enumerate(world.links) if link >= 0]
-            links = [world.links[k] for k in columns]
-            feet = {}
+            links = [link for link in world.links if link >= 0]
+            lost = (0.0,) * (len(world.links) - len(links))
+            feet: dict[tuple[int, int], int] = {}
             for row, body in zip(rows, world.bodies, strict=True):
-                self.robots.append((row, world.client, body, links))
-                if not links or len(links) < self.motors:
-                    self.columns[row] = columns
+                self.robots.append((row, world.client, body, links, lost))
+                columns.append(sorted(range(len(world.links)), key=lambda k: world.links[k] < 0))
                 feet.update({(body, link): row * self.touches + k for k, link in enumerate(world.touch_links)})
                 root = batch[row].model.root
                 self.frame_in_com[row] = _inverse(root.com_m, world.frames[root.name][1])
             self.feet.append((world.client, world.floor, feet))
-        order = [row for row, *_ in self.robots]
-        self.order: slice | list[int] = slice(None) if order == sorted(order) else list(np.argsort(order))
+        self._order(columns, len(batch[0].model.drives))
+
+    def _order(self, columns: list[list[int]], motors: int) -> None:
+        """Engine order is that of ``robots``, present joints first; None where it is that of the batch."""
+        shape = (len(self.robots), motors)
+        flat = np.array([row * motors + k for (row, *_), ks in zip(self.robots, columns, strict=True) for k in ks])
+        plain = bool((flat == np.arange(flat.size)).all())
+        self.to_engine = None if plain else flat.reshape(shape)
+        self.from_engine = None if plain else np.argsort(flat).reshape(shape)
 
     def read(self, touch: bool, pose: bool, twist: bool) -> Truth:
-        states, columns = p.getJointStates, self.columns
+        states = p.getJointStates
         positions, rates = [], []
-        for row, client, body, links in self.robots:
-            if row in columns:
-                some = states(body, links, client) if links else ()
-                at, speed = [0.0] * self.motors, [0.0] * self.motors
-                for k, state in zip(columns[row], some, strict=True):
-                    at[k], speed[k] = state[:2]
+        for _, client, body, links, lost in self.robots:
+            if links:
+                q, qd, _, _ = zip(*states(body, links, client), strict=True)
+                if lost:
+                    q, qd = q + lost, qd + lost
             else:
-                at, speed, _, _ = zip(*states(body, links, client))
-            positions.append(at)
-            rates.append(speed)
-        truth = Truth(np.array(positions)[self.order], np.array(rates)[self.order])
+                q = qd = lost
+            positions.append(q)
+            rates.append(qd)
+        joints, speeds = np.array(positions), np.array(rates)
+        if self.from_engine is not None:
+            joints, speeds = joints.reshape(-1)[self.from_engine], speeds.reshape(-1)[self.from_engine]
+        truth = Truth(joints, speeds)
         if touch:
             truth.touch = self._touch()
         if pose:
             truth.base_pose = self._poses()
         if twist:
             truth.base_twist = np.empty((len(self.robots), 6))
-            for row, client, body, _ in self.robots:
+            for row, client, body, _, _ in self.robots:
                 truth.base_twist[row] = np.concatenate(p.getBaseVelocity(body, physicsClientId=client))
         return truth
 
@@ -137,7 +143,7 @@ class BulletBodies:
 
     def _poses(self) -> Array:
         out = np.empty((len(self.robots), 7))
-        for row, client, body, _ in self.robots:
+        for row, client, body, _, _ in self.robots:
             position, turn = p.getBasePositionAndOrientation(body, physicsClientId=client)
             shift = self.frame_in_com[row]
             if shift is not None:
@@ -148,13 +154,10 @@ class BulletBodies:
 
     def step(self, torques: Array, force: Array | None) -> None:
         send, simulate, mode = p.setJointMotorControlArray, p.stepSimulation, p.TORQUE_CONTROL
-        rows, columns = torques.tolist(), self.columns
-        for row, client, body, links in self.robots:
-            values = rows[row]
-            if row in columns:
-                values = [values[k] for k in columns[row]]
+        rows = (torques if self.to_engine is None else torques.reshape(-1)[self.to_engine]).tolist()
+        for (row, client, body, links, lost), values in zip(self.robots, rows, strict=True):
             if links:
-                send(body, links, mode, forces=values, physicsClientId=client)
+                send(body, links, mode, forces=values[: len(links)] if lost else values, physicsClientId=client)
             if force is not None and force[row].any():
                 position, _ = p.getBasePositionAndOrientation(body, physicsClientId=client)
                 p.applyExternalForce(body, -1, force[row].tolist(), position, p.WORLD_FRAME, physicsClientId=client)

@@ -1,0 +1,92 @@
+"""The linear stage on real measurements: published errors and parameters by the published definition, found by the ladder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.candidates import candidate, candidates
+from ee_dist.discrepancy.closed_loop import closed_loop
+from ee_dist.discrepancy.fit import Model
+from ee_dist.discrepancy.force_balance import ForceBalance
+from ee_dist.discrepancy.ladder import Rule, climb, fit_everything
+from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.remains import remains
+from ee_dist.effects.catalogue import apply
+from ee_dist.effects.model_file import read_model
+from ee_dist.engines.one_joint import OneJointEngine
+from ee_dist.measurements.importer import import_file
+from ee_dist.measurements.mapping import read_mapping
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT.parent / "shared" / "data" / "emps" / "train.csv"
+EXAMPLES = ROOT / "docs" / "examples"
+
+pytestmark = pytest.mark.skipif(not DATA.is_file(), reason="the EMPS record is not beside the repository")
+MODEL = read_model(EXAMPLES / "emps_model.yaml")
+
+
+@pytest.fixture(scope="module")
+def problem() -> ForceBalance:
+    record, _ = import_file(DATA, read_mapping(EXAMPLES / "emps.yaml"), MODEL.robot)
+    return ForceBalance([MeasuredTrial(record.name, record.log)], MODEL.robot)
+
+
+def fitted(problem: ForceBalance, *added: str):  # type: ignore[no-untyped-def]
+    parts = [candidate(MODEL.robot, t.effect, t.target) for t in MODEL.terms]
+    model = Model((*parts, *(candidate(MODEL.robot, e, "carriage") for e in added)))
+    return fit_everything(problem, model, [0.05 * model.upper, 0.005 * model.upper])
+
+
+@pytest.mark.parametrize(
+    ("added", "error"),
+    [
+        ((), 0.1798),
+        (("coulomb_friction",), 0.0714),
+        (("coulomb_friction", "offset_torque"), 0.0409),
+        (("coulomb_friction", "friction_asymmetry"), 0.0312),
+    ],
+)
+def test_published_errors(problem: ForceBalance, added: tuple[str, ...], error: float) -> None:
+    fit = fitted(problem, *added)
+    assert problem.natural(np.sqrt(fit.energy / len(problem.segment_of))) == pytest.approx(error, abs=1e-4)
+
+
+def test_published_parameters(problem: ForceBalance) -> None:
+    robot = apply(MODEL.robot, fitted(problem, "coulomb_friction", "offset_torque").hypothesis)
+    drive = robot.drives[0]
+    found = (robot.part("carriage").mass_kg, drive.viscous, drive.coulomb, -drive.offset_torque)
+    assert found == pytest.approx((95.11, 203.5, 20.39, -3.165), rel=0.005)
+    d = apply(MODEL.robot, fitted(problem, "coulomb_friction", "friction_asymmetry").hypothesis).drives[0]
+    sided = (d.viscous + d.viscous_asymmetry, d.viscous - d.viscous_asymmetry, d.coulomb + d.friction_asymmetry)
+    assert sided == pytest.approx((166.7, 240.4, 20.14), rel=0.005)
+
+
+def test_the_ladder_finds_them_in_order_and_stops(problem: ForceBalance) -> None:
+    names = ("coulomb_friction", "friction_asymmetry", "offset_torque", "command_delay")
+    rungs = climb(problem, MODEL.terms, [(c,) for c in candidates(MODEL.robot, only=names)], Rule(folds=2))
+    assert [r.added for r in rungs] == ["start", "coulomb_friction@carriage", "friction_asymmetry@carriage", "stopped"]
+    held = [r.error_heldout for r in rungs]
+    assert held[2] < 0.032 < held[1] < 0.072 < held[0]
+    # A delay cannot show in a balance of forces, so it is not even judged.
+    assert "command_delay@carriage" not in {v.name for v in rungs[-1].tried}
+
+
+def test_closed_loop_errors_are_below_the_published(problem: ForceBalance) -> None:
+    robot = apply(MODEL.robot, fitted(problem, "coulomb_friction", "offset_torque").hypothesis)
+    # A third of the record, to be quick; tools/real_data.py runs all of it.
+    trial = MeasuredTrial("first third", problem.measured[0].log.head(8000))
+    (found,) = closed_loop([robot], trial, OneJointEngine())
+    assert found.position < 0.000138
+    assert found.speed < 0.00229
+    assert found.acceleration < 0.086
+    assert found.force < 0.0585
+
+
+def test_what_is_left_repeats_with_position(problem: ForceBalance) -> None:
+    found = remains(problem, fitted(problem, "coulomb_friction", "friction_asymmetry").hypothesis)
+    assert found.rms == pytest.approx(1.67, abs=0.05)
+    assert all(r.repeats > 0.9 for r in found.ripples)
+    assert found.ripples[0].wavelength == pytest.approx(0.0025, rel=0.05)

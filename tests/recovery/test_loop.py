@@ -1,0 +1,159 @@
+"""The loop: who is asked what, in which order, and that it finds a change it can say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from ee_dist.effects import term
+from ee_dist.engines.pybullet.engine import PyBulletEngine
+from ee_dist.evaluation.cache import CachedEvaluator
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.evolution.ga import Budget
+from ee_dist.recording.records import HARDWARE, PREDICTION, GenerationRecord, HypothesisRecord, TrialRecord
+from ee_dist.recovery.diagnosis import Judge, diagnose, prune
+from ee_dist.recovery.loop import Plan, recover
+from ee_dist.recovery.metrics import RollingMean
+from ee_dist.recovery.observer import Observer
+from ee_dist.robots.quadruped import quadruped
+
+ROBOT = quadruped()
+SEED = np.random.SeedSequence(0)
+SMALL = Budget(population=12, generations=2, crossovers=3)
+
+
+class Notes(Observer):
+    def __init__(self) -> None:
+        self.passes: list[tuple[str, int]] = []
+        self.generations: list[GenerationRecord] = []
+        self.said: list[HypothesisRecord] = []
+        self.trials: list[TrialRecord] = []
+
+    def pass_started(self, phase: str, pass_index: int, generations: int) -> None:
+        self.passes.append((phase, pass_index))
+
+    def generation(self, record: GenerationRecord) -> None:
+        self.generations.append(record)
+
+    def hypotheses(self, records: Sequence[HypothesisRecord]) -> None:
+        self.said.extend(records)
+
+    def trial(self, record: TrialRecord) -> None:
+        self.trials.append(record)
+
+
+@pytest.fixture(scope="module")
+def engine():
+    made = PyBulletEngine()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def finished(engine):
+    hidden = (term("part_lost", "upper_rear_left"),)
+    notes = Notes()
+    plan = Plan(repair=SMALL, diagnosis=Budget(population=100, generations=8), compensating_trials=2, steps=120)
+    changed = PhysicalRobot(engine, ROBOT, hidden, SEED)
+    result = recover(
+        ROBOT, PhysicalRobot(engine, ROBOT, (), SEED), changed, RollingMean(), plan,
+        CachedEvaluator(SerialEvaluator(engine)), np.random.SeedSequence(1), notes,
+    )  # fmt: skip
+    return result, notes, changed
+
+
+def test_passes_and_trials_come_in_the_papers_order(finished):
+    result, notes, changed = finished
+    assert notes.passes == [("repair", 0), ("diagnosis", 0), ("repair", 1), ("diagnosis", 1), ("repair", 2)]
+    hardware = [(t.index, t.name) for t in notes.trials if t.source == HARDWARE]
+    assert hardware == [(0, "intact"), (1, "after the change"), (2, "trial 1"), (3, "trial 2")]
+    assert sorted(t.index for t in notes.trials if t.source == PREDICTION) == [0, 1, 2, 3]
+    assert changed.trials == 3, "one right after the change, two compensating"
+    assert len(result.trials_m) == len(result.hypotheses) == 2
+
+
+def test_an_intact_robot_does_what_its_model_says(finished):
+    result, notes, _ = finished
+    measured, predicted = (
+        next(t for t in notes.trials if t.index == 0 and t.source == s) for s in (HARDWARE, PREDICTION)
+    )
+    assert measured.log.sensors.tobytes() == predicted.log.sensors.tobytes()
+    assert result.intact_m == result.expected_m[0]
+
+
+def test_a_lost_leg_is_found_and_the_repair_then_keeps_its_promise(finished):
+    result, _, _ = finished
+    assert result.hypotheses[-1] == (term("part_lost", "upper_rear_left"),)
+    assert result.errors[-1] == 0.0
+    assert result.trials_m[-1] == result.expected_m[-1], (
+        "on the right model a controller does on the body what it did there"
+    )
+
+
+def test_the_final_ten_hypotheses_are_different_and_sorted(finished):
+    _, notes, _ = finished
+    for k in range(2):
+        final = [h for h in notes.said if h.final and h.pass_index == k]
+        assert 1 < len(final) <= 10
+        assert len({h.terms for h in final}) == len(final)
+        assert [h.error for h in final] == sorted(h.error for h in final)
+
+
+def test_repair_fitness_never_falls_within_a_pass(finished):
+    _, notes, _ = finished
+    for k in range(3):
+        best = [g.best for g in notes.generations if g.phase == "repair" and g.pass_index == k]
+        assert best == sorted(best)
+
+
+def judge_of(engine, hidden):
+    controller = _some_controller()
+    log = PhysicalRobot(engine, ROBOT, hidden, SEED).trial(controller, 100)
+    return Judge(ROBOT, [(controller, log)], RollingMean(), SerialEvaluator(engine))
+
+
+def _some_controller():
+    from ee_dist.engines.drivers import Network
+
+    rng = np.random.default_rng(5)
+    return Network(tuple(float(v) for v in np.round(rng.uniform(-1, 1, 68), 2)))
+
+
+def test_the_truth_has_no_error_and_others_have(engine):
+    truth = (term("motor_weak", "knee_front_left", loss=0.5),)
+    errors = judge_of(engine, truth).errors([truth, (), (term("motor_weak", "knee_front_left", loss=0.6),)])
+    assert errors[0] == 0.0
+    assert (errors[1:] > 0).all()
+
+
+def test_pruning_drops_what_explains_nothing_and_keeps_the_rest(engine):
+    truth = (term("part_lost", "upper_rear_left"),)
+    judge = judge_of(engine, truth)
+    idle = (term("joint_jam", "knee_front_left", loss=0.01), *truth)
+    error = float(judge.errors([idle])[0])
+    assert prune(judge, idle, error, 0.1) == (truth, 0.0)
+    needed = (term("motor_weak", "knee_front_left", loss=0.5), *truth)
+    judge = judge_of(engine, needed)
+    assert prune(judge, needed, float(judge.errors([needed])[0]), 0.1) == (needed, 0.0)
+
+
+def test_nothing_broken_is_diagnosed_as_nothing(engine):
+    judge = judge_of(engine, ())
+    notes = Notes()
+    found, _, error = diagnose(judge, [], Budget(population=60, generations=3, crossovers=10), SEED, notes, 0)
+    pruned, error = prune(judge, found, error, 0.1)
+    assert (pruned, error) == ((), 0.0)
+
+
+def test_hardware_hides_its_truth():
+    engine = PyBulletEngine()
+    hidden = (term("motor_weak", "knee_front_left", loss=0.5),)
+    body = PhysicalRobot(engine, ROBOT, hidden, SEED)
+    assert not hasattr(body, "__dict__")
+    public = [getattr(body, name) for name in ("trials",)]
+    assert hidden not in public
+    assert body.reveal() == hidden
+    engine.close()

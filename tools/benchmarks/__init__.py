@@ -1,0 +1,1 @@
+"""The pieces of tools/benchmark.py and tools/scaling.py."""

@@ -1,0 +1,261 @@
+"""Does explain find what is wrong? Hidden effects are drawn over the whole catalogue, tried, explained blind, and scored.
+
+    python tools/blind_benchmark.py --cases 100 --seed 0 --engine mujoco --json blind.json
+
+Every tenth robot is untouched. An effect whose whole mark on the logs is below the noise is said to be too small and is
+left out of the scores. ``--withhold`` takes the drawn effect out of the catalogue: right is then ``unexplained``, or an
+effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``. ``--cross-engine`` tries the
+robot in the other engine, after calibrating the model on an untouched robot there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import numpy as np
+
+from ee_dist.discrepancy.candidates import Candidate, candidates
+from ee_dist.discrepancy.draw import draw
+from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
+from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.engines.contract import Engine, EngineError
+from ee_dist.evaluation.cache import CachedEvaluator
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.robots.model import Robot
+from ee_dist.robots.quadruped_lab import quadruped_lab
+from ee_dist.trials.excitation import STANDARD
+from ee_dist.trials.log import Array
+from ee_dist.trials.noise import with_noise
+
+DETECTABLE = 30.0
+"""Energy (sum of squares in standard deviations) of an effect's mark below which no search over 400 candidates can tell
+it from luck: about 2 ln(435) + 3 standard deviations."""
+
+
+@dataclass
+class Case:
+    """``mark``: energy that the hidden effect adds to the residual. ``ratio``: held-out error over the noise floor."""
+
+    index: int
+    family: str
+    truth: list[str]
+    shown: str
+    mark: float
+    too_small: bool
+    verdict: str = ""
+    named: list[str] = field(default_factory=list)
+    first: bool = False
+    within: bool = False
+    flagged: bool = False
+    ratio: float = float("nan")
+    value_error: float = float("nan")
+    seconds: float = 0.0
+
+
+def engine_of(name: str) -> Engine:
+    if name == "mujoco":
+        from ee_dist.engines.mujoco.engine import MuJoCoEngine
+
+        return MuJoCoEngine(1)
+    from ee_dist.engines.pybullet.engine import PyBulletEngine
+
+    return PyBulletEngine()
+
+
+def measured(engine: Engine, robot: Robot, hidden: Hypothesis, seed: Sequence[int]) -> list[MeasuredTrial]:
+    """The standard trials of a robot with a hidden change, on the floor and on the stand."""
+    out = []
+    for k, excitation in enumerate(STANDARD):
+        held = setup_of(excitation)
+        hardware = PhysicalRobot(engine, robot, (*hidden, *held), np.random.SeedSequence([*seed, k]))
+        driver = driver_of(excitation, robot)
+        log = hardware.trial(driver, excitation.steps(robot))
+        out.append(MeasuredTrial(f"{excitation.kind} {excitation.fixture}", log, driver, held))
+    return out
+
+
+class Bench:
+    """One run of the benchmark."""
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        self.args = args
+        self.robot = with_noise(quadruped_lab(), args.noise)
+        self.inner = engine_of(args.engine)
+        other = {"mujoco": "pybullet", "pybullet": "mujoco"}[args.engine]
+        self.outer = engine_of(other) if args.cross_engine else self.inner
+        self.pool = candidates(self.robot)
+        self.before: Hypothesis = ()
+        self.unmodelled: Array | None = None
+
+    def problem(self, trials: list[MeasuredTrial]) -> OpenLoop:
+        evaluator = CachedEvaluator(SerialEvaluator(self.inner))
+        return OpenLoop(trials, self.robot, evaluator, before=self.before, unmodelled=self.unmodelled)
+
+    def calibrate(self) -> None:
+        """Fit what all joints share to an untouched robot of the other engine, and note what is left by channel."""
+        problem = self.problem(measured(self.outer, self.robot, (), [self.args.seed, 999_999]))
+        shared = [
+            c for c in self.pool if c.effect.family == "world" or c.target in ("", "supply", self.robot.root.name)
+        ]
+        found = improve(problem, shared, (), None, most=3)
+        self.before = found.terms
+        raw = [problem.raw_blocks(k, found.residual) for k in range(len(problem.trials))]
+        left = np.concatenate([r**2 for r in raw]).mean(axis=0) * problem.block - problem.scale.noise**2
+        self.unmodelled = np.sqrt(np.maximum(left, 0.0))
+        print(f"calibrated on an untouched robot: {'; '.join(map(str, self.before)) or 'nothing to add'}", flush=True)
+
+    def case(self, index: int) -> Case:
+        rng = np.random.default_rng([self.args.seed, index])
+        drawn: list[Candidate] = []
+        hidden: Hypothesis = ()
+        if index % 10 != 9 or self.args.two or self.args.withhold:
+            for _ in range(2 if self.args.two else 1):
+                chosen, hidden_term = draw(self.robot, rng)
+                drawn.append(chosen)
+                hidden = (*hidden, hidden_term)
+        began = time.monotonic()
+        trials = measured(self.outer, self.robot, hidden, [self.args.seed, index])
+        problem = self.problem(trials)
+        base, true = problem.residuals([self.before, (*self.before, *hidden)])
+        mark = float(((base - true) ** 2).sum()) if np.isfinite(true).all() else float("inf")
+        names = [c.name for c in drawn]
+        found = Case(
+            index,
+            drawn[0].effect.family if drawn else "untouched",
+            names,
+            "; ".join(map(str, hidden)),
+            mark,
+            bool(drawn) and mark < DETECTABLE,
+        )
+        if self.args.two:
+            self._two(found, problem, names)
+        else:
+            self._one(found, problem, drawn, hidden)
+        found.seconds = time.monotonic() - began
+        return found
+
+    def _one(self, found: Case, problem: OpenLoop, drawn: list[Candidate], hidden: Hypothesis) -> None:
+        pool = self.pool
+        if self.args.withhold:
+            pool = [c for c in pool if c.effect.name != drawn[0].effect.name]
+        x = explain(problem, pool, self.before)
+        found.verdict, found.named, found.flagged = x.verdict, [j.name for j in x.tied], bool(x.left)
+        found.first = bool(found.named) and found.named[:1] == found.truth
+        found.within = bool(set(found.truth) & set(found.named))
+        after = x.best.error_heldout if x.best is not None else x.baseline_error
+        found.ratio = after / x.noise_floor
+        for judged in x.tied:
+            if drawn and judged.name == drawn[0].name and drawn[0].size:
+                at = drawn[0].shares(dict(hidden[0].values))
+                found.value_error = float(abs(judged.u[0] - at[0]))
+
+    def _two(self, found: Case, problem: OpenLoop, names: list[str]) -> None:
+        result = improve(problem, self.pool, self.before, None, most=4)
+        found.named = [f"{t.effect}@{t.target}" if t.target else t.effect for t in result.terms]
+        errors = [r.error_heldout for r in result.ladder]
+        found.within = set(names) <= set(found.named)
+        found.first = found.within and len(found.named) == 2
+        found.verdict = f"{len(found.named)} effects"
+        found.ratio = errors[-1] / result.noise_floor
+        found.flagged = all(b < a for a, b in pairwise(errors))
+
+
+def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
+    """Print the table; return what goes into the JSON."""
+    real = [c for c in cases if c.truth and not c.too_small]
+    untouched = [c for c in cases if not c.truth]
+    small = [c for c in cases if c.too_small]
+
+    def share(values: Sequence[bool]) -> float:
+        return float(np.mean(values)) if values else float("nan")
+
+    groups: dict[str, list[Case]] = defaultdict(list)
+    for c in real:
+        groups[c.family].append(c)
+    print(
+        f"\n{'family':<10}{'cases':>6}{'within ties':>13}{'first':>8}{'value error':>13}{'error/floor':>13}{'<= 1.3':>8}"
+    )
+    for name, some in [*groups.items(), ("all", real)]:
+        values = [c.value_error for c in some if np.isfinite(c.value_error)]
+        ratios = [c.ratio for c in some]
+        print(f"{name:<10}{len(some):>6}{share([c.within for c in some]):>13.0%}{share([c.first for c in some]):>8.0%}"
+              f"{np.median(values) if values else float('nan'):>13.3f}{np.median(ratios) if ratios else float('nan'):>13.2f}"
+              f"{share([r <= 1.3 for r in ratios]):>8.0%}")  # fmt: skip
+    alarms = [c for c in untouched if c.verdict != "nothing_missing"]
+    print(f"untouched: {len(untouched)}, false alarms {len(alarms)}")
+    print(f"too small to detect (mark below {DETECTABLE:g}): {len(small)}: {'; '.join(c.shown for c in small) or '-'}")
+    flagged = share([c.verdict == UNEXPLAINED or (c.verdict == EFFECT and c.flagged) for c in real])
+    if args.withhold:
+        print(f"withheld: unexplained, or an effect with the rest flagged: {flagged:.0%}")
+    if args.two:
+        both, falls = share([c.within for c in real]), share([c.flagged for c in real])
+        print(f"two effects: both found {both:.0%}, ladder falls at each step {falls:.0%}")
+    if not args.withhold:
+        print("missed:")
+        for c in real:
+            if not c.within:
+                print(
+                    f"  {c.index}: {c.shown} -> {c.verdict} {', '.join(c.named)} (mark {c.mark:.0f}, error/floor {c.ratio:.2f})"
+                )
+    return {
+        "settings": {k: v for k, v in vars(args).items() if k != "json"},
+        "within_ties": share([c.within for c in real]),
+        "first": share([c.first for c in real]),
+        "false_alarms": share([c in alarms for c in untouched]),
+        "within_1.3_of_floor": share([c.ratio <= 1.3 for c in real]),
+        "flagged": flagged,
+        "too_small": len(small),
+        "cases": [asdict(c) for c in cases],
+    }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--cases", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--noise", type=float, default=0.02, help="share of each channel's range")
+    parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
+    parser.add_argument("--json", type=Path)
+    for flag in ("withhold", "two", "cross-engine"):
+        parser.add_argument(f"--{flag}", action="store_true")
+    args = parser.parse_args()
+    bench, cases, began = Bench(args), [], time.monotonic()
+    if args.cross_engine:
+        bench.calibrate()
+    for k in range(args.cases):
+        try:
+            case = bench.case(k)
+        except EngineError as problem:
+            print(f"{k + 1:4d}/{args.cases}  skipped: {problem}", flush=True)
+            continue
+        cases.append(case)
+        spent = time.monotonic() - began
+        left = spent / (k + 1) * (args.cases - k - 1)
+        mark = "small" if case.too_small else "first" if case.first else "tied" if case.within else case.verdict
+        print(f"{k + 1:4d}/{args.cases}  {case.shown or 'untouched':<78.78}  {mark:<16} {case.ratio:5.2f} x floor "
+              f"{case.seconds:5.0f} s, {left / 60:.0f} min left", flush=True)  # fmt: skip
+    result = report(cases, args)
+    if args.json:
+        args.json.write_text(json.dumps(result, indent=1, default=str) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
