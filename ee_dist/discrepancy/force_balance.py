@@ -194,7 +194,7 @@ def left_over(robot: Robot, motion: Motion) -> Array:
         context = LawContext({n: np.full(len(q), v) for n, v in law.values}, INSTANT_S)
         context.position, context.speed, context.torque = q[:, k], qd[:, k], torque[:, k]
         torque[rows, k] += find_law(law.name)(context)
-    if Friction.needed(uses):
+    if Friction.rows(p).any():
         inertia = felt_inertia(robot)[None, :]
         friction = Friction(p, uses, inertia, INSTANT_S)
         # The load on a joint is all that its motion needed beyond its own inertia.

@@ -73,6 +73,7 @@ class OpenLoop:
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
         self.block, self.window = block, window
         self._members = members
+        self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}
         self.scale = channel_scale(robot, trials, unmodelled)
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self.trials = tuple(t.name for t in trials)
@@ -90,7 +91,7 @@ class OpenLoop:
         """Standard deviations of block means (blocks, S) and of the log of roughness (windows, S), trial by trial."""
         models = [apply(self.robot, before)]
         models += ensemble(models[0], self._members)
-        pairs = [(k, apply(m, t.setup)) for k, t in enumerate(self.measured) for m in models]
+        pairs = [(k, m) for k in range(len(self.measured)) for m in self._held(models, k)]
         found = self.predictor.digests(pairs)
         tiny = (0.25 * self.scale.scale) ** 2
         self.deviation: list[Array] = []
@@ -155,7 +156,7 @@ class OpenLoop:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
         models = [apply(self.robot, h) for h in hypotheses]
         chosen = list(range(len(self.measured))) if trials is None else list(trials)
-        pairs = [(k, apply(m, self.measured[k].setup)) for k in chosen for m in models]
+        pairs = [(k, m) for k in chosen for m in self._held(models, k)]
         digests = self.predictor.digests(pairs)
         out = np.zeros((len(models), len(self.segment_of)))
         for place, k in enumerate(chosen):
@@ -166,6 +167,20 @@ class OpenLoop:
                 parts.append(self._command_residuals(trial, models))
             out[:, self.slices[k]] = np.concatenate(parts, axis=1)
         return out
+
+    def _held(self, models: Sequence[Robot], trial: int) -> list[Robot]:
+        """The models as they are held in a trial; trials held alike share them, for a robot's digest is not free."""
+        setup = self.measured[trial].setup
+        if not setup:
+            return list(models)
+        known = self._setups.setdefault(setup, {})
+        for m in models:
+            if id(m) not in known:
+                known[id(m)] = (m, apply(m, setup))
+        held = [known[id(m)][1] for m in models]
+        if len(known) > 2000:
+            known.clear()
+        return held
 
     def _compare(self, trial: int, predicted: Digest) -> Array:
         measured = self._data[trial]

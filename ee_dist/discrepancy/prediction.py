@@ -104,12 +104,12 @@ def wired_commands(trial: MeasuredTrial, model: Robot) -> Commands:
     return Commands(np.ascontiguousarray(planned[: len(trial.log)][:, list(model.wiring.source)]))
 
 
-def rollout_of(trial: MeasuredTrial, model: Robot) -> Rollout:
-    """The physics of a model on the trial's own commands, with clean sensors."""
+def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) -> Rollout:
+    """The physics of a model on the trial's own commands, with clean sensors (``bare``, if it is at hand already)."""
     commands, enabled = released(wired_commands(trial, model).values)
     start = start_of(trial.log, model)
     return Rollout(
-        clean(model), Commands(commands), len(trial.log), start=start, supply_v=trial.log.supply_v, enabled=enabled
+        bare or clean(model), Commands(commands), len(trial.log), start=start, supply_v=trial.log.supply_v, enabled=enabled
     )
 
 
@@ -127,9 +127,12 @@ class Predictor:
         as_declared = {id(m): self._as_declared(m) for _, m in pairs}
         plain = [as_declared[id(model)] for _, model in pairs]
         jobs = []
+        bare: dict[int, Robot] = {}
         for (k, model), simple in zip(pairs, plain, strict=True):
+            if id(model) not in bare:
+                bare[id(model)] = clean(model)
             reduction = ToDigest(self.block, self.window) if simple else ToSensors()
-            jobs.append(Job(rollout_of(self.trials[k], model), reduction))
+            jobs.append(Job(rollout_of(self.trials[k], model, bare[id(model)]), reduction))
         found = self.evaluator.evaluate(jobs)
         out: list[Digest] = list(found)
         by_trial: dict[int, list[int]] = {}

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ee_dist.discrepancy.measured import driver_of
+from ee_dist.discrepancy.measured import driver_of, setup_of
 from ee_dist.discrepancy.prediction import ToSensors, clean, report
 from ee_dist.discrepancy.scale import channel_scale
 from ee_dist.effects.catalogue import Hypothesis, apply
@@ -21,21 +21,26 @@ from ee_dist.trials.log import Array
 
 LIBRARY = (
     Excitation("rest", 2.0),
-    Excitation("multisine", 4.0, 0.3, 11),
-    Excitation("multisine", 4.0, 0.8, 12),
-    Excitation("fast_sines", 3.0, 0.15, 13),
-    Excitation("fast_sines", 3.0, 0.4, 14),
-    Excitation("steps", 4.0, 0.25, 15),
-    Excitation("steps", 4.0, 0.6, 16),
-    Excitation("slow_sines", 4.8, 0.9, 17),
-    Excitation("gait", 3.0, 0.5, 18),
+    Excitation("sway", 6.0, 0.1, 10),
+    Excitation("multisine", 3.0, 0.3, 11),
+    Excitation("multisine", 4.0, 1.0, 12, "stand"),
+    Excitation("fast_sines", 1.8, 0.15, 13),
+    Excitation("fast_sines", 3.0, 0.4, 14, "stand"),
+    Excitation("steps", 1.8, 0.25, 15),
+    Excitation("steps", 4.0, 0.6, 16, "stand"),
+    Excitation("slow_sines", 9.6, 1.0, 17, "stand"),
+    Excitation("gait", 1.8, 0.5, 18),
 )
+
+
+ENOUGH = 4.0
+"""Standard deviations from which a trial is expected to tell two explanations apart."""
 
 
 @dataclass(frozen=True)
 class Proposal:
     """``separation``: predicted distance of the two most similar explanations on this trial, in standard deviations of
-    its noise (all channels and rows together). Below about 4 the trial would not tell them apart either."""
+    its noise (all channels and rows together). Below ENOUGH the trial would not tell them apart either."""
 
     excitation: Excitation
     separation: float
@@ -47,16 +52,20 @@ def proposals(
     """Excitations by how well they separate the hypotheses, the best first."""
     if len(tied) < 2:
         return []
-    models = [apply(robot, h) for h in tied]
+    loose = [apply(robot, h) for h in tied]
     scale = channel_scale(robot, [])
     jobs, drivers = [], []
+    models_of: list[list[Robot]] = []
     for excitation in library:
         driver = driver_of(excitation, robot)
         drivers.append(driver)
-        jobs += [Job(_rollout(m, driver, excitation.steps(robot)), ToSensors()) for m in models]
+        held = setup_of(excitation)
+        models_of.append([apply(m, held) for m in loose])
+        jobs += [Job(_rollout(m, driver, excitation.steps(robot)), ToSensors()) for m in models_of[-1]]
     found = evaluator.evaluate(jobs)
     out = []
     for k, (excitation, driver) in enumerate(zip(library, drivers, strict=True)):
+        models = models_of[k]
         logs = found[k * len(models) : (k + 1) * len(models)]
         if isinstance(driver, Commands):
             logs = list(np.moveaxis(report(models, np.stack(logs, axis=1), k)[0], 1, 0))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.judge import Judged
 from ee_dist.discrepancy.misfit import Leftover
-from ee_dist.discrepancy.separate import Proposal
+from ee_dist.discrepancy.separate import ENOUGH, Proposal
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.robots.model import Robot
 
@@ -63,10 +63,13 @@ def explanation_text(found: Explanation, robot: Robot, next_trial: Proposal | No
         lines.append(left_text(found.left, found.verdict == EFFECT))
     elif found.verdict == EFFECT:
         lines.append("With it, nothing is left above the noise.")
-    if next_trial is not None:
+    if next_trial is not None and next_trial.separation < ENOUGH:
+        lines.append("No trial of the library would separate them either: on all of them they do the same.")
+    elif next_trial is not None:
         e = next_trial.excitation
         lines.append(
-            f"The trial that would separate them best: {e.kind} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed} "
+            f"The trial that would separate them best: {e.kind} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}, "
+            f"on the {e.fixture} "
             f"(predicted distance {next_trial.separation:.0f} standard deviations)."
         )
     return lines

@@ -7,7 +7,8 @@ import math
 import os
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import ray
@@ -39,21 +40,21 @@ class _Worker:
         return os.getpid()
 
 
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Workers are one process a core: numerical libraries must not start threads of their own in them."""
+
+
 def start_ray(address: str | None, workers: int) -> None:
     """Connect to the cluster at ``address``, or start Ray on this machine. Raises EvaluatorError."""
     if ray.is_initialized():
         return
-    # Workers are one process a core: numerical libraries must not start threads of their own in them.
-    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    options: dict[str, Any] = {
-        "include_dashboard": False,
-        "log_to_driver": False,
-        "logging_level": logging.ERROR,
-        "runtime_env": {"env_vars": one_thread},
-    }
+    options: dict[str, Any] = {"include_dashboard": False, "log_to_driver": False, "logging_level": logging.ERROR}
     if not address:
-        ray.init(num_cpus=max(workers, os.cpu_count() or 1), **options)
+        # Inherited by the workers that Ray has ready: with a runtime_env it would start others, and a second later.
+        with _environment(ONE_THREAD):
+            ray.init(num_cpus=max(workers, os.cpu_count() or 1), **options)
         return
+    options["runtime_env"] = {"env_vars": ONE_THREAD}
     del options["include_dashboard"]
     _knock(address)
     try:
@@ -61,6 +62,21 @@ def start_ray(address: str | None, workers: int) -> None:
     except Exception as error:
         first = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise _unreachable(address, first) from None
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Set environment variables for a while."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def _knock(address: str) -> None:

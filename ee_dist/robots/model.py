@@ -53,6 +53,8 @@ class Part:
     shapes: tuple[Shape, ...] = ()
     group: str = ""
     """The limb that the part belongs to; a part lost takes its whole subtree with it."""
+    grip: float = 1.0
+    """Friction of the part's surface against the floor, as a share of the world's: a shell slides where a foot holds."""
 
 
 @dataclass(frozen=True)

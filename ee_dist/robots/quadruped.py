@@ -10,6 +10,9 @@ jitter.
 Feet are rubber. On a perfectly hard floor a contact solver with few iterations decides which of four feet carries the
 robot, so that one engine's robot stands on a diagonal and another's does not; feet that give settle it by physics.
 
+With a leg lost the robot leans on the edge of its body. The body is small and its shell smooth, so that it can be dragged
+along: function can be restored at all.
+
 Angle sensors sit on the hips: the knees speak through the touch sensors of their feet.
 """
 
@@ -21,11 +24,13 @@ from ee_dist.robots.model import Drive, Joint, Part, Robot, Sensor, Shape, Wirin
 from ee_dist.robots.solids import box_inertia, rod_inertia
 
 LEGS = ("front_left", "front_right", "rear_left", "rear_right")
-BODY_HALF = (0.14, 0.09, 0.03)
+BODY_HALF = (0.09, 0.07, 0.03)
 BODY_KG, UPPER_KG, LOWER_KG = 1.6, 0.2, 0.16
 UPPER_M, LOWER_M, RADIUS_M, FOOT_M = 0.11, 0.13, 0.012, 0.018
 FOOT_GIVE_M_N = 3e-4
 """Rubber feet: 2 mm under a quarter of the weight."""
+SHELL_GRIP = 0.2
+"""Body and upper legs are smooth plastic: they slide where a rubber foot (friction 1) holds."""
 RANGE_RAD = math.pi / 4
 HEADING_RAD = {"front_left": 1 / 3, "front_right": -1 / 3, "rear_left": 2 / 3, "rear_right": -2 / 3}
 """Direction of a leg at rest, seen from above, in units of pi; forward is 0."""
@@ -34,7 +39,15 @@ HEADING_RAD = {"front_left": 1 / 3, "front_right": -1 / 3, "rear_left": 2 / 3, "
 def quadruped() -> Robot:
     """The robot of Bongard and Lipson (2004), section 3, with the choices above."""
     parts = [
-        Part("body", BODY_KG, (0.0, 0.0, 0.0), box_inertia(BODY_KG, *BODY_HALF), (Shape("box", BODY_HALF),), "body")
+        Part(
+            "body",
+            BODY_KG,
+            (0.0, 0.0, 0.0),
+            box_inertia(BODY_KG, *BODY_HALF),
+            (Shape("box", BODY_HALF),),
+            "body",
+            SHELL_GRIP,
+        )
     ]
     joints: list[Joint] = []
     along_x = (0.0, math.sin(math.pi / 4), 0.0, math.cos(math.pi / 4))
@@ -51,6 +64,7 @@ def quadruped() -> Robot:
                 rod_inertia(UPPER_KG, UPPER_M, RADIUS_M, "x"),
                 (Shape("capsule", (RADIUS_M, UPPER_M), (UPPER_M / 2, 0.0, 0.0), along_x),),
                 f"leg_{leg}",
+                SHELL_GRIP,
             ),
             Part(
                 lower,

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from ee_dist.discrepancy.candidates import candidates
 from ee_dist.discrepancy.explain import Explanation, explain
-from ee_dist.discrepancy.separate import Proposal, proposals
+from ee_dist.discrepancy.separate import ENOUGH, Proposal, proposals
 from ee_dist.discrepancy.words import explanation_text, told
 from ee_dist.robots.model import Robot
 from ee_dist.tasks import measured_robot
@@ -63,14 +63,15 @@ def run(config: Config, options: Options, out: Path) -> None:
     write_summary(out, "explain", config, options, watch, digest, summary(found, words, best))
     wall, _ = watch.read()
     counts = evaluator.counts
-    console.print(f"\n{counts.simulated:,} rollouts, {counts.steps / 1e6:.1f} million robot-steps, {wall:.0f} s. Digest {digest[:16]}.",
-                  highlight=False)  # fmt: skip
+    work = f"{counts.simulated:,} rollouts, {counts.steps / 1e6:.1f} million robot-steps, {wall:.0f} s."
+    console.print(f"\n{work} Digest {digest[:16]}.", highlight=False)
     for file in ("report.html", "explain.rrd", "summary.json")[:: 1 if options.rerun else 2]:
         console.print(f"  {os.path.relpath(out / file)}", highlight=False, soft_wrap=True)
 
 
 def summary(found: Explanation, words: list[str], ahead: Proposal | None) -> dict[str, Any]:
     """The part of summary.json that explain documents."""
+    worth = ahead is not None and ahead.separation >= ENOUGH
     return {
         "verdict": found.verdict,
         "baseline_error": found.baseline_error,
@@ -83,7 +84,7 @@ def summary(found: Explanation, words: list[str], ahead: Proposal | None) -> dic
              "earned": c.earned, "why_not": c.why_not} for c in found.candidates
         ],
         "left": [{"trial": g.trial, "channel": g.channel, "deviations": g.z, "slow": g.trend} for g in found.left],
-        "next_trial": None if ahead is None else {**ahead.excitation.as_dict(), "separation": ahead.separation},
+        "next_trial": {**ahead.excitation.as_dict(), "separation": ahead.separation} if ahead is not None and worth else None,
         "words": words,
     }  # fmt: skip
 

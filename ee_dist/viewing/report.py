@@ -20,11 +20,11 @@ h1 { font-size: 26px; margin: 0 0 4px; letter-spacing: -0.01em; }
 h2 { font-size: 18px; margin: 0 0 4px; }
 .sub { color: var(--soft); margin: 0 0 20px; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px; padding: 20px 22px; margin: 0 0 18px; }
-section p.caption { color: var(--soft); margin: 0 0 10px; max-width: 90ch; }
+section p.caption { color: var(--soft); margin: 0 0 10px; }
 .verdict { border-left: 5px solid var(--accent); }
 .verdict.good { border-left-color: #2e8b57; }
 .verdict.open { border-left-color: #c77700; }
-.verdict p { margin: 0 0 8px; max-width: 95ch; }
+.verdict p { margin: 0 0 8px; max-width: 120ch; }
 .verdict p:first-of-type { font-size: 17px; }
 .tiles { display: flex; flex-wrap: wrap; gap: 12px; margin: 0 0 18px; }
 .tile { background: var(--paper); border: 1px solid var(--line); border-radius: 10px; padding: 12px 18px; min-width: 150px; }
@@ -93,7 +93,7 @@ def write_page(page: Page, path: str | Path) -> Path:
                     full_html=False,
                     include_plotlyjs=False,
                     div_id=f"plot{k}",
-                    config={"displaylogo": False, "responsive": True},
+                    config={"displaylogo": False, "responsive": True, "displayModeBar": "hover"},
                 )
             )
         if section.table is not None:

@@ -77,7 +77,7 @@ def heat_map(heat: Array, segments: Sequence[str], channels: Sequence[str], floo
             zmin=0.0,
             zmax=top,
             colorscale=[[0, "#f7fbff"], [min(1.3 * floor / top, 0.9), "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]],
-            colorbar={"title": {"text": "std"}, "thickness": 12},
+            colorbar={"title": {"text": "standard deviations", "side": "right"}, "thickness": 12},
             hovertemplate="%{y}<br>%{x}<br>%{z:.2f} standard deviations<extra></extra>",
         )
     )
@@ -123,14 +123,24 @@ def ranking(
 def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float], floor: float) -> go.Figure:
     """Error of each model from the first to the last, and the noise floor."""
     figure = go.Figure()
-    figure.add_scatter(x=list(names), y=list(heldout), name="held out", mode="lines+markers+text", line={"color": MEASURED, "width": 3},
-                       marker={"size": 10}, text=[f"{v:.2f}" for v in heldout], textposition="top center")  # fmt: skip
+    figure.add_scatter(
+        x=list(names),
+        y=list(heldout),
+        name="held out",
+        mode="lines+markers+text",
+        line={"color": MEASURED, "width": 3},
+        marker={"size": 10},
+        text=[f"{v:.2f}" for v in heldout],
+        textposition="top center",
+    )
     figure.add_scatter(
         x=list(names), y=list(fit), name="fitted", mode="lines+markers", line={"color": PREDICTED, "dash": "dot"}
     )
     figure.add_hline(y=floor, line={"color": IMPROVED, "dash": "dash"}, annotation_text=f"noise floor {floor:.2f}",
                      annotation_position="bottom left")  # fmt: skip
     _styled(figure, 340)
+    figure.update_xaxes(range=[-0.4, len(names) - 0.6])
+    figure.update_layout(yaxis_range=[0, 1.25 * max(max(heldout), floor)])
     figure.update_yaxes(title_text="error (standard deviations)", rangemode="tozero")
     return figure
 

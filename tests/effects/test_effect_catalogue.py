@@ -35,7 +35,8 @@ def corners(effect: Effect, robot: Robot, target: str) -> list[Term]:
     bounds = effect.bounds(robot, target)
     far = {p.name: max(bounds[p.name], key=lambda v, p=p: abs(v - p.neutral)) for p in effect.parameters}
     ends = [far | {name: end} for name, pair in bounds.items() for end in pair] or [{}]
-    return list(dict.fromkeys(term(effect.name, target, **values) for values in ends))
+    found = dict.fromkeys(term(effect.name, target, **values) for values in ends)
+    return [t for t in found if not effect.parameters or t != neutral(effect, target)]
 
 
 def neutral(effect: Effect, target: str) -> Term:

@@ -70,8 +70,9 @@ class Group:
         batch.expand("pair_solimp")[:] = found.impedance
         ratio = batch.expand("opt.impratio")
         ratio[:] = found.ratio.reshape(ratio.shape)
-        friction = np.array([max(w.friction, LEAST_FRICTION) for w in worlds])
-        batch.expand("pair_friction")[:, :, :2] = friction[:, None, None]
+        grips = np.array([[p.grip for p in r.model.present_parts] for r in members])[:, self.model.pair_part]
+        friction = np.maximum(np.array([[w.friction] for w in worlds]) * grips, LEAST_FRICTION)
+        batch.expand("pair_friction")[:, :, :2] = friction[:, :, None]
 
     def _stand(self, members: Sequence[Rollout]) -> None:
         """Put each robot at its start: the robot's own, or the state that the rollout asks for."""

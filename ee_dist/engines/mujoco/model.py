@@ -92,6 +92,8 @@ class Model:
         targets = [s.target for s in robot.sensors if s.kind == "touch"]
         self.touches = [k for k, name in enumerate(targets) if name in parts]
         self.pair_body = m.geom_bodyid[m.pair_geom2] if m.npair else np.zeros(0, dtype=int)
+        place = {int(body): k for k, body in enumerate(self.bodies)}
+        self.pair_part = [place[int(body)] for body in self.pair_body]
         self._fields = [m.opt.gravity, m.body_mass, m.body_inertia, m.body_ipos, m.body_iquat, m.dof_armature]
         self._blank = [np.array(field) for field in self._fields]
 

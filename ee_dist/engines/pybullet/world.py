@@ -27,7 +27,7 @@ _JOINTS = {"hinge": p.JOINT_REVOLUTE, "slide": p.JOINT_PRISMATIC, "fixed": p.JOI
 
 def structure_key(robot: Robot) -> str:
     """What a world cannot change after it was built."""
-    parts = tuple(replace(q, mass_kg=0.0, inertia_kg_m2=(0.0,) * 6) for q in robot.present_parts)
+    parts = tuple(replace(q, mass_kg=0.0, inertia_kg_m2=(0.0,) * 6, grip=1.0) for q in robot.present_parts)
     joints = tuple(replace(j, freedom=1.0) for j in robot.present_joints)
     drives = tuple((d.joint, d.rotor_inertia) for d in robot.drives)
     sensors = tuple((s.kind, s.target) for s in robot.sensors if s.kind == "touch")
@@ -152,7 +152,7 @@ class World:
         p.restoreState(self.start, physicsClientId=c)
         p.setGravity(*gravity_vector(robots[0]), physicsClientId=c)
         for k, (robot, start) in enumerate(zip(robots, starts, strict=True)):
-            masses = tuple((q.mass_kg, q.inertia_kg_m2) for q in robot.present_parts)
+            masses = tuple((q.mass_kg, q.inertia_kg_m2, q.grip) for q in robot.present_parts)
             patch = (masses, robot.world.friction)
             if patch != self._patched[k]:
                 self._apply(self.bodies[k], robot)
@@ -171,7 +171,7 @@ class World:
                 k,
                 mass=part.mass_kg if k >= 0 or robot.free_base else 0.0,
                 localInertiaDiagonal=diagonal,
-                lateralFriction=robot.world.friction,
+                lateralFriction=robot.world.friction * part.grip,
                 physicsClientId=self.client,
             )
 

@@ -1,0 +1,158 @@
+"""Screening, fitting, judging and verdicts on residuals whose answer is known, with no simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ee_dist.discrepancy.candidates import Candidate, candidate, candidates, known, parse
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, Effort, explain
+from ee_dist.discrepancy.folds import bootstrap, halves
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.misfit import leftovers
+from ee_dist.discrepancy.screen import screen
+from ee_dist.effects.catalogue import EffectError, Hypothesis, term
+from ee_dist.robots.quadruped_lab import quadruped_lab
+from ee_dist.trials.log import Array
+
+ROBOT = quadruped_lab()
+SEGMENTS, PER = 20, 40
+
+
+class Linear:
+    """A problem in which each (effect, joint) adds its own random pattern, in proportion to its first value."""
+
+    def __init__(self, hidden: Hypothesis, seed: int = 0, extra: float = 0.0) -> None:
+        self.robot = ROBOT
+        n = SEGMENTS * PER
+        self.segments = tuple(f"trial@{k}s" for k in range(SEGMENTS))
+        self.segment_of = np.repeat(np.arange(SEGMENTS), PER)
+        self.trial_of_segment = np.zeros(SEGMENTS, dtype=int)
+        self.trials = ("trial",)
+        self.channels = ("a", "b")
+        self.channel_of = np.arange(n) % 2
+        self.floor = np.ones(n)
+        self.error_definition = "root mean square"
+        rng = np.random.default_rng(seed)
+        self.measured = rng.standard_normal(n) + self.shift(hidden) + extra * np.sin(np.arange(n) / 25.0)
+
+    def shift(self, hypothesis: Hypothesis) -> Array:
+        total = np.zeros(SEGMENTS * PER)
+        for t in hypothesis:
+            key = [sum(map(ord, t.effect)), sum(map(ord, t.target)) % 9973]
+            pattern = np.random.default_rng(key).standard_normal(len(total))
+            total = total + 3.0 * (t.values[0][1] if t.values else 1.0) * pattern
+        return total
+
+    def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+        return np.stack([self.measured - self.shift(h) for h in hypotheses])
+
+    def noise_floor(self) -> tuple[float, str]:
+        return 1.0, "known"
+
+
+POOL = candidates(ROBOT, only=["motor_weak", "joint_jam", "command_gain", "load_friction"])
+QUICK = Effort(first=6, second=4, final=3, starts=1)
+
+
+def test_the_hidden_effect_is_named_with_its_value() -> None:
+    hidden = (term("motor_weak", "knee_front_left", loss=0.4),)
+    found = explain(Linear(hidden), POOL, effort=QUICK)
+    assert found.verdict == EFFECT
+    assert found.best is not None and found.best.name == "motor_weak@knee_front_left"
+    assert found.best.hypothesis[0].values[0][1] == pytest.approx(0.4, abs=0.05)
+    assert found.best.tied_with == []
+    assert 0 < found.best.interval[0] < found.best.gain < found.best.interval[1] < 1
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_alone_needs_no_effect(seed: int) -> None:
+    assert explain(Linear((), seed), POOL, effort=QUICK).verdict == NOTHING_MISSING
+
+
+def test_what_no_candidate_explains_is_said_to_be_unexplained() -> None:
+    found = explain(Linear((), extra=1.0), POOL, effort=QUICK)
+    assert found.verdict == UNEXPLAINED
+    assert found.left and found.left[0].trend
+
+
+def test_auto_adds_two_effects_and_stops() -> None:
+    hidden = (term("motor_weak", "knee_front_left", loss=0.4), term("load_friction", "hip_rear_left", share=0.3))
+    found = improve(Linear(hidden), POOL, effort=QUICK)
+    assert {t.effect for t in found.terms} == {"motor_weak", "load_friction"}
+    held = [r.error_heldout for r in found.ladder]
+    assert len(held) == 3 and held[0] > held[1] > held[2]
+    assert held[-1] < 1.1
+    values = {p.name: p for p in found.parameters}
+    assert values["loss"].low < 0.4 < values["loss"].high
+    assert not found.left
+
+
+def test_asked_for_effects_are_added_and_flagged_when_they_do_nothing() -> None:
+    found = improve(Linear(()), POOL, wanted=[candidate(ROBOT, "command_gain", "hip_front_left")], effort=QUICK)
+    assert len(found.terms) == 1
+    assert found.parameters[0].flag
+
+
+def test_an_earlier_effect_is_fitted_again() -> None:
+    hidden = (term("motor_weak", "knee_front_left", loss=0.4), term("load_friction", "hip_rear_left", share=0.3))
+    before = (term("motor_weak", "knee_front_left", loss=0.1),)
+    found = improve(Linear(hidden), POOL, before, [parse(ROBOT, "load_friction@hip_rear_left")], effort=QUICK)
+    assert dict(found.terms[0].values)["loss"] == pytest.approx(0.4, abs=0.05)
+
+
+def test_every_segment_is_held_out_once() -> None:
+    half = halves(Linear(()))
+    assert set(half) == {0, 1} and abs(half.mean() - 0.5) <= 0.05
+
+
+def test_leftovers_of_noise_are_none() -> None:
+    problem = Linear(())
+    assert leftovers(problem, problem.residuals([()])[0]) == []
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 400), st.lists(st.floats(-1, 1), min_size=3, max_size=3))
+def test_shares_and_values_are_inverse(index: int, shares: list[float]) -> None:
+    pool = ALL
+    c = pool[index % len(pool)]
+    u = np.clip(np.array(shares[: c.size]), c.lower, c.upper)
+    values = c.values(u)
+    for (low, high), v in zip(c.bounds, values.values(), strict=True):
+        assert low <= v <= high
+    assert np.allclose(c.shares(values), u, atol=1e-9)
+
+
+ALL: list[Candidate] = candidates(ROBOT)
+
+
+def test_screening_finds_the_exact_gain_of_a_linear_effect() -> None:
+    problem = Linear((term("motor_weak", "hip_rear_left", loss=0.2),))
+    base = problem.residuals([()])[0]
+    best = problem.residuals([(term("motor_weak", "hip_rear_left", loss=0.2),)])[0]
+    promise = {s.candidate.name: s.promise for s in screen(problem, POOL)}
+    top = max(promise, key=lambda k: promise[k])
+    assert top == "motor_weak@hip_rear_left"
+    assert promise[top] == pytest.approx(base @ base - best @ best, rel=0.05)
+
+
+def test_unknown_names_are_told_with_the_nearest() -> None:
+    with pytest.raises(EffectError, match="motor_weak"):
+        parse(ROBOT, "motor_weka@knee_front_left")
+    with pytest.raises(EffectError, match="knee_front_left"):
+        parse(ROBOT, "motor_weak@knee_frnt_left")
+
+
+def test_a_known_value_beyond_the_range_stays() -> None:
+    c = known(ROBOT, term("viscous_friction", "knee_front_left", damping_nm_s_rad=50.0))
+    assert c.values(c.shares({"damping_nm_s_rad": 50.0})) == {"damping_nm_s_rad": 50.0}
+
+
+def test_bootstrap_holds_the_sum() -> None:
+    d = np.random.default_rng(1).normal(1.0, 0.1, 50)
+    low, high = bootstrap(d)
+    assert low < d.sum() < high and low > 40

@@ -1,0 +1,81 @@
+"""docs/bring_your_robot.md from end to end: a URDF, a CSV with a hidden fault, and the commands of the page."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FAULT = "coulomb_friction@elbow:torque_nm=0.35"
+QUICK = ("engine=mujoco", "evaluator=serial", "task.rerun=false")
+
+
+def run(*arguments: str, fails: bool = False) -> str:
+    """A command of the page; its output, or its complaint."""
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)},
+    )
+    assert (done.returncode != 0) == fails, done.stderr
+    return done.stderr if fails else done.stdout
+
+
+def task(out: Path, *arguments: str) -> dict[str, Any]:
+    run("-m", "ee_dist", *arguments, f"hydra.run.dir={out}")
+    found: dict[str, Any] = json.loads((out / "summary.json").read_text())
+    return found
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("arm")
+    run("tools/make_arm_csv.py", "--out", str(folder / "csv"), "--fault", FAULT)
+    mapping = "task.mapping=docs/examples/arm_csv.yaml"
+    found = task(folder / "import", "task=import", f"measured={folder / 'csv'}", mapping)
+    assert [t["trial"] for t in found["trials"]] == ["run1", "run2"]
+    assert all(t["resampled"] and not t["suspicious"] for t in found["trials"])
+    return folder
+
+
+def test_import_compare_and_improve_with_a_named_effect(imported: Path) -> None:
+    log = f"measured={imported / 'import' / 'measured.mcap'}"
+    before = task(imported / "compare", "task=compare", log, *QUICK)
+    assert before["channels"][0]["name"] == "elbow_angle"
+    assert before["error"] > 1.5
+    better = task(imported / "improve", "task=improve", "effect=coulomb_friction@elbow", log, *QUICK)
+    assert better["ladder"][-1]["error_heldout"] < 0.6 * better["ladder"][0]["error_heldout"]
+    assert better["model_terms"][0]["values"]["torque_nm"] == pytest.approx(0.35, rel=0.1)
+    model = f"model={imported / 'improve' / 'model.yaml'}"
+    after = task(imported / "again", "task=compare", log, model, *QUICK)
+    assert after["error"] < 0.6 * before["error"]
+
+
+@pytest.mark.slow
+def test_explain_and_improve_find_the_fault_by_themselves(imported: Path) -> None:
+    log = f"measured={imported / 'import' / 'measured.mcap'}"
+    found = task(imported / "explain", "task=explain", log, *QUICK)
+    assert found["candidates"][0]["name"] == "coulomb_friction@elbow"
+    better = task(imported / "auto", "task=improve", "effect=auto", log, *QUICK)
+    assert better["ladder"][1]["effect"] == "coulomb_friction"
+    assert better["ladder"][1]["target"] == "elbow"
+
+
+def test_mistakes_are_one_line(imported: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "run.csv"
+    lines = (imported / "csv" / "run1.csv").read_text().splitlines()
+    broken.write_text("\n".join([lines[0].replace("q2_deg", "q2"), *lines[1:]]))
+    mapping = "task.mapping=docs/examples/arm_csv.yaml"
+    said = run("-m", "ee_dist", "task=import", f"measured={broken}", mapping, f"hydra.run.dir={tmp_path / 'a'}", fails=True)
+    assert "no column 'q2_deg'; did you mean" in said
+    assert len(said.strip().splitlines()) == 1
+    assert not list((tmp_path / "a").glob("*.mcap*"))
