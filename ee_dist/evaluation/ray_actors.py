@@ -106,12 +106,20 @@ NEWEST = 0.3
 """Weight of the newest measurement of a worker's speed."""
 
 
-class Shares:
-    """How many jobs each worker gets at a time, by the speed measured of it. Changes when results come, never what.
+def helping(left: int, total: int, share: float) -> int:
+    """How many of the ``left`` of ``total`` jobs a worker gets that does ``share`` of the work.
 
     A large lot goes out in ever smaller helpings, so that all finish together; a small one in one helping each, since
     a batch of half the size is nearly as slow as a whole one.
     """
+    whole = math.ceil(total * share)
+    if whole <= 2 * WORTH_A_CALL:
+        return min(left, max(1, whole))
+    return min(left, max(WORTH_A_CALL, math.ceil(left * share / 2)))
+
+
+class Shares:
+    """Each worker's share of the work, by its measured speed. Changes when results come, never what."""
 
     def __init__(self, workers: int) -> None:
         self.speed: list[float | None] = [None] * workers
@@ -121,16 +129,12 @@ class Shares:
         now, before = steps / max(seconds, 1e-9), self.speed[who]
         self.speed[who] = now if before is None else before + NEWEST * (now - before)
 
-    def size(self, who: int, left: int, total: int) -> int:
-        """Jobs for worker ``who`` when ``left`` of ``total`` are still to be given out."""
+    def of(self, who: int) -> float:
+        """Share of worker ``who``. One of unknown speed counts as an average one."""
         known = [s for s in self.speed if s is not None]
         usual = sum(known) / len(known) if known else 1.0
         mine = self.speed[who]
-        share = (usual if mine is None else mine) / sum(usual if s is None else s for s in self.speed)
-        whole = math.ceil(total * share)
-        if whole <= 2 * WORTH_A_CALL:
-            return min(left, whole)
-        return min(left, max(WORTH_A_CALL, math.ceil(left * share / 2)))
+        return (usual if mine is None else mine) / sum(usual if s is None else s for s in self.speed)
 
 
 class RayEvaluator:
@@ -163,7 +167,7 @@ class RayEvaluator:
         while given < len(jobs) or running:
             while given < len(jobs) and idle:
                 who = idle.pop(0)
-                size = self.chunk or self.shares.size(who, len(jobs) - given, len(jobs))
+                size = self.chunk or helping(len(jobs) - given, len(jobs), self.shares.of(who))
                 some = list(jobs[given : given + size])
                 running[self.actors[who].run.remote(some, size)] = (given, len(some), who)
                 given += len(some)

@@ -10,8 +10,8 @@ jitter.
 Feet are rubber. On a perfectly hard floor a contact solver with few iterations decides which of four feet carries the
 robot, so that one engine's robot stands on a diagonal and another's does not; feet that give settle it by physics.
 
-With a leg lost the robot leans on the edge of its body. The body is small and its shell smooth, so that it can be dragged
-along: function can be restored at all.
+With a leg lost the robot leans on the edge of its body. The shell is smooth, so that it can be dragged along: function can
+be restored at all.
 
 Angle sensors sit on the hips: the knees speak through the touch sensors of their feet.
 """
@@ -24,7 +24,7 @@ from ee_dist.robots.model import Drive, Joint, Part, Robot, Sensor, Shape, Wirin
 from ee_dist.robots.solids import box_inertia, rod_inertia
 
 LEGS = ("front_left", "front_right", "rear_left", "rear_right")
-BODY_HALF = (0.09, 0.07, 0.03)
+BODY_HALF = (0.14, 0.09, 0.03)
 BODY_KG, UPPER_KG, LOWER_KG = 1.6, 0.2, 0.16
 UPPER_M, LOWER_M, RADIUS_M, FOOT_M = 0.11, 0.13, 0.012, 0.018
 FOOT_GIVE_M_N = 3e-4
@@ -91,7 +91,7 @@ def quadruped() -> Robot:
         ]
     order = [j.name for j in joints]
     drives = tuple(
-        Drive(j, kp=15.0, ki=2.0, kd=0.2, torque_limit=3.0, speed_limit=5.0, rotor_inertia=0.012) for j in order
+        Drive(j, kp=15.0, ki=2.0, kd=0.1, torque_limit=3.0, speed_limit=5.0, rotor_inertia=0.012) for j in order
     )
     sensors = tuple(Sensor(f"touch_{leg}", "touch", f"lower_{leg}") for leg in LEGS) + tuple(
         Sensor(f"angle_{leg}", "angle", f"hip_{leg}") for leg in LEGS

@@ -12,8 +12,8 @@ from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.ray_actors import RayEvaluator
 from ee_dist.evaluation.serial import SerialEvaluator
-from ee_dist.robots.model import Robot
 from ee_dist.robots.describe import robot_of
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config
 
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ee_dist.robots.model import Law, Robot
+from ee_dist.robots.model import Law, Robot, World
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.serial import RobotFormatError, robot_from_dict, robot_from_json, robot_to_dict, robot_to_json
 
@@ -49,7 +49,7 @@ def test_keys_with_a_default_may_be_left_out() -> None:
     for drive in data["robot"]["drives"]:
         del drive["backlash"]
     del data["robot"]["world"]
-    assert robot_from_dict(data) == quadruped()
+    assert robot_from_dict(data) == replace(quadruped(), world=World())
 
 
 def _part(data: Any) -> Any:

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from benchmarks.timing import Measurement, Sample, interleaved, median_cpu, median_ratio, median_wall, timed
 
+from benchmarks.timing import Measurement, Sample, interleaved, median_cpu, median_ratio, median_wall, timed
 from ee_dist.engines.contract import Engine, Rollout
 from ee_dist.engines.drivers import Network, weight_count
 from ee_dist.robots.model import Robot
