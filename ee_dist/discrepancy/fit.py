@@ -6,7 +6,7 @@ taken over a finite step, which begins wide and shrinks, and every step is tried
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,6 +78,11 @@ class _Run:
     energy: float = np.inf
     residual: Array | None = None
     slopes: Array | None = None
+    origin: tuple[Array, Array] | None = None
+    """Where the slopes were taken: values and residual."""
+
+
+Evaluate = Callable[[Sequence[tuple[_Run, Array]]], list[tuple[float, Array]]]
 
 
 def fit_all(
@@ -118,7 +123,7 @@ def fit_all(
     return out
 
 
-def _slopes(runs, width, mask, evaluate):  # type: ignore[no-untyped-def]
+def _slopes(runs: Sequence[_Run], width: float, mask: Array, evaluate: Evaluate) -> None:
     """Derivatives over ``width`` (narrower for a small value), towards the inside; a better point found is taken."""
     points = []
     for run in runs:
@@ -130,6 +135,7 @@ def _slopes(runs, width, mask, evaluate):  # type: ignore[no-untyped-def]
     found = evaluate(points)
     at = 0
     for run in runs:
+        assert run.residual is not None
         columns = []
         best = (run.energy, run.u, run.residual)
         for k in range(len(run.u)):
@@ -141,14 +147,15 @@ def _slopes(runs, width, mask, evaluate):  # type: ignore[no-untyped-def]
             if value < best[0]:
                 best = (value, u, r)
         run.slopes = np.stack(columns, axis=1)
-        run.base = (run.u, run.residual)
+        run.origin = (run.u, run.residual)
         run.energy, run.u, run.residual = best
 
 
-def _steps(runs, mask, evaluate):  # type: ignore[no-untyped-def]
+def _steps(runs: Sequence[_Run], mask: Array, evaluate: Evaluate) -> None:
     points = []
     for run in runs:
-        origin, residual = run.base
+        assert run.origin is not None and run.slopes is not None
+        origin, residual = run.origin
         if not np.isfinite(residual).all():
             # No slope where nothing can be simulated: nearer to neutral.
             points += [(run, run.u * 0.5)]

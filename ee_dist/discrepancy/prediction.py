@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from ee_dist.evaluation.jobs import Evaluator, Job
 from ee_dist.robots.model import Robot, Sensor, Wiring
 from ee_dist.trials.log import Array, SensorLog
 
-_SENSOR_FAULTS = {f.name: f.default for f in fields(Sensor) if f.name not in ("name", "kind", "target", "unit")}
+_SENSOR_FAULTS: dict[str, Any] = {
+    f.name: f.default for f in fields(Sensor) if f.name not in ("name", "kind", "target", "unit")
+}
 
 
 def roughness(values: Array) -> Array:
@@ -109,7 +112,12 @@ def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) ->
     commands, enabled = released(wired_commands(trial, model).values)
     start = start_of(trial.log, model)
     return Rollout(
-        bare or clean(model), Commands(commands), len(trial.log), start=start, supply_v=trial.log.supply_v, enabled=enabled
+        bare or clean(model),
+        Commands(commands),
+        len(trial.log),
+        start=start,
+        supply_v=trial.log.supply_v,
+        enabled=enabled,
     )
 
 

@@ -16,13 +16,24 @@ def plain(name: str) -> str:
     return name.replace("_", " ")
 
 
+def without_unit(key: str, unit: str) -> str:
+    """``torque_nm`` in N.m is ``torque``: the unit is told behind the value."""
+    tail, parts = unit.lower().replace(".", "").replace("/", "").replace("^", ""), key.split("_")
+    for k in range(1, len(parts)):
+        if tail and "".join(parts[k:]) == tail:
+            return "_".join(parts[:k])
+    return key
+
+
 def told(term: Term, robot: Robot | None = None) -> str:
-    """``motor weak at knee front left (loss 0.3)``."""
+    """``coulomb friction at knee front left (torque 0.3 N.m)``."""
     entry = CATALOGUE[term.effect]
     shown = []
     for key, value in term.values:
         unit = entry.unit(key, robot, term.target) if robot is not None else entry.parameter(key).unit
-        shown.append(f"{plain(key)} {value:.3g}" + (f" {unit}" if unit not in ("", "1", "channel") else ""))
+        shown.append(
+            f"{plain(without_unit(key, unit))} {value:.3g}" + (f" {unit}" if unit not in ("", "1", "channel") else "")
+        )
     where = f" at {plain(term.target)}" if term.target else ""
     return f"{plain(term.effect)}{where}" + (f" ({', '.join(shown)})" if shown else "")
 

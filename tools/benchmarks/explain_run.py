@@ -20,7 +20,9 @@ def explain_catalogue(engine: str, quick: bool, out: Path, cwd: Path) -> dict[st
     """Seconds that the explanation took and what it said. Raises RuntimeError where the command line cannot do it."""
     excitations = ",".join(f"'{e}'" for e in (QUICK_TRIALS if quick else TRIALS))
     tried = watch(
-        ["task=trial", f"engine={engine}", f"+hidden={HIDDEN}", f"task.excitations=[{excitations}]"], out / "trials", cwd
+        ["task=trial", f"engine={engine}", f"+hidden={HIDDEN}", f"task.excitations=[{excitations}]"],
+        out / "trials",
+        cwd,
     )
     logs = sorted((out / "trials").glob("*.mcap"))
     if tried.status or not logs:

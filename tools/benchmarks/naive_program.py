@@ -110,7 +110,13 @@ def main() -> int:
         cpu = processor_s(pool, options.processes) - before
     finite = bool(np.isfinite(distances).all())
     json.dump(
-        {"evaluations": len(tasks), "steps": len(tasks) * options.steps, "wall_s": wall, "cpu_s": cpu, "finite": finite},
+        {
+            "evaluations": len(tasks),
+            "steps": len(tasks) * options.steps,
+            "wall_s": wall,
+            "cpu_s": cpu,
+            "finite": finite,
+        },
         sys.stdout,
     )
     return 0

@@ -25,7 +25,7 @@ def write_urdf(robot: Robot, path: Path) -> None:
         drive = next(d for d in robot.drives if d.joint == joint.name)
         lines.append(
             f'<joint name="{joint.name}" type="revolute"><parent link="{joint.parent}"/><child link="{joint.child}"/>'
-            f"{_origin(joint.position_m, joint.rotation)}<axis xyz=\"{_words(joint.axis)}\"/>"
+            f'{_origin(joint.position_m, joint.rotation)}<axis xyz="{_words(joint.axis)}"/>'
             f'<limit lower="{joint.lower}" upper="{joint.upper}" effort="{drive.torque_limit}" '
             f'velocity="{drive.speed_limit}"/></joint>'
         )

@@ -33,6 +33,7 @@ class Watched:
     cpu_s: float
     memory_mb: float
     first_progress_s: float | None
+    first_progress_cpu_s: float | None
     status: int
     output: str
     summary: dict[str, Any] = field(default_factory=dict)
@@ -69,11 +70,16 @@ class _Tree:
             count += 1
             self.over.wait(LOOK_S)
 
+    @property
+    def cpu_s(self) -> float:
+        """Processor time of all so far, s."""
+        return sum(self.cpu.copy().values())
+
     def close(self) -> float:
-        """Processor time of all, s."""
+        """Stop following. Processor time of all, s."""
         self.over.set()
         self.thread.join(5.0)
-        return sum(self.cpu.values())
+        return self.cpu_s
 
 
 def watch(arguments: Sequence[str], out: Path, cwd: Path) -> Watched:
@@ -85,7 +91,9 @@ def watch(arguments: Sequence[str], out: Path, cwd: Path) -> Watched:
     process = subprocess.Popen(command, stdin=follower, stdout=follower, stderr=follower, cwd=cwd, env=environment)
     os.close(follower)
     tree = _Tree(process.pid)
-    output, first = bytearray(), None
+    output = bytearray()
+    first: float | None = None
+    first_cpu: float | None = None
     while True:
         ready, _, _ = select.select([leader], [], [], 0.2)
         if ready:
@@ -97,7 +105,7 @@ def watch(arguments: Sequence[str], out: Path, cwd: Path) -> Watched:
                 break
             output += piece
             if first is None and FIRST_GENERATION.search(plain(bytes(output[-20000:]))):
-                first = time.monotonic() - began
+                first, first_cpu = time.monotonic() - began, tree.cpu_s
         elif process.poll() is not None:
             break
     status = process.wait()
@@ -107,7 +115,7 @@ def watch(arguments: Sequence[str], out: Path, cwd: Path) -> Watched:
     path = out / "summary.json"
     summary = json.loads(path.read_text(encoding="utf-8")) if status == 0 and path.is_file() else {}
     text = plain(bytes(output)).decode(errors="replace")
-    return Watched(wall, cpu, tree.memory_mb, first, status, text, summary)
+    return Watched(wall, cpu, tree.memory_mb, first, first_cpu, status, text, summary)
 
 
 def plain(text: bytes) -> bytes:
@@ -151,6 +159,7 @@ def run_scenario(setting: RunSetting, out: Path, cwd: Path) -> dict[str, Any]:
         "cpu_s": seen.cpu_s,
         "memory_mb": seen.memory_mb,
         "first_progress_s": seen.first_progress_s,
+        "first_progress_cpu_s": seen.first_progress_cpu_s,
         "asked": evaluations["asked"],
         "simulated": evaluations["simulated"],
         "whole_steps": whole_steps,
