@@ -109,7 +109,7 @@ class Benchmark:
     def peers(self) -> None:
         urdf = self.folder / "quadruped.urdf"
         write_urdf(quadruped(), urdf)
-        count, steps = (4, 50) if self.options.quick else (40, 1000)
+        count, steps = (8, 50) if self.options.quick else (40, 1000)
         common = ("--steps", str(steps), "--processes", str(self.cores))
         sizes = {
             "naive_program": ("--evaluations", str(count)),
@@ -153,7 +153,7 @@ class Benchmark:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options, console = parse(arguments), Console()
+    options, console = parse(arguments), Console(width=None if sys.stdout.isatty() else 150)
     with tempfile.TemporaryDirectory(prefix="ee_dist_benchmark_") as folder:
         benchmark = Benchmark(options, Path(folder), console)
         benchmark.run()

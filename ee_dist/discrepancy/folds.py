@@ -34,13 +34,24 @@ def mask_of(problem: Problem, half: int, of: NDArray[np.int64] | None = None) ->
     return np.asarray(chosen[problem.segment_of] == half)
 
 
-def bootstrap(differences: Array, seed: int = 0, draws: int = 1000, level: float = 0.95) -> tuple[float, float]:
-    """Interval of the sum of ``differences`` (segments,) under resampling of the segments."""
+def bootstrap(
+    differences: Array,
+    seed: int = 0,
+    draws: int = 1000,
+    level: float = 0.95,
+    groups: NDArray[np.int64] | None = None,
+) -> tuple[float, float]:
+    """Interval of the sum of ``differences`` (segments,) under resampling of the segments, within each of ``groups``
+    (segments,) if they are given: what shows only in some trials does not vanish because none of them was drawn."""
     d = np.asarray(differences, dtype=float)
     if not np.isfinite(d).all() or not len(d):
         return (-np.inf, np.inf)
     rng = np.random.default_rng([seed, len(d)])
-    sums = d[rng.integers(0, len(d), (draws, len(d)))].sum(axis=1)
+    of = np.zeros(len(d), dtype=np.int64) if groups is None else groups
+    sums = np.zeros(draws)
+    for g in np.unique(of):
+        mine = d[of == g]
+        sums += mine[rng.integers(0, len(mine), (draws, len(mine)))].sum(axis=1)
     low, high = np.quantile(sums, [(1 - level) / 2, (1 + level) / 2])
     return float(low), float(high)
 

@@ -12,7 +12,7 @@ from ee_dist.discrepancy.candidates import Candidate, known
 from ee_dist.discrepancy.explain import STANDARD_EFFORT, Effort, Explanation, explain, fit_out
 from ee_dist.discrepancy.fit import WIDTHS, Fit, Model, fit_all
 from ee_dist.discrepancy.folds import bootstrap, halves
-from ee_dist.discrepancy.judge import LEAST_SHARE, Judged, least_energy
+from ee_dist.discrepancy.judge import LEAST_SHARE, LOST_SHARE, Judged, least_energy, lost
 from ee_dist.discrepancy.misfit import Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.scan import scan
@@ -88,7 +88,7 @@ def improve(
             model, at = _with_best_start(problem, parts, u, [c], ladder[-1].terms)
             judged = fit_out(problem, [(model, at)], base, (), half, len(pool), progress)[0]
             parts, u = [*parts, c], judged.u
-            ladder.append(_rung(judged, 1, ladder[-1]))
+            ladder.append(_rung(problem, judged, 1, ladder[-1]))
     else:
         while True:
             if len(parts) - len(before) >= most:
@@ -102,7 +102,7 @@ def improve(
             for group in options:
                 model, at = _with_best_start(problem, parts, u, group, now, found)
                 judged = fit_out(problem, [(model, at)], base, (), half, len(pool), progress)[0]
-                step = _rung(judged, len(group), ladder[-1])
+                step = _rung(problem, judged, len(group), ladder[-1])
                 if _earns(step, ladder[-1], len(pool)):
                     rung = step
                     parts, u = [*parts, *group], judged.u
@@ -153,10 +153,10 @@ def _with_best_start(
     return Model((*parts, *group)), np.concatenate(starts)
 
 
-def _rung(judged: Judged, added: int, last: Rung) -> Rung:
+def _rung(problem: Problem, judged: Judged, added: int, last: Rung) -> Rung:
     gained = last.held - judged.held
     whole = float(last.held.sum())
-    low, high = bootstrap(gained)
+    low, high = bootstrap(gained, groups=problem.trial_of_segment)
     scale = whole if whole > 0 else 1.0
     return Rung(
         judged.hypothesis[-added:],
@@ -171,7 +171,8 @@ def _rung(judged: Judged, added: int, last: Rung) -> Rung:
 def _earns(step: Rung, last: Rung, tried: int) -> bool:
     gained = float((last.held - step.held).sum())
     whole = float(last.held.sum())
-    return np.isfinite(gained) and gained > max(least_energy(tried), LEAST_SHARE * whole) and step.interval[0] > 0
+    sound = step.interval[0] > 0 or lost(last.held - step.held) <= LOST_SHARE * gained
+    return bool(np.isfinite(gained) and gained > max(least_energy(tried), LEAST_SHARE * whole) and sound)
 
 
 def _finish(

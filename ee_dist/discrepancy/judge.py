@@ -17,6 +17,9 @@ from ee_dist.trials.log import Array
 
 LEAST_SHARE = 0.002
 """Share of the starting energy that an effect must take off held-out data to be worth a term."""
+LOST_SHARE = 0.1
+"""An interval that reaches zero counts against an effect only where it makes some segments worse by this share of its
+gain: an effect that shows in one window of twenty, and harms none, is no less true for that."""
 TIE_ENERGY = 9.0
 """Two explanations closer than this (3 standard deviations, squared) on held-out data are not told apart."""
 
@@ -67,13 +70,13 @@ def judge(problem: Problem, base: Array, fits: Sequence[Fit], halves: Array, tri
     before = per_segment(problem, base)
     total, n = float(before.sum()), len(base)
     gained = before - held
-    low, high = bootstrap(gained)
+    low, high = bootstrap(gained, groups=problem.trial_of_segment)
     gain = float(gained.sum())
     enough = least_energy(tried)
     why = ""
     if not np.isfinite(gain) or gain < enough:
         why = "its gain on held-out data is no more than luck"
-    elif low <= 0:
+    elif low <= 0 and lost(gained) > LOST_SHARE * gain:
         why = "its gain on held-out data may be zero"
     elif gain < LEAST_SHARE * total:
         why = f"it explains less than {LEAST_SHARE:.1%} of the residual"
@@ -93,6 +96,11 @@ def judge(problem: Problem, base: Array, fits: Sequence[Fit], halves: Array, tri
         slopes=best.slopes,
         why_not=why,
     )
+
+
+def lost(gained: Array) -> float:
+    """Energy that held-out segments lose where the effect makes them worse."""
+    return float(-np.minimum(gained, 0.0).sum())
 
 
 def ranked(found: Sequence[Judged]) -> list[Judged]:

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from benchmarks.steps import StepSetting, batch_cost, sample_rollouts
 
+from benchmarks.steps import StepSetting, batch_cost, sample_rollouts
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Counts, Job, Travel
 from ee_dist.evaluation.ray_actors import RayEvaluator

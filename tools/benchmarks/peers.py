@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,10 @@ PROGRAMS = Path(__file__).resolve().parent
 
 
 def write_urdf(robot: Robot, path: Path) -> None:
-    """The robot as a URDF: same masses, inertias (with the rotors'), shapes and joints."""
+    """The robot as a URDF: same masses, inertias, shapes and joints. Rotors have no place in it."""
     lines = [f'<robot name="{robot.name}">']
     for part in robot.parts:
-        lines += _link(_with_rotor(robot, part))
+        lines += _link(part)
     for joint in robot.joints:
         drive = next(d for d in robot.drives if d.joint == joint.name)
         lines.append(
@@ -47,17 +46,6 @@ def _link(part: Part) -> list[str]:
             form = f'<{shape.kind} radius="{shape.size[0]}" length="{shape.size[1]}"/>'
         lines.append(f"<collision>{_origin(shape.position_m, shape.rotation)}<geometry>{form}</geometry></collision>")
     return [*lines, "</link>"]
-
-
-def _with_rotor(robot: Robot, part: Part) -> Part:
-    """Bullet knows no rotor inertia: it goes to the part that the joint moves, as in our engine."""
-    grown = np.array(part.inertia_kg_m2)
-    for joint in robot.joints:
-        if joint.child == part.name:
-            drive = next(d for d in robot.drives if d.joint == joint.name)
-            grown[:3] += np.square(joint.axis) * drive.rotor_inertia
-    xx, yy, zz, xy, xz, yz = (float(v) for v in grown)
-    return replace(part, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
 
 
 def _words(values: tuple[float, ...]) -> str:

@@ -40,8 +40,9 @@ class Row:
 def show(console: Console, rows: Sequence[Row], title: str) -> None:
     """Print the table."""
     table = Table(box=SIMPLE, pad_edge=False, title=title, title_justify="left", caption_justify="left")
-    for name, side in (("what", "left"), ("value", "right"), ("", "left"), ("ratio", "right"), ("to", "left")):
-        table.add_column(name, justify=side, overflow="fold")  # type: ignore[arg-type]
+    table.add_column("what", min_width=62)
+    for name, side in (("value", "right"), ("", "left"), ("ratio", "right"), ("to", "left")):
+        table.add_column(name, justify=side, no_wrap=True)  # type: ignore[arg-type]
     table.add_column("aim", justify="right")
     table.add_column("")
     group = ""
