@@ -37,7 +37,7 @@ def effort_of(iterations: int) -> tuple[int, tuple[int, ...]]:
 @dataclass(eq=False)
 class _Search:
     model: Model
-    strategy: cma.CMAEvolutionStrategy | None
+    strategy: Any  # a CMAEvolutionStrategy, or None where nothing is searched
     energy: float = np.inf
     u: Array | None = None
     residual: Array | None = None

@@ -15,7 +15,16 @@ from ee_dist.tasks.config import ConfigError
 from ee_dist.trials.excitation import ExcitationError
 from ee_dist.trials.log import LogError
 
-USER_ERRORS = (ConfigError, EffectError, EngineError, EvaluatorError, LogError, RecordingError, RobotError, ExcitationError)
+USER_ERRORS = (
+    ConfigError,
+    EffectError,
+    EngineError,
+    EvaluatorError,
+    LogError,
+    RecordingError,
+    RobotError,
+    ExcitationError,
+)
 
 
 def hydra_message(error: HydraException) -> str:

@@ -121,7 +121,10 @@ def by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return lines
 
 
-HEAD = ("case", "runs", "intact (m)", "after (m)", "best trial (m)", "trial 4 (m)", "restored", "diagnosis right", "truth named", "p")  # fmt: skip
+HEAD = (
+    "case", "runs", "intact (m)", "after (m)", "best trial (m)", "trial 4 (m)", "restored", "diagnosis right",
+    "truth named", "p",
+)  # fmt: skip
 
 
 def cells(line: dict[str, Any]) -> list[str]:

@@ -35,12 +35,8 @@ def distances(summaries: Sequence[dict[str, Any]]) -> go.Figure:
             if s["metric"] == metric:
                 groups[s["scenario"]].append(s["distance_m"])
         cases = sorted(groups)
-        for name, pick in (
-            ("intact", lambda d: d["intact"]),
-            ("after the change", lambda d: d["after"]),
-            ("last trial", lambda d: d["trials"][-1]),
-        ):
-            values = [[pick(d) for d in groups[c]] for c in cases]
+        for name in ("intact", "after the change", "last trial"):
+            values = [[_distance(d, name) for d in groups[c]] for c in cases]
             figure.add_bar(
                 x=[str(c) for c in cases],
                 y=[float(np.mean(v)) for v in values],
@@ -51,6 +47,12 @@ def distances(summaries: Sequence[dict[str, Any]]) -> go.Figure:
     figure.update_xaxes(title="scenario", type="category")
     figure.update_yaxes(title="distance (m)")
     return figure
+
+
+def _distance(distances_m: dict[str, Any], name: str) -> float:
+    if name == "last trial":
+        return float(distances_m["trials"][-1])
+    return float(distances_m["intact" if name == "intact" else "after"])
 
 
 def dominants(summaries: Sequence[dict[str, Any]]) -> go.Figure:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -40,7 +42,7 @@ def test_best_never_gets_worse_and_search_beats_chance():
     while not ga.done:
         ga.tell(sphere(values(ga.ask())))
         best.append(ga.scores[0])
-    assert all(b >= a for a, b in zip(best, best[1:], strict=False))
+    assert all(b >= a for a, b in pairwise(best))
     chance = sphere(values(np.random.default_rng(1).integers(-SCALE, SCALE + 1, size=(3200, 16)))).max()
     assert best[-1] > chance
 

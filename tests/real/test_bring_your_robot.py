@@ -75,7 +75,9 @@ def test_mistakes_are_one_line(imported: Path, tmp_path: Path) -> None:
     lines = (imported / "csv" / "run1.csv").read_text().splitlines()
     broken.write_text("\n".join([lines[0].replace("q2_deg", "q2"), *lines[1:]]))
     mapping = "task.mapping=docs/examples/arm_csv.yaml"
-    said = run("-m", "ee_dist", "task=import", f"measured={broken}", mapping, f"hydra.run.dir={tmp_path / 'a'}", fails=True)
+    said = run(
+        "-m", "ee_dist", "task=import", f"measured={broken}", mapping, f"hydra.run.dir={tmp_path / 'a'}", fails=True
+    )
     assert "no column 'q2_deg'; did you mean" in said
     assert len(said.strip().splitlines()) == 1
     assert not list((tmp_path / "a").glob("*.mcap*"))
