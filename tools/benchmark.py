@@ -22,15 +22,16 @@ from benchmarks.explain_run import explain_catalogue
 from benchmarks.figures import draw_table
 from benchmarks.peers import run_peer, write_urdf
 from benchmarks.steps import StepSetting, measure_steps
-from benchmarks.table import Row, as_json, show
+from benchmarks.table import Row, as_json, markdown, put_between, show
 from benchmarks.timing import machine
 from benchmarks.together import at_once
-from benchmarks.whole_run import RunSetting, run_scenario
+from benchmarks.whole_run import RunSetting, finished_run, run_scenario
 from rich.console import Console
 
 from ee_dist.robots.quadruped import quadruped
 
 ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
 ENGINES = ("pybullet", "mujoco")
 USUAL_START_S = 8.0
 """From the command to the first generation, where no run was measured."""
@@ -48,7 +49,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--robots", type=int, help="robots a batch in the step measurement (25; with --quick: 4)")
     parser.add_argument("--steps", type=int, help="steps of it (1000; with --quick: 40)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the table for programs")
-    parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw the charts of the docs there")
+    parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw the charts there")
+    parser.add_argument("--docs", action="store_true", help="write JSON, charts and the table of docs/speed.md")
+    parser.add_argument("--finished", nargs="+", type=Path, metavar="RUN", help="take these runs instead of new ones")
     options = parser.parse_args(arguments)
     defaults = {
         "budget": ("paper", "quick"),
@@ -59,6 +62,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     for name, (usual, small) in defaults.items():
         if getattr(options, name) is None:
             setattr(options, name, small if options.quick else usual)
+    if options.docs:
+        options.json, options.figures = DOCS / "figures" / "speed.json", DOCS / "figures"
     return options
 
 
@@ -80,6 +85,13 @@ class Benchmark:
         self._collect()
 
     def runs(self) -> None:
+        for folder in self.options.finished or ():
+            try:
+                self.data["runs"].append(finished_run(folder))
+            except RuntimeError as error:
+                self.notes.append(str(error))
+        if self.options.finished:
+            return
         for engine in self.options.engines:
             for workers in self.options.workers:
                 out = self.folder / f"{engine}_{workers}"
@@ -169,6 +181,12 @@ def main(arguments: list[str] | None = None) -> int:
     if options.figures:
         for path in draw_table(content, options.figures):
             console.print(f"  {path}", highlight=False)
+    if options.docs:
+        put_between(
+            DOCS / "speed.md",
+            "benchmark",
+            f"{title}; load {about['load_1_min']} at the start.\n\n{markdown(benchmark.rows)}",
+        )
     return 0
 
 

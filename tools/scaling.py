@@ -17,11 +17,14 @@ from typing import Any
 
 from benchmarks.figures import save, scaling_chart
 from benchmarks.scaling_model import Costs, Generation, generations, limit_s, simulate, study
+from benchmarks.table import put_between
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+NAMES = {"pybullet": "PyBullet", "mujoco": "MuJoCo"}
 CORES = (1, 2, 4, 8, 16, 32, 64, 100, 200, 500, 1000, 2000, 5000, 10000)
+DOCS = Path(__file__).resolve().parent.parent / "docs"
 STUDY_RUNS = 260
 WORTH = 0.05
 """More cores are worth it while doubling them takes this share off the wall time."""
@@ -77,6 +80,32 @@ def show(console: Console, engine: str, rows: Sequence[Mapping[str, Any]], least
     )
 
 
+def markdown(result: Mapping[str, Any]) -> str:
+    """The tables of docs/speed.md."""
+    lines: list[str] = []
+    for engine, rows in result["curves"].items():
+        lines += [f"**{NAMES[engine]}**", "", "| cores | one run, s | start | search | work | waiting | 260 runs, s |"]
+        lines.append("|" + "---:|" * 7)
+        for r in rows:
+            parts = " | ".join(f"{r[f'{p}_s']:,.1f}" for p in ("start", "search", "work", "waiting"))
+            lines.append(f"| {r['cores']:,} | {r['run_s']:,.1f} | {parts} | {r['study_s']:,.0f} |")
+        lines += [
+            "",
+            f"One run stops falling at about {stops_at(rows, 'run_s'):,} cores, the study at about "
+            f"{stops_at(rows, 'study_s'):,}: doubling the cores beyond takes off less than 5 %.",
+            "",
+        ]
+        found = result["check"].get(engine)
+        if found:
+            lines += [
+                f"Check, a repair pass on warm workers: 2 workers are {found['speed_up_measured']:.2f} times as fast as 1 "
+                f"(predicted {found['speed_up_predicted']:.2f}), two nodes {found['speed_up_two_nodes']:.2f} times; "
+                f"{'the same result in all' if found['same_result'] else 'the results differ'}.",
+                "",
+            ]
+    return "\n".join(lines).rstrip()
+
+
 def traces(content: Mapping[str, Any]) -> dict[str, list[Generation]]:
     """The generations of the measured run of each engine; an engine without a run has those of another."""
     found = {r["engine"]: generations(r["generations"]) for r in content["runs"]}
@@ -87,24 +116,28 @@ def traces(content: Mapping[str, Any]) -> dict[str, list[Generation]]:
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, required=True, help="what tools/benchmark.py --json wrote")
+    parser.add_argument(
+        "--json", type=Path, default=DOCS / "figures" / "speed.json", help="from tools/benchmark.py --json"
+    )
+    parser.add_argument("--docs", action="store_true", help="write the chart and the table of docs/speed.md")
     parser.add_argument("--figure", type=Path, help="draw the chart there (PNG)")
     parser.add_argument("--out", type=Path, help="write the curves for programs")
     parser.add_argument(
         "--check", action="store_true", help="measure 1 and 2 workers and two nodes too (a minute or two)"
     )
     options = parser.parse_args(arguments)
+    if options.docs:
+        options.figure = DOCS / "figures" / "speed_scaling.png"
     content = json.loads(options.json.read_text(encoding="utf-8"))
     console, lines = Console(width=None if sys.stdout.isatty() else 120), {}
     result: dict[str, Any] = {"curves": {}, "check": {}}
-    names = {"pybullet": "PyBullet", "mujoco": "MuJoCo"}
     for engine, trace in traces(content).items():
         costs = Costs.of(content["costs"][engine])
         rows = curves(trace, costs, CORES, STUDY_RUNS)
-        show(console, names[engine], rows, limit_s(trace, costs))
+        show(console, NAMES[engine], rows, limit_s(trace, costs))
         result["curves"][engine] = rows
-        lines[f"one run, {names[engine]}"] = [r["run_s"] for r in rows]
-        lines[f"{STUDY_RUNS} runs, {names[engine]}"] = [r["study_s"] for r in rows]
+        lines[f"one run, {NAMES[engine]}"] = [r["run_s"] for r in rows]
+        lines[f"{STUDY_RUNS} runs, {NAMES[engine]}"] = [r["study_s"] for r in rows]
         if options.check:
             from benchmarks.scaling_check import CheckSetting, check
 
@@ -114,6 +147,8 @@ def main(arguments: list[str] | None = None) -> int:
                 f"predicted {found['speed_up_predicted']:.2f} x; same result: {found['same_result']}.",
                 highlight=False,
             )
+    if options.docs:
+        put_between(DOCS / "speed.md", "scaling", markdown(result))
     if options.figure:
         measured = [(r["workers"], r["wall_s"]) for r in content["runs"]]
         console.print(f"  {save(scaling_chart(CORES, lines, {'measured runs': measured}), options.figure)}")

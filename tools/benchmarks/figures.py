@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import subprocess
 import tempfile
@@ -41,7 +42,7 @@ def save(figure: go.Figure, path: Path) -> Path:
                 "--no-sandbox",
                 "--disable-gpu",
                 "--hide-scrollbars",
-                f"--window-size={SIZE[0]},{SIZE[1] + 90}",
+                f"--window-size={SIZE[0]},{SIZE[1]}",
                 "--virtual-time-budget=15000",
                 f"--screenshot={path.resolve()}",
                 source.as_uri(),
@@ -101,7 +102,7 @@ def run_chart(content: Mapping[str, Any]) -> go.Figure:
         text=[f"{b[1]:,.0f} s" for b in bars],
     )
     figure.update_layout(title=f"Scenario 8, budget {runs[0]['budget']}: processor time of all processes")
-    figure.update_yaxes(title="s", type="log")
+    figure.update_yaxes(title="s")
     return figure
 
 
@@ -136,6 +137,4 @@ def scaling_chart(
 
 
 def _log(value: float) -> float:
-    import math
-
     return math.log10(value)

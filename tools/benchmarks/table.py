@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE
@@ -55,6 +56,39 @@ def show(console: Console, rows: Sequence[Row], title: str) -> None:
         name = f"  {row.name}" + (f"\n  [dim]{row.note}[/dim]" if row.note else "")
         table.add_row(name, number(row.value), row.unit, number(row.ratio), row.of, row.aim, verdict)
     console.print(table)
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """The table as Markdown, a heading for each group."""
+    lines: list[str] = []
+    group = ""
+    for row in rows:
+        if row.group != group:
+            lines += [
+                "",
+                f"**{row.group}**",
+                "",
+                "| what | value | ratio | to | aim | |",
+                "|---|---:|---:|---|---:|---|",
+            ]
+            group = row.group
+        verdict = {True: "met", False: "missed", None: ""}[row.met]
+        value = f"{number(row.value)} {row.unit}".strip()
+        ratio = "" if row.ratio is None else number(row.ratio)
+        name = row.name + (f" ({row.note})" if row.note else "")
+        lines.append(f"| {name} | {value} | {ratio} | {row.of} | {row.aim} | {verdict} |")
+    return "\n".join(lines[1:])
+
+
+def put_between(path: Path, mark: str, text: str) -> None:
+    """Replace what stands between ``<!-- mark -->`` and ``<!-- end of mark -->`` in a document. Raises ValueError without."""
+    begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
+    content = path.read_text(encoding="utf-8")
+    if begin not in content or end not in content:
+        raise ValueError(f"{path}: no {begin} ... {end}")
+    before, rest = content.split(begin, 1)
+    after = rest.split(end, 1)[1]
+    path.write_text(f"{before}{begin}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 def number(value: float | None) -> str:

@@ -149,25 +149,45 @@ def run_scenario(setting: RunSetting, out: Path, cwd: Path) -> dict[str, Any]:
     if seen.status or not seen.summary:
         last = (seen.output.strip().splitlines() or ["no output"])[-1]
         raise RuntimeError(f"{' '.join(setting.arguments)}: {last}")
-    evaluations = seen.summary["evaluations"]
-    trace, whole_steps = workload(out / "recovery.mcap", evaluations)
     return {
-        "engine": setting.engine,
-        "budget": setting.budget,
-        "workers": setting.workers,
+        **finished_run(out, setting.workers),
         "wall_s": seen.wall_s,
         "cpu_s": seen.cpu_s,
         "memory_mb": seen.memory_mb,
         "first_progress_s": seen.first_progress_s,
         "first_progress_cpu_s": seen.first_progress_cpu_s,
+    }
+
+
+def finished_run(folder: Path, workers: int = 1) -> dict[str, Any]:
+    """The numbers of a run of the past, of ``evaluator=serial`` if its processor time is to be complete.
+
+    Raises RuntimeError where ``folder`` has none.
+    """
+    path = folder / "summary.json"
+    if not path.is_file():
+        raise RuntimeError(f"{folder}: no finished run there (summary.json)")
+    summary = json.loads(path.read_text(encoding="utf-8"))
+    evaluations = summary["evaluations"]
+    trace, whole_steps = workload(folder / "recovery.mcap", evaluations)
+    return {
+        "engine": summary["engine"],
+        "scenario": summary["scenario"],
+        "budget": summary["budget"],
+        "workers": workers,
+        "wall_s": summary["wall_s"],
+        "cpu_s": summary["cpu_s"],
+        "memory_mb": None,
+        "first_progress_s": None,
+        "first_progress_cpu_s": None,
         "asked": evaluations["asked"],
         "simulated": evaluations["simulated"],
         "whole_steps": whole_steps,
         "asked_steps": evaluations["asked_steps"],
         "steps": evaluations["steps"],
-        "digest": seen.summary["result_digest"],
+        "digest": summary["result_digest"],
         "generations": trace,
-        "controllers": controllers(out / "recovery.mcap"),
+        "controllers": controllers(folder / "recovery.mcap"),
     }
 
 
