@@ -16,11 +16,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from benchmarks.assess import explain_rows, peer_rows, run_rows, speed_up_rows, step_rows
+from benchmarks.assess import explain_rows, peer_rows, profile_rows, run_rows, speed_up_rows, step_rows
 from benchmarks.costs import measure_costs
 from benchmarks.explain_run import explain_catalogue
 from benchmarks.figures import draw_table
 from benchmarks.peers import run_peer, write_urdf
+from benchmarks.profile import profile
 from benchmarks.steps import StepSetting, measure_steps
 from benchmarks.table import Row, as_json, markdown, put_between, show
 from benchmarks.timing import machine
@@ -35,7 +36,7 @@ DOCS = ROOT / "docs"
 ENGINES = ("pybullet", "mujoco")
 USUAL_START_S = 8.0
 """From the command to the first generation, where no run was measured."""
-PARTS = ("runs", "steps", "peers", "explain", "costs")
+PARTS = ("runs", "steps", "profile", "peers", "explain", "costs")
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
@@ -118,6 +119,11 @@ class Benchmark:
                 "processes": processes,
             }
 
+    def profile(self) -> None:
+        self.data["profile"] = {}
+        for engine in self.options.engines:
+            self.data["profile"][engine] = profile(StepSetting(engine, self.options.robots, self.options.steps))
+
     def peers(self) -> None:
         urdf = self.folder / "quadruped.urdf"
         write_urdf(quadruped(), urdf)
@@ -154,6 +160,8 @@ class Benchmark:
         d = self.data
         for engine, bare in d["bare"].items():
             self.rows += step_rows(engine, bare["robots"], bare["processes"], bare)
+        for engine, found in d.get("profile", {}).items():
+            self.rows += profile_rows(engine, self.options.robots, found)
         for run in d["runs"]:
             self.rows += run_rows(run, d["bare"].get(run["engine"]), self.cores)
         self.rows += speed_up_rows(d["runs"])

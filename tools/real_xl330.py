@@ -85,8 +85,8 @@ def _held_out(
             f"--hold {hold}: no recording at that gain; there are: {sorted({_gain(t) for t in trials})}"
         )
     evaluator = SerialEvaluator(OneJointEngine(1024), 1024)
-    problem = FreeRun([t for t in trials if _gain(t) != hold], model.robot, evaluator, 50 if quick else 5)
-    held = FreeRun(own, model.robot, evaluator, 50 if quick else 5)
+    problem = FreeRun([t for t in trials if _gain(t) != hold], model.robot, evaluator, 5, effort=0.1 if quick else 1.0)
+    held = FreeRun(own, model.robot, evaluator, 5, effort=0.1 if quick else 1.0)
     page.text(
         f"## kp {hold} held out", "", f"error: {problem.natural_name} over free runs, every recording counting the same"
     )

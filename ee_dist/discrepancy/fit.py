@@ -98,7 +98,7 @@ def fit_all(
     if getattr(problem, "rugged", False):
         from ee_dist.discrepancy.global_fit import effort_of, search_all
 
-        generations, seeds = effort_of(len(widths))
+        generations, seeds = effort_of(len(widths), getattr(problem, "effort", 1.0))
         return search_all(problem, starts, before, mask, trials, generations, seeds, progress=progress)
     runs = [_Run(m, np.clip(np.asarray(u, float), m.lower, m.upper)) for m, u in starts]
 

@@ -46,7 +46,7 @@ class FreeRun:
     """Implements ``ee_dist.discrepancy.problem.Problem``. Channels are the joint positions; a segment is a whole trial.
 
     ``every``: rows of a log from one residual value to the next. ``windows_s`` starts the model anew from the measured
-    state so often, and makes segments of the windows; None runs each trial through.
+    state so often, and makes segments of the windows; None runs each trial through. ``effort`` scales the length of a search.
     """
 
     rugged = True
@@ -60,7 +60,9 @@ class FreeRun:
         evaluator: Evaluator,
         every: int = 3,
         windows_s: float | None = None,
+        effort: float = 1.0,
     ) -> None:
+        self.effort = effort
         self.robot, self.measured, self.evaluator, self.every = robot, tuple(trials), evaluator, every
         columns = [k for k, s in enumerate(robot.sensors) if s.kind == "position"]
         if not columns:

@@ -30,9 +30,13 @@ WIDTH = 0.02
 """Finite difference for the slopes at the end, as a share of the bounds."""
 
 
-def effort_of(iterations: int) -> tuple[int, tuple[int, ...]]:
-    """(generations, seeds) for as many iterations of a fit by slopes: a full fit of four is tried from three seeds."""
-    return 10 * iterations, (1, 2, 3) if iterations >= 4 else (1,)
+def effort_of(iterations: int, effort: float = 1.0) -> tuple[int, tuple[int, ...]]:
+    """(generations, seeds) for as many iterations of a fit by slopes: a full fit of four is tried from three seeds.
+
+    ``effort`` below 1 shortens the search and tries one seed.
+    """
+    seeds = (1, 2, 3) if iterations >= 4 and effort >= 1 else (1,)
+    return max(1, round(10 * iterations * effort)), seeds
 
 
 @dataclass(eq=False)

@@ -352,4 +352,4 @@ def test_the_engines_stand_alike(engines: dict[str, Engine]) -> None:
         assert b.base_pose is not None
         # A robot of these that falls over a lost leg slides while it falls: there contact models differ most.
         assert a.base_pose[:, :3] == pytest.approx(b.base_pose[:, :3], abs=1e-2)
-        assert a.base_pose[:, 3:] == pytest.approx(b.base_pose[:, 3:], abs=0.02)
+        assert a.base_pose[:, 3:] == pytest.approx(b.base_pose[:, 3:], abs=0.04)

@@ -53,6 +53,21 @@ def test_a_step_measurement_has_its_keys(name):
     assert all(math.isfinite(v) and v > 0 for v in found.values())
 
 
+@pytest.mark.parametrize("name", ENGINES)
+def test_a_profile_adds_up_and_leaves_the_loop_as_it_was(name):
+    from benchmarks.profile import profile
+    from benchmarks.steps import StepSetting
+
+    from ee_dist.engines import loop
+
+    before = loop.DrivePath.step
+    found = profile(StepSetting(name, 3, 10))
+    parts = {row: us for row, us in found.items() if row != "in all"}
+    assert {"engine: torques sent, step", "reading joints and contacts", "network", "drives"} <= set(parts)
+    assert sum(parts.values()) == pytest.approx(found["in all"])
+    assert loop.DrivePath.step is before
+
+
 def test_offspring_of_a_run_differ_in_few_weights():
     from benchmarks.steps import StepSetting, sample_rollouts
 

@@ -35,6 +35,13 @@ def step_rows(engine: str, robots: int, processes: int, found: Mapping[str, floa
     return rows
 
 
+def profile_rows(engine: str, robots: int, found: Mapping[str, float]) -> list[Row]:
+    """Where the time of a rollout goes."""
+    group = f"{LABEL[engine]}: where the time of a robot-step goes ({robots} robots a batch)"
+    total = max(found["in all"], 1e-12)
+    return [Row(group, name, us, "us of a core", us / total, "all") for name, us in found.items()]
+
+
 def run_rows(run: Mapping[str, Any], bare: Mapping[str, float] | None, cores: int) -> list[Row]:
     """A whole run of scenario 8."""
     workers = run["workers"]
