@@ -46,7 +46,8 @@ class FreeRun:
     """Implements ``ee_dist.discrepancy.problem.Problem``. Channels are the joint positions; a segment is a whole trial.
 
     ``every``: rows of a log from one residual value to the next. ``windows_s`` starts the model anew from the measured
-    state so often, and makes segments of the windows; None runs each trial through. ``effort`` scales the length of a search.
+    state so often, and makes segments of the windows; None runs each trial through. ``effort`` scales the length of a
+    search.
     """
 
     rugged = True

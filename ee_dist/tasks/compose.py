@@ -31,6 +31,14 @@ def quoted(arguments: list[str]) -> list[str]:
     return [quote(a) for a in arguments]
 
 
+def folder_name(overrides: str) -> str:
+    """A job's overrides as the name of its folder, without signs that mean something to a shell."""
+    return re.sub(r"[^A-Za-z0-9._=-]+", "_", overrides.replace("'", "").replace("+", "")).strip("_")
+
+
+OmegaConf.register_new_resolver("folder_name", folder_name, replace=True)
+
+
 def config_folder() -> Path:
     """The folder of configs: beside the package in a checkout, inside it where it was installed."""
     package = Path(__file__).resolve().parent.parent

@@ -123,6 +123,9 @@ def test_a_sweep_gives_each_job_its_own_folder(cli, tiny):
     summaries = [json.loads((run / "summary.json").read_text()) for run in outcome.runs()]
     assert {(s["scenario"], s["seed"]) for s in summaries} == {(1, 0), (1, 1), (9, 0), (9, 1)}
     assert len({s["result_digest"] for s in summaries}) == 4
+    names = [run.name for run in outcome.runs()]
+    assert sum("scenario-1" in name for name in names) == sum("scenario-9" in name for name in names) == 2
+    assert not [name for name in names if set("'+ ") & set(name)], "a shell must take them as they are"
 
 
 def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny):
