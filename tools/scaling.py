@@ -99,7 +99,8 @@ def markdown(result: Mapping[str, Any]) -> str:
         if found:
             lines += [
                 f"Check, a repair pass on warm workers: 2 workers are {found['speed_up_measured']:.2f} times as fast as 1 "
-                f"(predicted {found['speed_up_predicted']:.2f}), two nodes {found['speed_up_two_nodes']:.2f} times; "
+                f"(predicted {found['speed_up_predicted']:.2f}; two processes that share nothing: "
+                f"{found['speed_up_possible']:.2f}), two nodes {found['speed_up_two_nodes']:.2f} times; "
                 f"{'the same result in all' if found['same_result'] else 'the results differ'}.",
                 "",
             ]
@@ -144,7 +145,8 @@ def main(arguments: list[str] | None = None) -> int:
             result["check"][engine] = found = check(CheckSetting(engine), costs)
             console.print(
                 f"Check: 2 workers measured {found['speed_up_measured']:.2f} x, two nodes {found['speed_up_two_nodes']:.2f} x, "
-                f"predicted {found['speed_up_predicted']:.2f} x; same result: {found['same_result']}.",
+                f"predicted {found['speed_up_predicted']:.2f} x, two processes that share nothing "
+                f"{found['speed_up_possible']:.2f} x; same result: {found['same_result']}.",
                 highlight=False,
             )
     if options.docs:

@@ -36,7 +36,7 @@ def test_the_parts_add_up_to_the_wall_time(model, workers):
     assert 0 < found.busy <= 1
 
 
-def test_more_cores_never_hurt_and_stop_helping_at_one_robot_a_worker(model):
+def test_more_cores_help_until_each_worker_has_one_robot(model):
     from benchmarks.scaling_model import limit_s, simulate
 
     walls = [simulate(*model, n).wall_s for n in (1, 2, 4, 8, 16, 50, 200, 1000, 10000)]
@@ -90,5 +90,6 @@ def test_two_workers_and_two_nodes_come_close_to_the_prediction():
     found = check(CheckSetting("pybullet", population=48, generations=2, steps=300, repeat=2), costs)
     assert found["nodes"] == 2
     assert found["same_result"]
-    # A shared machine leaves two workers anything between the speed of one and of two.
-    assert 0.4 * found["speed_up_predicted"] < found["speed_up_measured"] < 1.6 * found["speed_up_predicted"]
+    # On a machine that others use, two workers get what two processes get that share nothing.
+    most = min(found["speed_up_predicted"], found["speed_up_possible"])
+    assert 0.5 * most < found["speed_up_measured"] < 2.0 * most
