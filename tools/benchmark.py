@@ -167,7 +167,7 @@ class Benchmark:
         self.rows += speed_up_rows(d["runs"])
         for program, title in (("naive_program", "Naive program"), ("deap_program", "DEAP program")):
             if program in d["peers"]:
-                self.rows += peer_rows(title, d["peers"][program], d["runs"], self.cores)
+                self.rows += peer_rows(title, d["peers"][program], d["runs"], d["machine"]["shared"])
         for found in d.get("explain", []):
             self.rows += explain_rows(found)
 

@@ -153,11 +153,14 @@ def test_rows_compare_a_run_with_its_limit_and_its_peers():
     assert rows["saved by stopping at the header"].ratio == pytest.approx(0.6)
     assert rows["saved by the cache"].ratio == pytest.approx(0.1)
     assert {r.name: r.ratio for r in speed_up_rows(runs)}["whole run"] == pytest.approx(2.0)
-    cost = {"evaluations": 10, "steps": 1000, "wall_s": 0.1, "cpu_s": 0.2}
-    peer = {r.name: r for r in peer_rows("Naive program", cost, runs, cores=2)}
+    cost = {"evaluations": 10, "steps": 1000, "wall_s": 0.1, "cpu_s": 0.24}
+    peer = {r.name: r for r in peer_rows("Naive program", cost, runs, shared=False)}
     found = peer["all evaluations, against our run on PyBullet"]
     assert (found.value, found.ratio) == (pytest.approx(100.0), pytest.approx(10.0))
     assert found.met
+    busy = {r.name: r.met for r in peer_rows("Naive program", cost, runs, shared=True)}
+    assert busy["all evaluations, against our run on PyBullet"] is None
+    assert busy["the same, processor time"] is True
 
 
 @pytest.mark.slow
