@@ -25,6 +25,10 @@ _SENSOR_FAULTS: dict[str, Any] = {
 }
 
 
+DRAWS = 8
+"""Draws of the noise of a faulty channel, whose mean roughness is compared with the measured one."""
+
+
 def roughness(values: Array) -> Array:
     """(T, S) -> (T, S): squared second difference / 6, whose mean is the variance of white noise on a smooth signal."""
     out = np.zeros_like(values)
@@ -132,51 +136,64 @@ class Predictor:
 
     def digests(self, pairs: Sequence[tuple[int, Robot]]) -> list[Digest]:
         """Digests for (trial, model) pairs, simulated in one call."""
-        as_declared = {id(m): self._as_declared(m) for _, m in pairs}
-        plain = [as_declared[id(model)] for _, model in pairs]
+        changed = {id(m): self._changed(m) for _, m in pairs}
         jobs = []
         bare: dict[int, Robot] = {}
-        for (k, model), simple in zip(pairs, plain, strict=True):
+        for k, model in pairs:
             if id(model) not in bare:
                 bare[id(model)] = clean(model)
-            reduction = ToDigest(self.block, self.window) if simple else ToSensors()
+            reduction = ToSensors() if changed[id(model)] else ToDigest(self.block, self.window)
             jobs.append(Job(rollout_of(self.trials[k], model, bare[id(model)]), reduction))
         found = self.evaluator.evaluate(jobs)
         out: list[Digest] = list(found)
-        by_trial: dict[int, list[int]] = {}
-        for i, ((k, _), simple) in enumerate(zip(pairs, plain, strict=True)):
-            if not simple:
-                by_trial.setdefault(k, []).append(i)
+        for i, (k, model) in enumerate(pairs):
+            if channels := changed[id(model)]:
+                out[i] = self._reported(k, model, found[i], channels)
             else:
                 out[i] = self._with_declared_noise(found[i])
-        for k, members in by_trial.items():
-            reported = report([pairs[i][1] for i in members], np.stack([found[i] for i in members], axis=1), k)
-            for column, i in enumerate(members):
-                clear, noisy = reported[0][:, column], reported[1][:, column]
-                shape, grain = digest(clear, self.block, self.window), digest(noisy, self.block, self.window)
-                out[i] = replace(shape, rough=grain.rough, repeated=grain.repeated)
         return out
 
-    def _as_declared(self, model: Robot) -> bool:
-        """Whether the model's sensors are perfect but for the noise that the base model declares."""
-        if model.sensors != self.base.sensors:
-            return False
-        return all(replace(s, noise=0.0) == replace(s, **_SENSOR_FAULTS) for s in model.sensors)
+    def _changed(self, model: Robot) -> list[int]:
+        """The channels whose report takes more than adding the noise that the base model declares."""
+        return [
+            i
+            for i, (s, declared) in enumerate(zip(model.sensors, self.base.sensors, strict=True))
+            if s != declared or replace(s, noise=0.0) != replace(s, **_SENSOR_FAULTS)
+        ]
 
     def _with_declared_noise(self, found: Digest) -> Digest:
         noise = np.array([s.noise for s in self.base.sensors])
         return replace(found, rough=found.rough + noise**2, repeated=np.where(noise > 0, 0.0, found.repeated))
 
+    def _reported(self, trial: int, model: Robot, true: Array, channels: Sequence[int]) -> Digest:
+        """The digest of true channels (T, S) behind sensors of which ``channels`` are faulty.
 
-def report(models: Sequence[Robot], true: Array, seed: int) -> tuple[Array, Array]:
-    """What the sensors of B models report of true channels (T, B, S): without random errors, and with them."""
-    quiet = [replace(m, sensors=tuple(replace(s, noise=0.0, dropout=0.0) for s in m.sensors)) for m in models]
-    dt, steps = models[0].time_step_s, len(true)
-    out = []
-    for robots in (quiet, list(models)):
-        path = SensingPath(robots, dt, steps, [1000 + seed] * len(robots))
-        out.append(np.stack([path.step(i, true[i]) for i in range(steps)]))
-    return out[0], out[1]
+        Noise is the expected one wherever that is known: a draw of it would count against every hypothesis that has a
+        faulty sensor. How a faulty channel looks under noise is the mean of some draws.
+        """
+        clear = true.copy()
+        clear[:, channels] = report(model, true, channels)
+        shape = self._with_declared_noise(digest(clear, self.block, self.window))
+        rough, repeated = shape.rough.copy(), shape.repeated.copy()
+        noisy = report(model, true, channels, [1000 * (d + 1) + trial for d in range(DRAWS)])
+        grain = digest(noisy.reshape(len(true), -1), self.block, self.window)
+        rough[:, channels] = grain.rough.reshape(-1, DRAWS, len(channels)).mean(axis=1)
+        repeated[:, channels] = grain.repeated.reshape(-1, DRAWS, len(channels)).mean(axis=1)
+        return replace(shape, rough=rough, repeated=repeated)
+
+
+def report(model: Robot, true: Array, channels: Sequence[int], seeds: Sequence[int] = ()) -> Array:
+    """What some sensors report of true channels (T, S): (T, C) without random errors, (T, draws * C) with those of
+    each seed."""
+    sensors = tuple(model.sensors[c] for c in channels)
+    if not seeds:
+        sensors = tuple(replace(s, noise=0.0, dropout=0.0) for s in sensors)
+    robot = replace(model, sensors=sensors)
+    draws = max(1, len(seeds))
+    path = SensingPath([robot] * draws, model.time_step_s, len(true), seeds or [None])
+    seen = true[:, list(channels)]
+    rows = [path.step(i, np.broadcast_to(v, (draws, len(v)))) for i, v in enumerate(seen)]
+    return np.stack(rows).reshape(len(true), -1)
 
 
 def predicted_commands(trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
