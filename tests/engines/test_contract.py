@@ -99,12 +99,13 @@ def test_pendulum_period(engine: Engine, rotor_inertia: float) -> None:
     assert angle[-700:].max() > 0.098, "and loses none"
 
 
-def test_torque_turns_and_force_slides_a_joint(engine: Engine) -> None:
+@pytest.mark.parametrize("rotor", [0.0, 0.5])
+def test_torque_turns_and_force_slides_a_joint(engine: Engine, rotor: float) -> None:
     for kind, inertia in (("hinge", 0.008), ("slide", MASS_KG)):
-        robot = one_joint(kind, (0.0, 0.0, 1.0)).with_world(gravity_m_s2=0.0)
+        robot = one_joint(kind, (0.0, 0.0, 1.0), rotor).with_world(gravity_m_s2=0.0)
         robot = robot.map_drive("joint", lambda d: replace(d, offset_torque=0.04))
         position = run(engine, robot, 201).channel("position")
-        assert position[-1] == pytest.approx(0.5 * 0.04 / inertia * 0.4**2, rel=0.006)
+        assert position[-1] == pytest.approx(0.5 * 0.04 / (inertia + rotor) * 0.4**2, rel=0.006)
 
 
 def test_coulomb_friction_stops_a_slide_where_the_formula_says_and_never_reverses_it(engine: Engine) -> None:

@@ -93,7 +93,7 @@ class World:
             robot.start_rotation,
             baseInertialFramePosition=root.com_m,
             baseInertialFrameOrientation=self.frames[root.name][1],
-            linkMasses=[q.mass_kg for q in parts],
+            linkMasses=[_with_rotor(robot, q).mass_kg for q in parts],
             linkCollisionShapeIndices=[self._shape(q) for q in parts],
             linkVisualShapeIndices=[-1] * len(parts),
             linkPositions=[j.position_m for j in joints],
@@ -163,13 +163,14 @@ class World:
     def _apply(self, body: int, robot: Robot) -> None:
         for part in robot.present_parts:
             k = self.link_of_part[part.name]
-            diagonal, turn = _principal(_with_rotor(robot, part))
+            grown = _with_rotor(robot, part)
+            diagonal, turn = _principal(grown)
             if not np.allclose(turn, self.frames[part.name][1]):
                 raise RuntimeError(f"pybullet: the principal axes of {part.name} changed in place")
             p.changeDynamics(
                 body,
                 k,
-                mass=part.mass_kg if k >= 0 or robot.free_base else 0.0,
+                mass=grown.mass_kg if k >= 0 or robot.free_base else 0.0,
                 localInertiaDiagonal=diagonal,
                 lateralFriction=robot.world.friction * part.grip,
                 physicsClientId=self.client,
@@ -196,7 +197,7 @@ class World:
 def _with_rotor(robot: Robot, part: Part) -> Part:
     """Bullet knows no rotor inertia: it is given to the part that the joint moves, about the joint's axis.
 
-    Unlike a true rotor's, it also resists when the parent turns; for a slide it adds to the mass.
+    Unlike a true rotor's, it also resists when the parent turns; for a slide it adds to the mass, and so to the weight.
     """
     for joint in robot.joints:
         if joint.child != part.name:
