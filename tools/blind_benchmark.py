@@ -5,7 +5,8 @@
 Every tenth robot is untouched. An effect whose whole mark on the logs is below the noise is said to be too small and is
 left out of the scores. ``--withhold`` takes the drawn effect out of the catalogue: right is then ``unexplained``, or an
 effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``. ``--cross-engine`` tries the
-robot in the other engine, after calibrating the model on an untouched robot there.
+robot in the other engine, after calibrating the model on an untouched robot there. ``--workers`` runs cases side by
+side; a case is the same whoever runs it.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ import os
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -226,28 +229,60 @@ def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def run(bench: Bench) -> Iterator[Case | str]:
+    """All cases in their order; for one that the engine cannot simulate, what it said."""
+    count = bench.args.cases
+    if bench.args.workers < 2:
+        yield from (attempt(bench, k) for k in range(count))
+        return
+    settings = (bench.args, bench.before, bench.unmodelled)
+    with ProcessPoolExecutor(bench.args.workers, get_context("spawn"), _start, settings) as pool:
+        yield from pool.map(_attempt, range(count))
+
+
+def attempt(bench: Bench, index: int) -> Case | str:
+    try:
+        return bench.case(index)
+    except EngineError as problem:
+        return str(problem)
+
+
+_here: list[Bench] = []
+"""The bench of a worker process."""
+
+
+def _start(args: argparse.Namespace, before: Hypothesis, unmodelled: Array | None) -> None:
+    bench = Bench(args)
+    bench.before, bench.unmodelled = before, unmodelled
+    _here.append(bench)
+
+
+def _attempt(index: int) -> Case | str:
+    return attempt(_here[0], index)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", type=float, default=0.02, help="share of each channel's range")
     parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
+    parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--json", type=Path)
     for flag in ("withhold", "two", "cross-engine"):
         parser.add_argument(f"--{flag}", action="store_true")
     args = parser.parse_args()
-    bench, cases, began = Bench(args), [], time.monotonic()
+    bench = Bench(args)
+    cases: list[Case] = []
     if args.cross_engine:
         bench.calibrate()
-    for k in range(args.cases):
-        try:
-            case = bench.case(k)
-        except EngineError as problem:
-            print(f"{k + 1:4d}/{args.cases}  skipped: {problem}", flush=True)
+    began = time.monotonic()
+    for k, case in enumerate(run(bench)):
+        if isinstance(case, str):
+            print(f"{k + 1:4d}/{args.cases}  skipped: {case}", flush=True)
             continue
         cases.append(case)
-        spent = time.monotonic() - began
-        left = spent / (k + 1) * (args.cases - k - 1)
+        left = (time.monotonic() - began) / (k + 1) * (args.cases - k - 1)
         mark = "small" if case.too_small else "first" if case.first else "tied" if case.within else case.verdict
         print(f"{k + 1:4d}/{args.cases}  {case.shown or 'untouched':<78.78}  {mark:<16} {case.ratio:5.2f} x floor "
               f"{case.seconds:5.0f} s, {left / 60:.0f} min left", flush=True)  # fmt: skip

@@ -103,7 +103,7 @@ def improve(
                 model, at = _with_best_start(problem, parts, u, group, now, found)
                 judged = fit_out(problem, [(model, at)], base, (), half, len(pool), progress)[0]
                 step = _rung(problem, judged, len(group), ladder[-1])
-                if _earns(step, ladder[-1], len(pool)):
+                if _earns(step, ladder[-1], least_energy(len(pool), sum(c.size for c in group))):
                     rung = step
                     parts, u = [*parts, *group], judged.u
                     break
@@ -168,11 +168,11 @@ def _rung(problem: Problem, judged: Judged, added: int, last: Rung) -> Rung:
     )
 
 
-def _earns(step: Rung, last: Rung, tried: int) -> bool:
+def _earns(step: Rung, last: Rung, least: float) -> bool:
     gained = float((last.held - step.held).sum())
     whole = float(last.held.sum())
     sound = step.interval[0] > 0 or lost(last.held - step.held) <= LOST_SHARE * gained
-    return bool(np.isfinite(gained) and gained > max(least_energy(tried), LEAST_SHARE * whole) and sound)
+    return bool(np.isfinite(gained) and gained > max(least, LEAST_SHARE * whole) and sound)
 
 
 def _finish(

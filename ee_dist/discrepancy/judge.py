@@ -54,10 +54,10 @@ class Judged:
         return " + ".join(c.name for c in self.model.parts)
 
 
-def least_energy(tried: int) -> float:
+def least_energy(tried: int, parameters: int = 1) -> float:
     """Energy that the best of ``tried`` useless candidates may take off by luck, with a margin: the largest of that many
-    chi-squared values with one degree of freedom is about 2 ln(tried)."""
-    return 2.0 * math.log(max(tried, 2)) + 7.0
+    chi-squared values with one degree of freedom is about 2 ln(tried), and every further parameter adds to it."""
+    return 2.0 * math.log(max(tried, 2)) + 8.0 + 2.0 * parameters
 
 
 def judge(problem: Problem, base: Array, fits: Sequence[Fit], halves: Array, tried: int) -> Judged:
@@ -72,7 +72,7 @@ def judge(problem: Problem, base: Array, fits: Sequence[Fit], halves: Array, tri
     gained = before - held
     low, high = bootstrap(gained, groups=problem.trial_of_segment)
     gain = float(gained.sum())
-    enough = least_energy(tried)
+    enough = least_energy(tried, max(1, len(first.u)))
     why = ""
     if not np.isfinite(gain) or gain < enough:
         why = "its gain on held-out data is no more than luck"

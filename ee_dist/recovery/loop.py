@@ -34,6 +34,8 @@ class Plan:
     steps: int = 1000
     parsimony: float = 0.1
     """Share of the error that a term of a hypothesis must account for to be believed; the paper has no such rule (0)."""
+    related: float = 1.0
+    """Share of a repair pass's first population that descends from the database; with 0 only the database itself does."""
 
     def __post_init__(self) -> None:
         if self.compensating_trials < 1:
@@ -42,6 +44,8 @@ class Plan:
             raise ValueError("plan: steps must be 2 or more")
         if not 0.0 <= self.parsimony < 1.0:
             raise ValueError(f"plan: parsimony must be from 0 to below 1, not {self.parsimony}")
+        if not 0.0 <= self.related <= 1.0:
+            raise ValueError(f"plan: related must be from 0 to 1, not {self.related}")
 
 
 @dataclass
@@ -102,7 +106,7 @@ def recover(
 
         model = apply(robot, hypothesis)
         best, expected = repair(
-            model, controllers, evaluator, plan.repair, plan.steps, repair_seeds[k + 1], observer, k + 1
+            model, controllers, evaluator, plan.repair, plan.steps, repair_seeds[k + 1], observer, k + 1, plan.related
         )
         controllers.append(best)
         result.expected_m.append(expected)

@@ -97,6 +97,7 @@ class BudgetConfig:
     compensating_trials: int = 4
     steps: int = 1000
     parsimony: float = 0.1
+    related: float = 1.0
 
     def __post_init__(self) -> None:
         self.plan()
@@ -110,6 +111,7 @@ class BudgetConfig:
                 compensating_trials=self.compensating_trials,
                 steps=self.steps,
                 parsimony=self.parsimony,
+                related=self.related,
             )
         except ValueError as error:
             raise ConfigError(str(error)) from None
