@@ -231,5 +231,4 @@ class OpenLoop:
         models = [apply(model, t.setup) for t in self.measured]
         rollouts = [rollout_of(t, m) for t, m in zip(self.measured, models, strict=True)]
         true = self.evaluator.evaluate([Job(r, ToSensors()) for r in rollouts])
-        every = range(len(self.robot.sensors))
-        return [report(m, v, every) for m, v in zip(models, true, strict=True)]
+        return [report(m, v) for m, v in zip(models, true, strict=True)]

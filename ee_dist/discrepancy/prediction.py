@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -95,9 +96,14 @@ def digest(sensors: Array, block: int, window: int) -> Digest:
     )
 
 
+@lru_cache(4096)
+def _faultless(sensor: Sensor) -> Sensor:
+    return replace(sensor, **_SENSOR_FAULTS)
+
+
 def clean(robot: Robot) -> Robot:
     """The robot with perfect sensors and straight wiring: what is left for the engine once commands are given."""
-    sensors = tuple(replace(s, **_SENSOR_FAULTS) for s in robot.sensors)
+    sensors = tuple(map(_faultless, robot.sensors))
     wiring = Wiring(tuple(range(len(robot.drives))), robot.wiring.hidden_gain)
     neutral = replace(wiring, hidden_gain=tuple(1.0 for _ in wiring.hidden_gain))
     return replace(robot, sensors=sensors, wiring=neutral)
@@ -133,6 +139,7 @@ class Predictor:
     ) -> None:
         self.trials, self.base, self.evaluator = trials, base, evaluator
         self.block, self.window = block, window
+        self._only_noisy = [replace(s, noise=0.0) == _faultless(s) for s in base.sensors]
 
     def digests(self, pairs: Sequence[tuple[int, Robot]]) -> list[Digest]:
         """Digests for (trial, model) pairs, simulated in one call."""
@@ -146,11 +153,16 @@ class Predictor:
             jobs.append(Job(rollout_of(self.trials[k], model, bare[id(model)]), reduction))
         found = self.evaluator.evaluate(jobs)
         out: list[Digest] = list(found)
+        alike: dict[tuple[int, ...], list[int]] = {}
         for i, (k, model) in enumerate(pairs):
             if channels := changed[id(model)]:
-                out[i] = self._reported(k, model, found[i], channels)
+                alike.setdefault((k, *(int(model.sensors[c].kind == "touch") for c in channels)), []).append(i)
             else:
                 out[i] = self._with_declared_noise(found[i])
+        for (k, *_), members in alike.items():
+            faulty = [(pairs[i][1], found[i], changed[id(pairs[i][1])]) for i in members]
+            for i, seen in zip(members, self._reported(k, faulty), strict=True):
+                out[i] = seen
         return out
 
     def _changed(self, model: Robot) -> list[int]:
@@ -158,42 +170,60 @@ class Predictor:
         return [
             i
             for i, (s, declared) in enumerate(zip(model.sensors, self.base.sensors, strict=True))
-            if s != declared or replace(s, noise=0.0) != replace(s, **_SENSOR_FAULTS)
+            if s != declared or not self._only_noisy[i]
         ]
 
     def _with_declared_noise(self, found: Digest) -> Digest:
         noise = np.array([s.noise for s in self.base.sensors])
         return replace(found, rough=found.rough + noise**2, repeated=np.where(noise > 0, 0.0, found.repeated))
 
-    def _reported(self, trial: int, model: Robot, true: Array, channels: Sequence[int]) -> Digest:
-        """The digest of true channels (T, S) behind sensors of which ``channels`` are faulty.
+    def _reported(self, trial: int, members: Sequence[Faulty]) -> list[Digest]:
+        """Digests of what members report, whose faulty channels are of the same kinds.
 
         Noise is the expected one wherever that is known: a draw of it would count against every hypothesis that has a
         faulty sensor. How a faulty channel looks under noise is the mean of some draws.
         """
-        clear = true.copy()
-        clear[:, channels] = report(model, true, channels)
-        shape = self._with_declared_noise(digest(clear, self.block, self.window))
-        rough, repeated = shape.rough.copy(), shape.repeated.copy()
-        noisy = report(model, true, channels, [1000 * (d + 1) + trial for d in range(DRAWS)])
-        grain = digest(noisy.reshape(len(true), -1), self.block, self.window)
-        rough[:, channels] = grain.rough.reshape(-1, DRAWS, len(channels)).mean(axis=1)
-        repeated[:, channels] = grain.repeated.reshape(-1, DRAWS, len(channels)).mean(axis=1)
-        return replace(shape, rough=rough, repeated=repeated)
+        steady = reports(members)[:, :, 0]
+        drawn = reports(members, [1000 * (d + 1) + trial for d in range(DRAWS)])
+        out = []
+        for i, (_, true, channels) in enumerate(members):
+            clear = true.copy()
+            clear[:, channels] = steady[i]
+            shape = self._with_declared_noise(digest(clear, self.block, self.window))
+            rough, repeated = shape.rough.copy(), shape.repeated.copy()
+            grain = digest(drawn[i].reshape(len(true), -1), self.block, self.window)
+            rough[:, channels] = grain.rough.reshape(-1, DRAWS, len(channels)).mean(axis=1)
+            repeated[:, channels] = grain.repeated.reshape(-1, DRAWS, len(channels)).mean(axis=1)
+            out.append(replace(shape, rough=rough, repeated=repeated))
+        return out
 
 
-def report(model: Robot, true: Array, channels: Sequence[int], seeds: Sequence[int] = ()) -> Array:
-    """What some sensors report of true channels (T, S): (T, C) without random errors, (T, draws * C) with those of
-    each seed."""
-    sensors = tuple(model.sensors[c] for c in channels)
-    if not seeds:
-        sensors = tuple(replace(s, noise=0.0, dropout=0.0) for s in sensors)
-    robot = replace(model, sensors=sensors)
+Faulty = tuple[Robot, Array, Sequence[int]]
+"""A model, the true values of its channels (T, S), and some of its channels."""
+
+
+def reports(members: Sequence[Faulty], seeds: Sequence[int] = ()) -> Array:
+    """What some sensors of each member report: (B, T, D, C), one D a seed; without random errors, D = 1, if there is none.
+
+    The members' channels are as many, of the same kinds, and their trials as long.
+    """
     draws = max(1, len(seeds))
-    path = SensingPath([robot] * draws, model.time_step_s, len(true), seeds or [None])
-    seen = true[:, list(channels)]
-    rows = [path.step(i, np.broadcast_to(v, (draws, len(v)))) for i, v in enumerate(seen)]
-    return np.stack(rows).reshape(len(true), -1)
+    robots = []
+    for model, _, channels in members:
+        sensors = tuple(model.sensors[c] for c in channels)
+        if not seeds:
+            sensors = tuple(replace(s, noise=0.0, dropout=0.0) for s in sensors)
+        robots += [replace(model, sensors=sensors)] * draws
+    seen = np.stack([true[:, list(channels)] for _, true, channels in members], axis=1)
+    each: list[int | None] = [*seeds] if seeds else [None]
+    path = SensingPath(robots, robots[0].time_step_s, len(seen), each * len(members))
+    found = np.stack([path.step(i, v) for i, v in enumerate(np.repeat(seen, draws, axis=1))])
+    return np.moveaxis(found.reshape(len(seen), len(members), draws, -1), 0, 1)
+
+
+def report(model: Robot, true: Array) -> Array:
+    """What the sensors report of true channels (T, S) when they make no random errors."""
+    return np.asarray(reports([(model, true, range(len(model.sensors)))])[0, :, 0])
 
 
 def predicted_commands(trial: MeasuredTrial, models: Sequence[Robot]) -> Array:

@@ -68,7 +68,7 @@ def proposals(
         models = models_of[k]
         logs = found[k * len(models) : (k + 1) * len(models)]
         if isinstance(driver, Commands):
-            logs = [report(m, true, range(len(m.sensors))) for m, true in zip(models, logs, strict=True)]
+            logs = [report(m, true) for m, true in zip(models, logs, strict=True)]
         gaps = [_distance(a, b, scale.scale) for a, b in combinations(logs, 2)]
         out.append(Proposal(excitation, float(min(gaps)) if np.isfinite(gaps).all() else 0.0))
     return sorted(out, key=lambda p: -p.separation / np.sqrt(p.excitation.seconds))

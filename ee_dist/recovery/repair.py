@@ -14,7 +14,6 @@ from ee_dist.recording.records import REPAIR, GenerationRecord
 from ee_dist.recovery.observer import Observer
 from ee_dist.robots.model import Robot
 
-
 NEAREST, FARTHEST = 0.01, 0.3
 """Shares of new values in the relatives of a controller that start a pass."""
 
