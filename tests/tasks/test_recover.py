@@ -128,6 +128,18 @@ def test_a_sweep_gives_each_job_its_own_folder(cli, tiny):
     assert not [name for name in names if set("'+ ") & set(name)], "a shell must take them as they are"
 
 
+def test_the_runs_of_a_sweep_go_side_by_side_with_the_same_digests(cli, tiny):
+    sweep = ["-m", "+scenario=1,9", "evaluator=serial", *tiny, "budget.compensating_trials=1"]
+    digests = []
+    for launcher in ([], ["hydra/launcher=joblib", "hydra.launcher.n_jobs=2"]):
+        outcome = cli(*sweep, *launcher)
+        assert outcome.status == 0, outcome.err
+        summaries = [json.loads((run / "summary.json").read_text()) for run in outcome.runs()]
+        digests.append({(s["scenario"], s["result_digest"]) for s in summaries})
+    assert digests[0] == digests[1]
+    assert len(digests[0]) == 2
+
+
 def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny):
     base = ["+scenario=3", *tiny, "budget.compensating_trials=1"]
     same = [
