@@ -36,6 +36,7 @@ from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
 from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.unmodelled import Unmodelled, unmodelled_by
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.contract import Engine, EngineError
 from ee_dist.evaluation.cache import CachedEvaluator
@@ -44,7 +45,6 @@ from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.trials.excitation import STANDARD
-from ee_dist.trials.log import Array
 from ee_dist.trials.noise import with_noise
 
 DETECTABLE = 30.0
@@ -90,7 +90,7 @@ def measured(engine: Engine, robot: Robot, hidden: Hypothesis, seed: Sequence[in
         hardware = PhysicalRobot(engine, robot, (*hidden, *held), np.random.SeedSequence([*seed, k]))
         driver = driver_of(excitation, robot)
         log = hardware.trial(driver, excitation.steps(robot))
-        out.append(MeasuredTrial(f"{excitation.kind} {excitation.fixture}", log, driver, held))
+        out.append(MeasuredTrial(f"{k} {excitation.kind} {excitation.fixture}", log, driver, held))
     return out
 
 
@@ -105,7 +105,7 @@ class Bench:
         self.outer = engine_of(other) if args.cross_engine else self.inner
         self.pool = candidates(self.robot)
         self.before: Hypothesis = ()
-        self.unmodelled: Array | None = None
+        self.unmodelled: Unmodelled | None = None
 
     def problem(self, trials: list[MeasuredTrial]) -> OpenLoop:
         evaluator = CachedEvaluator(SerialEvaluator(self.inner))
@@ -119,9 +119,7 @@ class Bench:
         ]
         found = improve(problem, shared, (), None, most=3)
         self.before = found.terms
-        raw = [problem.raw_blocks(k, found.residual) for k in range(len(problem.trials))]
-        left = np.concatenate([r**2 for r in raw]).mean(axis=0) * problem.block - problem.scale.noise**2
-        self.unmodelled = np.sqrt(np.maximum(left, 0.0))
+        self.unmodelled = unmodelled_by(problem, found.residual)
         print(f"calibrated on an untouched robot: {'; '.join(map(str, self.before)) or 'nothing to add'}", flush=True)
 
     def case(self, index: int) -> Case:
@@ -251,7 +249,7 @@ _here: list[Bench] = []
 """The bench of a worker process."""
 
 
-def _start(args: argparse.Namespace, before: Hypothesis, unmodelled: Array | None) -> None:
+def _start(args: argparse.Namespace, before: Hypothesis, unmodelled: Unmodelled | None) -> None:
     bench = Bench(args)
     bench.before, bench.unmodelled = before, unmodelled
     _here.append(bench)

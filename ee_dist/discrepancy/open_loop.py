@@ -24,6 +24,7 @@ from ee_dist.discrepancy.prediction import (
     rollout_of,
 )
 from ee_dist.discrepancy.scale import channel_scale
+from ee_dist.discrepancy.unmodelled import Unmodelled, of_trial
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job
@@ -54,7 +55,7 @@ def _held_up(spread: Array) -> Array:
 class OpenLoop:
     """Implements ``ee_dist.discrepancy.problem.Problem``.
 
-    ``block`` rows are averaged into a value, ``window`` rows (a multiple) are a segment. ``unmodelled`` (S,) widens the
+    ``block`` rows are averaged into a value, ``window`` rows (a multiple) are a segment. ``unmodelled`` widens the
     scales by what a calibrated model is known to leave. ``before``: what the model is believed to have; the spread
     of ``members`` neighbours of that model weighs the residuals.
     """
@@ -66,7 +67,7 @@ class OpenLoop:
         evaluator: Evaluator,
         block: int = 4,
         window: int = 60,
-        unmodelled: Array | None = None,
+        unmodelled: Unmodelled | None = None,
         before: Hypothesis = (),
         members: int = MEMBERS,
     ) -> None:
@@ -74,7 +75,8 @@ class OpenLoop:
         self.block, self.window = block, window
         self._members = members
         self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}
-        self.scale = channel_scale(robot, trials, unmodelled)
+        self.scale = channel_scale(robot, trials)
+        self._unmodelled = unmodelled or {}
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self.trials = tuple(t.name for t in trials)
         self.looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
@@ -99,7 +101,8 @@ class OpenLoop:
         for k in range(len(self.measured)):
             mine = found[k * len(models) : (k + 1) * len(models)]
             base, others = mine[0], [d for d in mine[1:] if d.finite]
-            noise = self.scale.scale**2 / self.block
+            known = of_trial(self._unmodelled, self.trials[k], len(self.robot.sensors))
+            noise = self.scale.scale**2 / self.block + known**2
             spread = np.zeros_like(base.means, dtype=float)
             grain = np.zeros_like(base.rough, dtype=float)
             if others and base.finite:

@@ -28,10 +28,9 @@ class Scale:
     source: str
 
 
-def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial], unmodelled: Array | None = None) -> Scale:
+def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
     """The noise declared by the robot's sensors; where it declares none, measured between repeated trials, or else
-    estimated from the second differences of the logs. ``unmodelled`` (S,) is added in squares: what a calibrated
-    model is known to leave."""
+    estimated from the second differences of the logs."""
     declared = np.array([s.noise for s in robot.sensors])
     spans = np.array([channel_range(robot, s) for s in robot.sensors])
     touch = np.array([s.kind == "touch" for s in robot.sensors])
@@ -44,8 +43,6 @@ def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial], unmodelled: Arr
             noise = np.sqrt(np.mean([np.median(roughness(t.log.sensors), axis=0) / 0.455 for t in trials], axis=0))
             source = "estimated: second differences of the logs"
     scale = np.maximum(noise, RESOLUTION * spans)
-    if unmodelled is not None:
-        scale = np.sqrt(scale**2 + unmodelled**2)
     scale = np.where(touch, np.maximum(scale, TOUCH_SCALE), scale)
     return Scale(noise, scale, source)
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 from rich.console import Console
 from rich.table import Table
@@ -17,6 +16,7 @@ from rich.table import Table
 from ee_dist.discrepancy.candidates import Candidate, candidates, parse
 from ee_dist.discrepancy.improve import Improvement, improve
 from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.unmodelled import to_entries, unmodelled_by
 from ee_dist.discrepancy.words import left_text, told
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
@@ -109,15 +109,12 @@ def improvement_text(found: Improvement, robot: Robot) -> list[str]:
 
 
 def write_calibration(problem: OpenLoop, residual: Array, path: Path) -> None:
-    """What the calibrated model still leaves on each channel, beyond noise, in its own unit."""
-    raw = [problem.raw_blocks(k, residual) for k in range(len(problem.trials))]
-    square = np.concatenate([r**2 for r in raw]).mean(axis=0) - problem.scale.noise**2 / problem.block
-    entries = {
-        s.name: {"deviation": float(np.sqrt(max(v, 0.0))), "unit": s.unit}
-        for s, v in zip(problem.robot.sensors, square, strict=True)
-    }
+    """What the calibrated model still leaves on each channel in each trial, beyond noise."""
+    robot = problem.robot
+    entries = to_entries(unmodelled_by(problem, residual), robot.sensor_names, [s.unit for s in robot.sensors])
     path.write_text(
-        "# What the model beside this file leaves on an untouched robot.\n" + yaml.safe_dump({"unmodelled": entries}),
+        "# What the model beside this file leaves on an untouched robot.\n"
+        + yaml.safe_dump({"unmodelled": entries}, sort_keys=False),
         encoding="utf-8",
     )
 

@@ -14,6 +14,7 @@ import yaml
 
 from ee_dist.discrepancy.measured import MeasuredTrial, setup_of
 from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.unmodelled import Unmodelled, from_entries
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.evaluation.jobs import Evaluator
@@ -23,7 +24,7 @@ from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.trials.excitation import Excitation
-from ee_dist.trials.log import Array, LogError, SensorLog
+from ee_dist.trials.log import LogError, SensorLog
 
 FEWEST_ROWS = 60
 
@@ -38,8 +39,8 @@ class Measurements:
     model: Hypothesis
     source: Any
     folder: Path
-    unmodelled: Array | None = None
-    """(S,) what the model is known to leave on an untouched robot, in the units of the channels (from calibration)."""
+    unmodelled: Unmodelled | None = None
+    """What the model is known to leave on an untouched robot (from calibration)."""
 
 
 def load(config: Config) -> Measurements:
@@ -139,13 +140,17 @@ def _same_robot(file: Path, run: RunRecord, robot: Robot) -> None:
         raise LogError(f"{file}: a log of another robot ({run.robot.name}) than the first ({robot.name})")
 
 
-def _calibration(path: Path, robot: Robot) -> Array | None:
-    """What task=improve task.calibrate=true wrote beside the model file."""
+def _calibration(path: Path, robot: Robot) -> Unmodelled | None:
+    """What task=improve task.calibrate=true wrote beside the model file. Raises ConfigError for another kind of file."""
     beside = path.with_suffix(".calibration.yaml")
     if not beside.is_file():
         return None
-    data = yaml.safe_load(beside.read_text(encoding="utf-8"))["unmodelled"]
-    return np.array([float(data.get(s.name, {}).get("deviation", 0.0)) for s in robot.sensors])
+    try:
+        return from_entries(yaml.safe_load(beside.read_text(encoding="utf-8"))["unmodelled"], robot.sensor_names)
+    except (KeyError, TypeError, ValueError, AttributeError, yaml.YAMLError):
+        raise ConfigError(
+            f"{beside}: not a calibration; write it with task=improve task.calibrate=true on an untouched robot"
+        ) from None
 
 
 def problem_of(measured: Measurements, evaluator: Evaluator, **settings: Any) -> OpenLoop:

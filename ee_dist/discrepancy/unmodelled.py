@@ -1,0 +1,58 @@
+"""What a calibrated model is known to leave on an untouched robot: it widens the scale of each channel in each trial.
+
+No model is perfect, and where it is wrong depends on what the robot does: a model that follows the legs in the air may
+lose them in a gait. What an untouched robot shows beyond noise in a trial says nothing about what is wrong with another
+robot in the same trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ee_dist.trials.log import Array
+
+if TYPE_CHECKING:
+    from ee_dist.discrepancy.open_loop import OpenLoop
+
+Unmodelled = Mapping[str, Array]
+"""By name of the trial: (S,) standard deviation in the units of the channels."""
+
+
+def unmodelled_by(problem: OpenLoop, residual: Array) -> dict[str, Array]:
+    """What ``residual`` (n,), of an untouched robot, holds beyond noise and beyond the spread of equally good models."""
+    squares: dict[str, list[Array]] = {}
+    for k, name in enumerate(problem.trials):
+        excess = (problem.raw_blocks(k, residual) ** 2 - problem.deviation[k] ** 2).mean(axis=0)
+        squares.setdefault(name, []).append(excess)
+    return {name: np.sqrt(np.maximum(np.mean(found, axis=0), 0.0)) for name, found in squares.items()}
+
+
+def of_trial(unmodelled: Unmodelled, name: str, channels: int) -> Array:
+    """(S,) of a trial; for one that the calibration did not see, the largest of those it saw."""
+    if name in unmodelled:
+        return unmodelled[name]
+    return np.max([np.zeros(channels), *unmodelled.values()], axis=0)
+
+
+def to_entries(unmodelled: Unmodelled, names: Sequence[str], units: Sequence[str]) -> list[dict[str, object]]:
+    """Plain data for a file."""
+    return [
+        {
+            "trial": trial,
+            "channels": {n: {"deviation": float(v), "unit": u} for n, v, u in zip(names, values, units, strict=True)},
+        }
+        for trial, values in unmodelled.items()
+    ]
+
+
+def from_entries(
+    entries: Sequence[Mapping[str, Mapping[str, Mapping[str, float]]]], names: Sequence[str]
+) -> Unmodelled:
+    """The inverse. Raises KeyError, TypeError or ValueError for data of another shape."""
+    return {
+        str(e["trial"]): np.array([float(e["channels"].get(n, {}).get("deviation", 0.0)) for n in names])
+        for e in entries
+    }
