@@ -17,7 +17,7 @@ from ee_dist.trials.log import Array
 
 LEAST_SHARE = 0.002
 """Share of the starting energy that an effect must take off held-out data to be worth a term."""
-LOST_SHARE = 0.1
+LOST_SHARE = 0.3
 """An interval that reaches zero counts against an effect only where it makes some segments worse by this share of its
 gain: an effect that shows in one window of twenty, and harms none, is no less true for that."""
 TIE_ENERGY = 9.0

@@ -12,6 +12,8 @@ from ee_dist.trials.log import Array
 
 LIMIT = 5.0
 """Standard deviations beyond which a group of values (of some hundred) is not noise: one false alarm in 10^4 runs."""
+VARIES = 0.3
+"""By how much of itself what calibration left may vary from one robot to the next, as one standard deviation."""
 EVENT = 170.0
 """Energy of a few touch values that come a row early or late: a model good to the noise still misses some contacts."""
 
@@ -46,18 +48,22 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
     e = np.bincount(cell, weights=residual**2, minlength=size).reshape(shape)
     f = np.bincount(cell, weights=problem.floor, minlength=size).reshape(shape)
     s = np.bincount(cell, weights=residual, minlength=size).reshape(shape)
+    known = getattr(problem, "known", np.zeros(len(residual)))
+    b = np.bincount(cell, weights=known, minlength=size).reshape(shape)
     found = []
     for k, trial in enumerate(problem.trials):
         mine = problem.trial_of_segment == k
         count, energy, floor = n[mine].sum(0), e[mine].sum(0), f[mine].sum(0)
         slow = np.divide(s[mine] ** 2, n[mine], out=np.zeros_like(s[mine]), where=n[mine] > 0)
-        mean_floor = np.divide(f[mine], n[mine], out=np.zeros_like(s[mine]), where=n[mine] > 0)
+        bias = b[mine].sum(0)
+        mean_floor = np.divide(f[mine] - b[mine], n[mine], out=np.zeros_like(s[mine]), where=n[mine] > 0)
         for c in np.flatnonzero(count):
             events = EVENT if floor[c] < 0.3 * count[c] else 0.0
-            quick_z = (energy[c] - floor[c]) / (math.sqrt(2.0 * max(floor[c], 1.0)) + events)
+            quick_z = (energy[c] - floor[c]) / (math.sqrt(2.0 * max(floor[c], 1.0)) + events + VARIES * bias[c])
             windows = float((n[mine][:, c] > 0).sum())
             sd = math.sqrt(2.0) * math.sqrt(max(float((mean_floor[:, c] ** 2).sum()), 1.0)) + events
-            slow_z = (slow[:, c].sum() - mean_floor[:, c].sum()) / sd if windows else 0.0
+            sd += VARIES * bias[c]
+            slow_z = (slow[:, c].sum() - mean_floor[:, c].sum() - bias[c]) / sd if windows else 0.0
             z = max(quick_z, slow_z)
             if z > limit:
                 found.append(

@@ -101,19 +101,22 @@ class OpenLoop:
         for k in range(len(self.measured)):
             mine = found[k * len(models) : (k + 1) * len(models)]
             base, others = mine[0], [d for d in mine[1:] if d.finite]
-            known = of_trial(self._unmodelled, self.trials[k], len(self.robot.sensors))
-            noise = self.scale.scale**2 / self.block + known**2
+            noise = self.scale.scale**2 / self.block + self._known(k)[0]
             spread = np.zeros_like(base.means, dtype=float)
             grain = np.zeros_like(base.rough, dtype=float)
             if others and base.finite:
                 spread = np.mean([(d.means.astype(float) - base.means) ** 2 for d in others], axis=0)
                 grain = np.mean([np.log((d.rough + tiny) / (base.rough + tiny)) ** 2 for d in others], axis=0)
             self.deviation.append(np.sqrt(noise + _held_up(spread)))
-            self.grain_deviation.append(np.sqrt(2 * 1.95 / self.window + 0.01 + _held_up(grain)))
+            self.grain_deviation.append(np.sqrt(2 * 1.95 / self.window + 0.01 + self._known(k)[1] + _held_up(grain)))
 
         quiet = np.array([s.kind != "touch" for s in self.robot.sensors])
         alone = self.scale.scale**2 / self.block
         self.trust = tuple(float(1.0 / np.mean((d**2 / alone)[:, quiet])) for d in self.deviation)
+
+    def _known(self, trial: int) -> Array:
+        """(2, S) mean squares that calibration left in a trial: of block means, and of the log of roughness."""
+        return of_trial(self._unmodelled, self.trials[trial], len(self.robot.sensors)) ** 2
 
     def _lay_out(self) -> None:
         """Segments, channels and floors of all residual values, trial after trial."""
@@ -121,6 +124,7 @@ class OpenLoop:
         seg: list[Array] = []
         chan: list[Array] = []
         floor: list[Array] = []
+        known: list[Array] = []
         trial_of_segment: list[int] = []
         self.slices: list[slice] = []
         s, per = len(self.robot.sensors), self.window // self.block
@@ -137,15 +141,19 @@ class OpenLoop:
             of_block = first + np.minimum(np.arange(blocks) // per, count - 1)
             seg += [np.repeat(of_block, s), np.repeat(first + np.arange(windows), 2 * s)]
             chan += [np.tile(np.arange(s), blocks), np.tile(np.arange(s), 2 * windows)]
-            share = self.scale.noise**2 / self.block / self.deviation[k] ** 2
-            grain = _ROUGH_FLOOR * noisy * pure / self.grain_deviation[k] ** 2
+            left = self._known(k)[0] / self.deviation[k] ** 2
+            share = self.scale.noise**2 / self.block / self.deviation[k] ** 2 + left
+            rough = _ROUGH_FLOOR * self._known(k)[1] / self.grain_deviation[k] ** 2
+            grain = _ROUGH_FLOOR * noisy * pure / self.grain_deviation[k] ** 2 + rough
             texture = np.stack([grain, np.zeros_like(grain)], axis=1)
             floor += [share.ravel() * _SOFT_FLOOR, texture.ravel()]
+            known += [left.ravel() * _SOFT_FLOOR, np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
             if isinstance(trial.driver, Network):
                 m = len(self.robot.drives)
                 seg.append(np.repeat(of_block, m))
                 chan.append(np.tile(s + np.arange(m), blocks))
                 floor.append(np.zeros(m * blocks))
+                known.append(np.zeros(m * blocks))
             size = sum(map(len, seg)) - at
             self.slices.append(slice(at, at + size))
             at += size
@@ -154,6 +162,7 @@ class OpenLoop:
         self.segment_of = np.concatenate(seg).astype(np.int64)
         self.channel_of = np.concatenate(chan).astype(np.int64)
         self.floor = np.concatenate(floor)
+        self.known = np.concatenate(known)
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
@@ -206,7 +215,8 @@ class OpenLoop:
         return np.ascontiguousarray(np.moveaxis(values, 1, 0)).reshape(len(models), -1)
 
     def noise_floor(self) -> tuple[float, str]:
-        return float(np.sqrt(self.floor.mean())), self.scale.source
+        source = self.scale.source
+        return float(np.sqrt(self.floor.mean())), f"{source}, and what calibration left" if self._unmodelled else source
 
     # -- views of a residual -----------------------------------------------------------------------------------------
 
@@ -219,9 +229,17 @@ class OpenLoop:
         """The same before softening, in the units of the channels."""
         return np.asarray(SOFT * np.sinh(self.blocks(trial, residual) / SOFT) * self.deviation[trial])
 
+    def raw_grain(self, trial: int, residual: Array) -> Array:
+        """(T // window, S): differences of the log of roughness, before softening."""
+        rows, s = len(self.measured[trial].log), len(self.robot.sensors)
+        first, windows = rows // self.block * s, rows // self.window
+        texture = residual[self.slices[trial]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
+        return np.asarray(SOFT * np.sinh(texture / SOFT) * self.grain_deviation[trial])
+
     def block_floor(self, trial: int) -> Array:
-        """(T // block, S): mean square that noise leaves of each value of ``blocks``."""
-        return np.asarray(self.scale.noise**2 / self.block / self.deviation[trial] ** 2 * _SOFT_FLOOR)
+        """(T // block, S): mean square that noise and known errors of the model leave of each value of ``blocks``."""
+        left = self.scale.noise**2 / self.block + self._known(trial)[0]
+        return np.asarray(left / self.deviation[trial] ** 2 * _SOFT_FLOOR)
 
     def command_scale(self, channel: str) -> float:
         """What a residual of 1 is for ``command_<motor>``, rad (m)."""

@@ -18,23 +18,26 @@ if TYPE_CHECKING:
     from ee_dist.discrepancy.open_loop import OpenLoop
 
 Unmodelled = Mapping[str, Array]
-"""By name of the trial: (S,) standard deviation in the units of the channels."""
+"""By name of the trial: (2, S) standard deviations of block means, in the units of the channels, and of the logarithm of
+the roughness of windows."""
+VALUES = ("deviation", "roughness")
 
 
 def unmodelled_by(problem: OpenLoop, residual: Array) -> dict[str, Array]:
     """What ``residual`` (n,), of an untouched robot, holds beyond noise and beyond the spread of equally good models."""
     squares: dict[str, list[Array]] = {}
     for k, name in enumerate(problem.trials):
-        excess = (problem.raw_blocks(k, residual) ** 2 - problem.deviation[k] ** 2).mean(axis=0)
-        squares.setdefault(name, []).append(excess)
+        shape = (problem.raw_blocks(k, residual) ** 2 - problem.deviation[k] ** 2).mean(axis=0)
+        grain = (problem.raw_grain(k, residual) ** 2 - problem.grain_deviation[k] ** 2).mean(axis=0)
+        squares.setdefault(name, []).append(np.stack([shape, grain]))
     return {name: np.sqrt(np.maximum(np.mean(found, axis=0), 0.0)) for name, found in squares.items()}
 
 
 def of_trial(unmodelled: Unmodelled, name: str, channels: int) -> Array:
-    """(S,) of a trial; for one that the calibration did not see, the largest of those it saw."""
+    """(2, S) of a trial; for one that the calibration did not see, the largest of those it saw."""
     if name in unmodelled:
         return unmodelled[name]
-    return np.max([np.zeros(channels), *unmodelled.values()], axis=0)
+    return np.max([np.zeros((2, channels)), *unmodelled.values()], axis=0)
 
 
 def to_entries(unmodelled: Unmodelled, names: Sequence[str], units: Sequence[str]) -> list[dict[str, object]]:
@@ -42,7 +45,10 @@ def to_entries(unmodelled: Unmodelled, names: Sequence[str], units: Sequence[str
     return [
         {
             "trial": trial,
-            "channels": {n: {"deviation": float(v), "unit": u} for n, v, u in zip(names, values, units, strict=True)},
+            "channels": {
+                n: {"deviation": float(v), "roughness": float(r), "unit": u}
+                for n, v, r, u in zip(names, *values, units, strict=True)
+            },
         }
         for trial, values in unmodelled.items()
     ]
@@ -53,6 +59,6 @@ def from_entries(
 ) -> Unmodelled:
     """The inverse. Raises KeyError, TypeError or ValueError for data of another shape."""
     return {
-        str(e["trial"]): np.array([float(e["channels"].get(n, {}).get("deviation", 0.0)) for n in names])
+        str(e["trial"]): np.array([[float(e["channels"].get(n, {}).get(v, 0.0)) for n in names] for v in VALUES])
         for e in entries
     }

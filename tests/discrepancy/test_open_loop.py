@@ -1,0 +1,104 @@
+"""The problem of a whole robot: what faulty sensors report, and what a calibration widens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.candidates import candidates
+from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
+from ee_dist.discrepancy.misfit import leftovers
+from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.screen import screen
+from ee_dist.discrepancy.unmodelled import from_entries, of_trial, to_entries, unmodelled_by
+from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.engines.contract import Engine
+from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.engines.pybullet.engine import PyBulletEngine
+from ee_dist.evaluation.cache import CachedEvaluator
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.robots.quadruped_lab import quadruped_lab
+from ee_dist.tasks.config import ConfigError
+from ee_dist.tasks.measured import _calibration
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.noise import with_noise
+
+ROBOT = with_noise(quadruped_lab(), 0.02)
+GAIT = Excitation("gait", seconds=4.0)
+
+
+def trials(engine: Engine, hidden: Hypothesis, seed: int = 0) -> list[MeasuredTrial]:
+    held = setup_of(GAIT)
+    driver = driver_of(GAIT, ROBOT)
+    hardware = PhysicalRobot(engine, ROBOT, (*hidden, *held), np.random.SeedSequence(seed))
+    return [MeasuredTrial("gait", hardware.trial(driver, GAIT.steps(ROBOT)), driver, held)]
+
+
+@pytest.fixture(scope="module")
+def mujoco() -> MuJoCoEngine:
+    return MuJoCoEngine(1)
+
+
+def problem(engine: Engine, measured: list[MeasuredTrial], **settings: object) -> OpenLoop:
+    return OpenLoop(measured, ROBOT, CachedEvaluator(SerialEvaluator(engine)), **settings)  # type: ignore[arg-type]
+
+
+def test_a_sensor_fault_too_small_to_matter_costs_nothing(mujoco: MuJoCoEngine) -> None:
+    p = problem(mujoco, trials(mujoco, ()))
+    faults = [
+        (term("sensor_failing", "touch_front_left", loss=1e-6),),
+        (term("sensor_gain", "roll", change=1e-6),),
+        (term("sensor_delay", "torque_knee_rear_left", delay_s=1e-6),),
+    ]
+    base, *others = (float(r @ r) for r in p.residuals([(), *faults]))
+    for found in others:
+        assert found == pytest.approx(base, abs=6.0), "no other channel may look worse for it"
+
+
+def test_a_stuck_touch_sensor_is_better_explained_by_the_truth_than_by_nothing(mujoco: MuJoCoEngine) -> None:
+    hidden = (term("sensor_stuck", "touch_front_right", share=0.7, from_s=0.65),)
+    p = problem(mujoco, trials(mujoco, hidden))
+    nothing, truth = p.residuals([(), hidden])
+    assert float(nothing @ nothing) - float(truth @ truth) > 100.0
+    pool = candidates(ROBOT, only=["sensor_stuck@touch_front_right", "sensor_stuck@touch_rear_left"])
+    right, wrong = sorted(screen(p, pool), key=lambda s: -s.promise)
+    assert right.candidate.target == "touch_front_right"
+    assert right.promise > 5 * wrong.promise
+
+
+def test_a_calibration_widens_what_the_other_engine_does_differently(mujoco: MuJoCoEngine) -> None:
+    bullet = PyBulletEngine()
+    try:
+        first, again = trials(bullet, (), 1), trials(bullet, (), 2)
+    finally:
+        bullet.close()
+    strict = problem(mujoco, first)
+    left = unmodelled_by(strict, strict.residuals([()])[0])
+    assert set(left) == {"gait"}
+    known = problem(mujoco, again, unmodelled=left)
+    raw = problem(mujoco, again)
+    assert error(raw.residuals([()])[0]) > 1.3 * raw.noise_floor()[0], "the engines differ in a gait"
+    assert error(known.residuals([()])[0]) < error(raw.residuals([()])[0])
+    assert leftovers(raw, raw.residuals([()])[0])
+    assert not leftovers(known, known.residuals([()])[0]), "nothing new on another untouched robot"
+    assert known.noise_floor()[1].endswith("and what calibration left")
+
+
+def test_a_calibration_survives_its_file_and_serves_trials_it_did_not_see(tmp_path: Path) -> None:
+    names, units = ROBOT.sensor_names, [s.unit for s in ROBOT.sensors]
+    rng = np.random.default_rng(0)
+    before = {"gait": rng.random((2, len(names))), "sway": rng.random((2, len(names)))}
+    after = from_entries(to_entries(before, names, units), names)  # type: ignore[arg-type]
+    for trial in before:
+        assert np.array_equal(before[trial], of_trial(after, trial, len(names)))
+    unseen = of_trial(after, "hops", len(names))
+    assert np.array_equal(unseen, np.maximum(before["gait"], before["sway"]))
+    assert not of_trial({}, "hops", len(names)).any()
+    path = tmp_path / "model.yaml"
+    path.with_suffix(".calibration.yaml").write_text("unmodelled: {roll: {deviation: 1}}\n")
+    with pytest.raises(ConfigError, match="not a calibration"):
+        _calibration(path, ROBOT)
