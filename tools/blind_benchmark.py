@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 
-from ee_dist.discrepancy.candidates import Candidate, candidates
+from ee_dist.discrepancy.candidates import Candidate, candidates, shared
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
@@ -114,10 +114,7 @@ class Bench:
     def calibrate(self) -> None:
         """Fit what all joints share to an untouched robot of the other engine, and note what is left by channel."""
         problem = self.problem(measured(self.outer, self.robot, (), [self.args.seed, 999_999]))
-        shared = [
-            c for c in self.pool if c.effect.family == "world" or c.target in ("", "supply", self.robot.root.name)
-        ]
-        found = improve(problem, shared, (), None, most=3)
+        found = improve(problem, shared(self.pool, self.robot), (), None, most=3)
         self.before = found.terms
         self.unmodelled = unmodelled_by(problem, found.residual)
         print(f"calibrated on an untouched robot: {'; '.join(map(str, self.before)) or 'nothing to add'}", flush=True)

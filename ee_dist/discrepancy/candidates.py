@@ -126,6 +126,12 @@ def candidates(robot: Robot, without: Iterable[str] = (), only: Iterable[str] | 
     return found
 
 
+def shared(pool: Iterable[Candidate], robot: Robot) -> list[Candidate]:
+    """Those that no single joint or sensor can be blamed for: the surroundings, the supply, the body. They are what a
+    model is calibrated with on an untouched robot."""
+    return [c for c in pool if c.effect.family == "world" or c.target in ("", "supply", robot.root.name)]
+
+
 def parse(robot: Robot, text: str) -> Candidate:
     """A candidate as typed: ``coulomb_friction@knee_front_left``. Raises EffectError with the nearest names."""
     name, _, target = text.partition("@")

@@ -13,7 +13,7 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
-from ee_dist.discrepancy.candidates import Candidate, candidates, parse
+from ee_dist.discrepancy.candidates import Candidate, candidates, parse, shared
 from ee_dist.discrepancy.improve import Improvement, improve
 from ee_dist.discrepancy.open_loop import OpenLoop
 from ee_dist.discrepancy.unmodelled import to_entries, unmodelled_by
@@ -58,6 +58,8 @@ def run(config: Config, options: Options, out: Path) -> None:
         problem = problem_of(measured, evaluator)
         base = problem.residuals([measured.model])[0]
         pool = candidates(measured.robot, options.without)
+        if options.calibrate:
+            pool = shared(pool, measured.robot)
         found = improve(problem, pool, measured.model, wanted, most=options.most, progress=progress)
     words = improvement_text(found, measured.robot)
     out.mkdir(parents=True, exist_ok=True)
