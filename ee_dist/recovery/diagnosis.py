@@ -13,7 +13,7 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.evaluation.jobs import Evaluator, Job, Reduction
 from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recording.records import DIAGNOSIS, GenerationRecord, HypothesisRecord
-from ee_dist.recovery.genome import LENGTH, decode
+from ee_dist.recovery.genome import LENGTH, decode, first_hypotheses
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.robots.model import Robot
@@ -60,8 +60,10 @@ def diagnose(
 ) -> tuple[Hypothesis, Genomes, float]:
     """Best hypothesis found, its genome and its error. Genomes of the database join the start."""
     robot = judge.robot
-    seeds = np.array(database, dtype=np.int16).reshape(-1, LENGTH)
-    ga = GeneticAlgorithm(LENGTH, budget, seed, seeds)
+    (start,) = seed.spawn(1)
+    fresh = first_hypotheses(budget.population, np.random.default_rng(start))
+    known = np.array(database, dtype=np.int16).reshape(-1, LENGTH)
+    ga = GeneticAlgorithm(LENGTH, budget, seed, np.concatenate([known, fresh]))
     observer.pass_started(DIAGNOSIS, pass_index, budget.generations)
     while not ga.done:
         genomes = ga.ask()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import qmc
 
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.effects.targets import carried_parts, motors, parts, sensors
@@ -17,6 +18,27 @@ SITUATIONS = ("part_lost", "part_mass", "motor_weak", "sensor_failing", "joint_j
 HEAVIER = (1.0, 2.0)
 """A part grows heavier by 100 to 200 %."""
 STEEPEST_DEG = 30.0
+
+
+ACTIVE = (0.02, 0.5, 0.3, 0.13, 0.05)
+"""Shares of hypotheses with 0, 1, ... 4 active genes in a first population: most faults are single, and what two genes say
+is found by joining those that say one."""
+
+
+def first_hypotheses(count: int, rng: np.random.Generator) -> NDArray[np.int16]:
+    """(count, 16) random genomes that cover the space evenly: a Latin hypercube over all values, few genes active.
+
+    With each gene active by the toss of a coin, a single fault is said by a quarter of the genomes only, and forty-two
+    places to be wrong at are then tried with one magnitude each.
+    """
+    even = qmc.LatinHypercube(LENGTH, rng=rng).random(count)
+    genomes = (np.minimum(np.floor(even * (2 * SCALE + 1)), 2 * SCALE) - SCALE).astype(np.int16)
+    switch = np.abs(genomes[:, ::GENE_LENGTH])
+    active = np.zeros(switch.shape, dtype=bool)
+    for row, number in zip(active, rng.choice(GENES + 1, size=count, p=ACTIVE), strict=True):
+        row[rng.permutation(GENES)[:number]] = True
+    genomes[:, ::GENE_LENGTH] = np.where(active, np.maximum(switch, 1), -np.maximum(switch, 1))
+    return genomes
 
 
 def choice(value: int, options: int) -> int:

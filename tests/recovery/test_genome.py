@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from ee_dist.effects import apply, term
 from ee_dist.evolution.ga import SCALE
-from ee_dist.recovery.genome import LENGTH, SITUATIONS, choice, decode
+from ee_dist.recovery.genome import ACTIVE, LENGTH, SITUATIONS, choice, decode, first_hypotheses
 from ee_dist.robots.quadruped import quadruped
 
 ROBOT = quadruped()
@@ -86,3 +86,18 @@ def test_the_order_of_genes_at_different_places_does_not_matter(g, order):
     active = sum(choice(int(g[4 * k]), 2) for k in range(4))
     if len(parts) == active:  # no two genes speak of the same place
         assert decode(g.reshape(4, 4)[list(order)].ravel(), ROBOT) == parts
+
+
+def test_the_first_hypotheses_cover_the_space_and_mostly_say_one_thing():
+    genomes = first_hypotheses(2000, np.random.default_rng(0))
+    assert genomes.shape == (2000, LENGTH)
+    assert (genomes.min(), genomes.max()) == (-SCALE, SCALE)
+    active = (np.vectorize(lambda v: choice(v, 2))(genomes[:, ::4]) == 1).sum(axis=1)
+    assert np.allclose(np.bincount(active, minlength=5) / 2000, ACTIVE, atol=0.03)
+    said = {t.effect for g in genomes[:200] for t in decode(g, quadruped())}
+    assert said == set(SITUATIONS)
+    for column in (1, 2, 3):
+        assert np.abs(np.histogram(genomes[:, column], bins=10, range=(-100.5, 100.5))[0] - 200).max() <= 12
+    assert np.array_equal(
+        first_hypotheses(50, np.random.default_rng(3)), first_hypotheses(50, np.random.default_rng(3))
+    )
