@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2, norm
 
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.trials.log import Array
@@ -64,9 +65,19 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
             sd = math.sqrt(2.0) * math.sqrt(max(float((mean_floor[:, c] ** 2).sum()), 1.0)) + events
             sd += VARIES * bias[c]
             slow_z = (slow[:, c].sum() - mean_floor[:, c].sum() - bias[c]) / sd if windows else 0.0
+            # A sum of few squares is far from normal: two windows exceed six of its standard deviations once in 500 times.
+            quick_z = min(quick_z, _rarity(energy[c], floor[c] / count[c], count[c]))
+            slow_z = min(slow_z, _rarity(slow[:, c].sum(), mean_floor[:, c].sum() / max(windows, 1.0), windows))
             z = max(quick_z, slow_z)
             if z > limit:
                 found.append(
                     Leftover(trial, problem.channels[c], float(z), float(energy[c] - floor[c]), bool(slow_z >= quick_z))
                 )
     return sorted(found, key=lambda g: -g.z)
+
+
+def _rarity(total: float, each: float, count: float) -> float:
+    """How rare a sum of ``count`` squares of noise of mean ``each`` is: the normal deviate that is as rare."""
+    if each <= 0 or count < 1:
+        return math.inf
+    return float(norm.isf(chi2.sf(total / each, count)))
