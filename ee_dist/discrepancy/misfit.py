@@ -13,7 +13,7 @@ from ee_dist.trials.log import Array
 
 LIMIT = 5.0
 """Standard deviations beyond which a group of values (of some hundred) is not noise: one false alarm in 10^4 runs."""
-VARIES = 0.3
+VARIES = 1.0
 """By how much of itself what calibration left may vary from one robot to the next, as one standard deviation."""
 EVENT = 170.0
 """Energy of a few touch values that come a row early or late: a model good to the noise still misses some contacts."""

@@ -51,4 +51,4 @@ def test_what_calibration_left_is_no_news_but_much_more_of_it_is() -> None:
     steady = rng.standard_normal(cell.max() + 1)[cell]
     noise = rng.standard_normal(len(p.floor))
     assert not leftovers(p, noise + np.sqrt(0.5) * steady)
-    assert leftovers(p, noise + 3.0 * steady)
+    assert leftovers(p, noise + 4.0 * steady)
