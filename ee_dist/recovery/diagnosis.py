@@ -13,7 +13,7 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.evaluation.jobs import Evaluator, Job, Reduction
 from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recording.records import DIAGNOSIS, GenerationRecord, HypothesisRecord
-from ee_dist.recovery.genome import LENGTH, decode, first_hypotheses
+from ee_dist.recovery.genome import LENGTH, decode, first_hypotheses, neighbours
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.robots.model import Robot
@@ -57,8 +57,8 @@ def diagnose(
     seed: np.random.SeedSequence,
     observer: Observer,
     pass_index: int,
-) -> tuple[Hypothesis, Genomes, float]:
-    """Best hypothesis found, its genome and its error. Genomes of the database join the start."""
+) -> tuple[Genomes, float]:
+    """Genome of the best hypothesis found, and its error. Genomes of the database join the start."""
     robot = judge.robot
     (start,) = seed.spawn(1)
     fresh = first_hypotheses(budget.population, np.random.default_rng(start))
@@ -86,7 +86,22 @@ def diagnose(
         best = decode(ga.genomes[0], robot)
         observer.hypotheses([HypothesisRecord(pass_index, ga.generation - 1, 0, best, float(-ga.scores[0]))])
     observer.hypotheses(_final(ga, robot, pass_index))
-    return decode(ga.genomes[0], robot), ga.genomes[0].copy(), float(-ga.scores[0])
+    return ga.genomes[0].copy(), float(-ga.scores[0])
+
+
+def polish(judge: Judge, genome: Genomes, error: float, rounds: int) -> tuple[Genomes, float]:
+    """Walk to the best neighbour of a genome until none is better, at most ``rounds`` times.
+
+    An offspring of the paper's evolution mutates in one of seven cases, which finds a valley and seldom its bottom.
+    """
+    for _ in range(rounds):
+        around = np.array(neighbours(genome, judge.robot), dtype=np.int16)
+        errors = judge.errors([decode(g, judge.robot) for g in around])
+        k = int(np.argmin(errors))
+        if not errors[k] < error:
+            break
+        genome, error = around[k], float(errors[k])
+    return genome, error
 
 
 def prune(judge: Judge, hypothesis: Hypothesis, error: float, parsimony: float) -> tuple[Hypothesis, float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
@@ -63,6 +65,33 @@ def decode(genome: NDArray[np.int16], robot: Robot) -> Hypothesis:
         if choice(active, 2) == 1:
             found.append(_gene(SITUATIONS[choice(situation, len(SITUATIONS))], where, much, robot))
     return normal(found, robot)
+
+
+STEPS = (40, 20, 10, 5, 2, 1)
+"""How far, in hundredths, the fourth value of a gene is moved to both sides."""
+AMOUNTS = (-60, 0, 60)
+"""Fourth values with which another term is tried."""
+
+
+def neighbours(genome: NDArray[np.int16], robot: Robot) -> list[NDArray[np.int16]]:
+    """Genomes whose hypotheses differ in one term: dropped, a little stronger or weaker, added, or another in its place."""
+    found: dict[Hypothesis, NDArray[np.int16]] = {}
+    for k in range(0, LENGTH, GENE_LENGTH):
+        active, situation, where, much = (int(v) for v in genome[k : k + GENE_LENGTH])
+        genes = [(-1, situation, where, much)]
+        if choice(active, 2) == 1:
+            genes += [(active, situation, where, much + d) for s in STEPS for d in (s, -s) if abs(much + d) <= SCALE]
+        genes += product((1,), _middles(len(SITUATIONS)), _middles(len(parts(robot))), AMOUNTS)
+        for gene in genes:
+            other = genome.copy()
+            other[k : k + GENE_LENGTH] = gene
+            found.setdefault(decode(other, robot), other)
+    return list(found.values())
+
+
+def _middles(options: int) -> list[int]:
+    """Values in hundredths in the middle of each of equal shares of [-1, 1]."""
+    return [round((2 * i + 1) * SCALE / options) - SCALE for i in range(options)]
 
 
 def _gene(situation: str, where: int, much: int, robot: Robot) -> Term:

@@ -15,7 +15,8 @@ from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.evolution.ga import Budget, Genomes
 from ee_dist.recording.records import HARDWARE, PREDICTION, TrialRecord
-from ee_dist.recovery.diagnosis import Judge, diagnose, prune
+from ee_dist.recovery.diagnosis import Judge, diagnose, polish, prune
+from ee_dist.recovery.genome import decode
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.recovery.repair import repair
@@ -34,6 +35,8 @@ class Plan:
     steps: int = 1000
     parsimony: float = 0.1
     """Share of the error that a term of a hypothesis must account for to be believed; the paper has no such rule (0)."""
+    polish: int = 8
+    """How many steps to a better neighbour the evolved hypothesis may take; the paper has no such step (0)."""
     related: float = 1.0
     """Share of a repair pass's first population that descends from the database; with 0 only the database itself does."""
 
@@ -44,6 +47,8 @@ class Plan:
             raise ValueError("plan: steps must be 2 or more")
         if not 0.0 <= self.parsimony < 1.0:
             raise ValueError(f"plan: parsimony must be from 0 to below 1, not {self.parsimony}")
+        if self.polish < 0:
+            raise ValueError(f"plan: polish must be 0 or more, not {self.polish}")
         if not 0.0 <= self.related <= 1.0:
             raise ValueError(f"plan: related must be from 0 to 1, not {self.related}")
 
@@ -95,7 +100,9 @@ def recover(
     believed: list[Genomes] = []
     for k in range(passes):
         judge = Judge(robot, trials, metric, evaluator)
-        hypothesis, genome, error = diagnose(judge, believed, plan.diagnosis, diagnosis_seeds[k], observer, k)
+        genome, error = diagnose(judge, believed, plan.diagnosis, diagnosis_seeds[k], observer, k)
+        genome, error = polish(judge, genome, error, plan.polish)
+        hypothesis = decode(genome, robot)
         believed.append(genome)
         if plan.parsimony:
             hypothesis, error = prune(judge, hypothesis, error, plan.parsimony)

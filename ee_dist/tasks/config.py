@@ -97,6 +97,7 @@ class BudgetConfig:
     compensating_trials: int = 4
     steps: int = 1000
     parsimony: float = 0.1
+    polish: int = 8
     related: float = 1.0
 
     def __post_init__(self) -> None:
@@ -111,6 +112,7 @@ class BudgetConfig:
                 compensating_trials=self.compensating_trials,
                 steps=self.steps,
                 parsimony=self.parsimony,
+                polish=self.polish,
                 related=self.related,
             )
         except ValueError as error:

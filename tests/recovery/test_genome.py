@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from ee_dist.effects import apply, term
 from ee_dist.evolution.ga import SCALE
-from ee_dist.recovery.genome import ACTIVE, LENGTH, SITUATIONS, choice, decode, first_hypotheses
+from ee_dist.recovery.genome import ACTIVE, LENGTH, SITUATIONS, choice, decode, first_hypotheses, neighbours
 from ee_dist.robots.quadruped import quadruped
 
 ROBOT = quadruped()
@@ -101,3 +101,15 @@ def test_the_first_hypotheses_cover_the_space_and_mostly_say_one_thing():
     assert np.array_equal(
         first_hypotheses(50, np.random.default_rng(3)), first_hypotheses(50, np.random.default_rng(3))
     )
+
+
+def test_neighbours_differ_in_one_term_and_reach_every_place():
+    robot = quadruped()
+    (genome,) = first_hypotheses(1, np.random.default_rng(1))
+    here = set(decode(genome, robot))
+    around = [set(decode(g, robot)) for g in neighbours(genome, robot)]
+    assert len({frozenset(h) for h in around}) == len(around)
+    assert all(len(here - h) <= 1 and len(h - here) <= 1 for h in around)
+    single = {(t.effect, t.target) for h in around for t in h - here}
+    every = {(t.effect, t.target) for g in first_hypotheses(4000, np.random.default_rng(0)) for t in decode(g, robot)}
+    assert single | {(t.effect, t.target) for t in here} == every

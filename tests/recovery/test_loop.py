@@ -14,7 +14,8 @@ from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.evolution.ga import Budget
 from ee_dist.recording.records import HARDWARE, PREDICTION, GenerationRecord, HypothesisRecord, TrialRecord
-from ee_dist.recovery.diagnosis import Judge, diagnose, prune
+from ee_dist.recovery.diagnosis import Judge, diagnose, polish, prune
+from ee_dist.recovery.genome import decode, first_hypotheses
 from ee_dist.recovery.loop import Plan, recover
 from ee_dist.recovery.metrics import RollingMean
 from ee_dist.recovery.observer import Observer
@@ -140,11 +141,24 @@ def test_pruning_drops_what_explains_nothing_and_keeps_the_rest(engine):
     assert prune(judge, needed, float(judge.errors([needed])[0]), 0.1) == (needed, 0.0)
 
 
+def test_polishing_finds_the_bottom_of_the_valley_and_never_climbs(engine):
+    truth = (term("motor_weak", "knee_front_left", loss=0.5),)
+    judge = judge_of(engine, truth)
+    (start,) = first_hypotheses(1, np.random.default_rng(2))
+    before = float(judge.errors([decode(start, ROBOT)])[0])
+    assert polish(judge, start, before, 0) == (start, before)
+    errors = [polish(judge, start, before, rounds)[1] for rounds in (1, 4, 12)]
+    assert before > errors[0] >= errors[1] >= errors[2]
+    genome, error = polish(judge, start, before, 12)
+    assert error == float(judge.errors([decode(genome, ROBOT)])[0]) == 0.0
+    assert prune(judge, decode(genome, ROBOT), error, 0.1)[0] == truth
+
+
 def test_nothing_broken_is_diagnosed_as_nothing(engine):
     judge = judge_of(engine, ())
     notes = Notes()
-    found, _, error = diagnose(judge, [], Budget(population=60, generations=3, crossovers=10), SEED, notes, 0)
-    pruned, error = prune(judge, found, error, 0.1)
+    genome, error = diagnose(judge, [], Budget(population=60, generations=3, crossovers=10), SEED, notes, 0)
+    pruned, error = prune(judge, decode(genome, ROBOT), error, 0.1)
     assert (pruned, error) == ((), 0.0)
 
 
