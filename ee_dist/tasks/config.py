@@ -98,6 +98,7 @@ class BudgetConfig:
     steps: int = 1000
     parsimony: float = 0.1
     polish: int = 8
+    restarts: int = 0
     related: float = 1.0
 
     def __post_init__(self) -> None:
@@ -113,6 +114,7 @@ class BudgetConfig:
                 steps=self.steps,
                 parsimony=self.parsimony,
                 polish=self.polish,
+                restarts=self.restarts,
                 related=self.related,
             )
         except ValueError as error:

@@ -14,6 +14,7 @@ from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.evolution.ga import Budget
 from ee_dist.recording.records import HARDWARE, PREDICTION, GenerationRecord, HypothesisRecord, TrialRecord
+from ee_dist.recovery import loop
 from ee_dist.recovery.diagnosis import Judge, diagnose, polish, prune
 from ee_dist.recovery.genome import decode, first_hypotheses
 from ee_dist.recovery.loop import Plan, recover
@@ -74,6 +75,23 @@ def test_passes_and_trials_come_in_the_papers_order(finished):
     assert sorted(t.index for t in notes.trials if t.source == PREDICTION) == [0, 1, 2, 3]
     assert changed.trials == 3, "one right after the change, two compensating"
     assert len(result.trials_m) == len(result.hypotheses) == 2
+
+
+def test_restarts_begin_with_the_intact_gait_and_the_last_pass_with_all(engine, monkeypatch):
+    seen: list[int] = []
+
+    def spy(model, database, *rest):
+        seen.append(len(database))
+        return _some_controller(), 0.0
+
+    monkeypatch.setattr(loop, "repair", spy)
+    few = Budget(population=8, generations=1, crossovers=2)
+    for restarts in (0, 2):
+        plan = Plan(repair=few, diagnosis=few, compensating_trials=3, steps=80, polish=0, restarts=restarts)
+        robots = [PhysicalRobot(engine, ROBOT, (), SEED) for _ in range(2)]
+        evaluator = CachedEvaluator(SerialEvaluator(engine))
+        recover(ROBOT, *robots, RollingMean(), plan, evaluator, np.random.SeedSequence(1), Observer())
+    assert seen == [0, 1, 2, 3, 0, 1, 1, 3]
 
 
 def test_an_intact_robot_does_what_its_model_says(finished):

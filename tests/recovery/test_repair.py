@@ -46,3 +46,9 @@ def test_without_a_database_there_are_none():
 def test_an_impossible_share_is_refused(share):
     with pytest.raises(ValueError, match="related must be from 0 to 1"):
         Plan(related=share)
+
+
+@pytest.mark.parametrize("restarts", [-1, 4])
+def test_restarts_leave_a_pass_to_refine(restarts):
+    with pytest.raises(ValueError, match="restarts must be from 0 to 3"):
+        Plan(restarts=restarts)
