@@ -202,6 +202,10 @@ def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
     flagged = share([c.verdict == UNEXPLAINED or (c.verdict == EFFECT and c.flagged) for c in real])
     if args.withhold:
         print(f"withheld: unexplained, or an effect with the rest flagged: {flagged:.0%}")
+        print("not flagged (a stand-in at 1.00 times the floor does all that the truth would):")
+        for c in real:
+            if c.verdict != UNEXPLAINED and not c.flagged:
+                print(f"  {c.index}: {c.shown} -> {c.verdict} {', '.join(c.named)} (error/floor {c.ratio:.2f})")
     if args.two:
         both, falls = share([c.within for c in real]), share([c.flagged for c in real])
         print(f"two effects: both found {both:.0%}, ladder falls at each step {falls:.0%}")

@@ -22,6 +22,12 @@ from ee_dist.trials.log import Array
 
 AT_BOUND = 0.985
 """Share of the way to a bound from which a value counts as being at it."""
+NO_MORE = "no effect takes more off held-out data than luck"
+TOO_LITTLE = "what is left is spread: no effect takes a tenth of it off held-out data"
+WORTH = 0.1
+"""Share of the squared error above the noise floor that an effect must take off to be added. Where a model is wrong in ways
+that no effect describes (another simulator, resampled records), some effect always takes a little of it, surely and
+wrongly."""
 
 
 @dataclass(eq=False)
@@ -81,6 +87,7 @@ def improve(
     u = np.concatenate([c.shares(dict(t.values)) for c, t in zip(parts, before, strict=True)] or [np.zeros(0)])
     start = per_model(problem, base)
     ladder = [Rung((), before, error(base), error(base), start)]
+    floor, _ = problem.noise_floor()
     explanations: list[Explanation] = []
     stopped = "the effects asked for were added"
     if wanted is not None:
@@ -98,12 +105,16 @@ def improve(
             found = explain(problem, [c for c in pool if c.name not in {p.name for p in parts}], now, effort, progress)
             explanations.append(found)
             options = _options(problem, found, pool)
-            rung, stopped = None, "no effect takes more off held-out data than luck"
+            rung, stopped = None, NO_MORE
             for group in options:
                 model, at = _with_best_start(problem, parts, u, group, now, found)
                 judged = fit_out(problem, [(model, at)], base, (), half, len(pool), progress)[0]
                 step = _rung(problem, judged, len(group), ladder[-1])
-                if _earns(step, ladder[-1], least_energy(len(pool), sum(c.size for c in group))):
+                if not _earns(step, ladder[-1], least_energy(len(pool), sum(c.size for c in group))):
+                    continue
+                if worth(ladder[-1].error_heldout, step.error_heldout, floor) < WORTH:
+                    stopped = TOO_LITTLE
+                else:
                     rung = step
                     parts, u = [*parts, *group], judged.u
                     break
@@ -111,6 +122,12 @@ def improve(
                 break
             ladder.append(rung)
     return _finish(problem, parts, u, ladder, base, stopped, explanations, progress)
+
+
+def worth(before: float, after: float, floor: float) -> float:
+    """Share of the squared error above the noise floor that a step takes off; 1 where nothing was above it."""
+    above = before**2 - floor**2
+    return (before**2 - after**2) / above if above > 0 else 1.0
 
 
 def per_model(problem: Problem, residual: Array) -> Array:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ee_dist.discrepancy.candidates import Candidate, candidate, candidates, known, parse
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, Effort, explain
 from ee_dist.discrepancy.folds import bootstrap, halves
-from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.improve import WORTH, improve, worth
 from ee_dist.discrepancy.misfit import leftovers
 from ee_dist.discrepancy.screen import screen
 from ee_dist.effects.catalogue import EffectError, Hypothesis, term
@@ -156,3 +156,9 @@ def test_bootstrap_holds_the_sum() -> None:
     d = np.random.default_rng(1).normal(1.0, 0.1, 50)
     low, high = bootstrap(d)
     assert low < d.sum() < high and low > 40
+
+
+def test_a_step_is_worth_what_it_takes_of_the_error_above_the_floor() -> None:
+    assert worth(2.0, 1.0, 1.0) == pytest.approx(1.0)
+    assert worth(1.1, 1.09, 0.6) < WORTH < worth(1.1, 1.0, 0.6)
+    assert worth(0.9, 0.9, 1.0) == 1.0, "nothing was above the floor"
