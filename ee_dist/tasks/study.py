@@ -127,6 +127,10 @@ HEAD = (
 )  # fmt: skip
 
 
+SHORT = ("case", "runs", "intact", "after", "best", "trial 4", "restored", "right", "named", "p")
+"""The same for a terminal of 80 columns."""
+
+
 def cells(line: dict[str, Any]) -> list[str]:
     n = line["runs"]
     return [
@@ -154,9 +158,9 @@ def markdown(rows: list[dict[str, Any]]) -> str:
 
 def _print(console: Console, rows: list[dict[str, Any]]) -> None:
     for metric, counts in total(rows).items():
-        table = Table(title=metric, box=SIMPLE, pad_edge=False, title_justify="left")
-        for name in HEAD:
-            table.add_column(name, justify="right")
+        table = Table(title=f"{metric}, distances in m", box=SIMPLE, pad_edge=False, title_justify="left")
+        for name in SHORT:
+            table.add_column(name, justify="right", no_wrap=True)
         for line in by_case(rows):
             if line["metric"] == metric:
                 table.add_row(*cells(line))
