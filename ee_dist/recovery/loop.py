@@ -37,9 +37,9 @@ class Plan:
     """Share of the error that a term of a hypothesis must account for to be believed; the paper has no such rule (0)."""
     polish: int = 8
     """How many steps to a better neighbour the evolved hypothesis may take; the paper has no such step (0)."""
-    restarts: int = 0
+    restarts: int = 3
     """How many passes after the change start from the intact robot's controller instead of all controllers so far. A pass
-    keeps the kind of gait that it started with: restarts try several, and the last pass refines the best."""
+    keeps the kind of gait that it started with: restarts try several. The last pass starts from all in any case, and refines the best."""
     related: float = 1.0
     """Share of a repair pass's first population that descends from the database; with 0 only the database itself does."""
 
@@ -52,8 +52,8 @@ class Plan:
             raise ValueError(f"plan: parsimony must be from 0 to below 1, not {self.parsimony}")
         if self.polish < 0:
             raise ValueError(f"plan: polish must be 0 or more, not {self.polish}")
-        if not 0 <= self.restarts < self.compensating_trials:
-            raise ValueError(f"plan: restarts must be from 0 to {self.compensating_trials - 1}, not {self.restarts}")
+        if self.restarts < 0:
+            raise ValueError(f"plan: restarts must be 0 or more, not {self.restarts}")
         if not 0.0 <= self.related <= 1.0:
             raise ValueError(f"plan: related must be from 0 to 1, not {self.related}")
 
@@ -117,7 +117,7 @@ def recover(
         _predict(k + 1, name, robot, trials[-1][0], hypothesis, evaluator, plan.steps, observer)
 
         model = apply(robot, hypothesis)
-        known = controllers if k >= plan.restarts else controllers[:1]
+        known = controllers if k >= min(plan.restarts, passes - 1) else controllers[:1]
         best, expected = repair(
             model, known, evaluator, plan.repair, plan.steps, repair_seeds[k + 1], observer, k + 1, plan.related
         )

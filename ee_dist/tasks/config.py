@@ -98,7 +98,7 @@ class BudgetConfig:
     steps: int = 1000
     parsimony: float = 0.1
     polish: int = 8
-    restarts: int = 0
+    restarts: int = 3
     related: float = 1.0
 
     def __post_init__(self) -> None:

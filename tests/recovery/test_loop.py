@@ -86,12 +86,12 @@ def test_restarts_begin_with_the_intact_gait_and_the_last_pass_with_all(engine, 
 
     monkeypatch.setattr(loop, "repair", spy)
     few = Budget(population=8, generations=1, crossovers=2)
-    for restarts in (0, 2):
+    for restarts in (0, 2, 5):
         plan = Plan(repair=few, diagnosis=few, compensating_trials=3, steps=80, polish=0, restarts=restarts)
         robots = [PhysicalRobot(engine, ROBOT, (), SEED) for _ in range(2)]
         evaluator = CachedEvaluator(SerialEvaluator(engine))
         recover(ROBOT, *robots, RollingMean(), plan, evaluator, np.random.SeedSequence(1), Observer())
-    assert seen == [0, 1, 2, 3, 0, 1, 1, 3]
+    assert seen == [0, 1, 2, 3, 0, 1, 1, 3, 0, 1, 1, 3]
 
 
 def test_an_intact_robot_does_what_its_model_says(finished):
