@@ -43,7 +43,7 @@ class Rule:
 @dataclass(eq=False)
 class Verdict:
     """A proposal on top of the model of its step. ``gain``: share of the held-out error that it takes off; ``residual``
-    (n,): each value from the fit that had not seen it; ``u``: values fitted on the first fold."""
+    (n,): size of each value in the fit that had not seen it; ``u``: values fitted on the first fold."""
 
     name: str
     proposal: Proposal
@@ -78,14 +78,27 @@ def natural(problem: Problem, value: float) -> float:
     return float(convert(value)) if convert is not None else value
 
 
-def folds_of(problem: Problem, count: int) -> NDArray[np.int64]:
-    """(segments,) which fold holds a segment out: whole trials take turns where there are as many as folds, else the
-    segments of each do."""
+Folds = list[NDArray[np.int64]]
+"""Ways of cutting the segments into folds: each (segments,), which fold holds a segment out."""
+
+
+def folds_of(problem: Problem, count: int) -> Folds:
+    """Whole trials take turns where there are as many as folds, else the segments of each do.
+
+    Where trials differ in their settings (a gain, a payload), a second way holds out one setting after the other: a model
+    must also be right about settings that it was not fitted to.
+    """
+    trial = np.asarray(problem.trial_of_segment)
     if len(problem.trials) >= count:
-        return np.asarray(problem.trial_of_segment) % count
-    place = np.arange(len(problem.segments))
-    first = np.array([np.flatnonzero(problem.trial_of_segment == k)[0] for k in range(len(problem.trials))])
-    return (place - first[problem.trial_of_segment]) % count
+        ways = [trial % count]
+    else:
+        first = np.array([np.flatnonzero(trial == k)[0] for k in range(len(problem.trials))])
+        ways = [(np.arange(len(problem.segments)) - first[trial]) % count]
+    setups = [t.setup for t in getattr(problem, "measured", ())]
+    settings = list(dict.fromkeys(setups))
+    if 1 < len(settings) < len(setups):
+        ways.append(np.array([settings.index(s) for s in setups])[trial] % count)
+    return ways
 
 
 def climb(
@@ -129,7 +142,7 @@ def judge_all(
     fit: Fit,
     current: Array,
     proposals: Sequence[Proposal],
-    folds: NDArray[np.int64],
+    folds: Folds,
     rule: Rule,
     progress: Progress = quiet,
 ) -> list[Verdict]:
@@ -151,24 +164,28 @@ def judge_all(
 
 
 def cross_fit(
-    problem: Problem, starts: Sequence[tuple[Model, Array]], folds: NDArray[np.int64], progress: Progress = quiet
+    problem: Problem, starts: Sequence[tuple[Model, Array]], folds: Folds, progress: Progress = quiet
 ) -> list[tuple[float, Array, Array]]:
-    """For each (model, start): energy of the fits on what they saw, held-out residual (n,), values u of the first fold."""
+    """For each (model, start): energy of the fits on what they saw, held-out residual (n,), values u of the first fold.
+
+    With several ways of holding out, a value of the residual is the root mean square over them.
+    """
     seen = np.zeros(len(starts))
-    held = [np.zeros(len(problem.segment_of)) for _ in starts]
+    square = [np.zeros(len(problem.segment_of)) for _ in starts]
     values: list[Array] = []
-    for k in range(int(folds.max()) + 1):
-        out = (folds == k)[problem.segment_of]
-        if not out.any():
-            continue
-        fits = fit_all(problem, list(starts), (), ~out, widths=WIDTHS[1:], progress=progress)
-        trials = np.unique(problem.trial_of_segment[folds == k]).tolist()
-        rows = problem.residuals([f.hypothesis for f in fits], trials)
-        for i, (fit, row) in enumerate(zip(fits, rows, strict=True)):
-            seen[i] += fit.energy
-            held[i][out] = row[out]
-        values = values or [f.u for f in fits]
-    return list(zip(seen.tolist(), held, values, strict=True))
+    for way in folds:
+        for k in range(int(way.max()) + 1):
+            out = (way == k)[problem.segment_of]
+            if not out.any():
+                continue
+            fits = fit_all(problem, list(starts), (), ~out, widths=WIDTHS[1:], progress=progress)
+            trials = np.unique(problem.trial_of_segment[way == k]).tolist()
+            rows = problem.residuals([f.hypothesis for f in fits], trials)
+            for i, (fit, row) in enumerate(zip(fits, rows, strict=True)):
+                seen[i] += fit.energy
+                square[i][out] += row[out] ** 2 / len(folds)
+            values = values or [f.u for f in fits]
+    return list(zip(seen.tolist(), [np.sqrt(s) for s in square], values, strict=True))
 
 
 def _verdict(

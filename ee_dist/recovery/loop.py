@@ -39,7 +39,7 @@ class Plan:
     """How many steps to a better neighbour the evolved hypothesis may take; the paper has no such step (0)."""
     restarts: int = 3
     """How many passes after the change start from the intact robot's controller instead of all controllers so far. A pass
-    keeps the kind of gait that it started with: restarts try several. The last pass starts from all in any case, and refines the best."""
+    keeps the kind of gait that it started with: restarts try several. The last pass starts from all in any case."""
     related: float = 1.0
     """Share of a repair pass's first population that descends from the database; with 0 only the database itself does."""
 
