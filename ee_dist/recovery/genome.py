@@ -6,7 +6,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.effects.targets import carried_parts, motors, parts, sensors
@@ -33,6 +32,9 @@ def first_hypotheses(count: int, rng: np.random.Generator) -> NDArray[np.int16]:
     With each gene active by the toss of a coin, a single fault is said by a quarter of the genomes only, and forty-two
     places to be wrong at are then tried with one magnitude each.
     """
+    # Loading scipy.stats takes longer than everything else before a run's first generation.
+    from scipy.stats import qmc
+
     even = qmc.LatinHypercube(LENGTH, rng=rng).random(count)
     genomes = (np.minimum(np.floor(even * (2 * SCALE + 1)), 2 * SCALE) - SCALE).astype(np.int16)
     switch = np.abs(genomes[:, ::GENE_LENGTH])

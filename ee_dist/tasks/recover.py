@@ -33,7 +33,6 @@ from ee_dist.tasks.summary import (
     write_summary,
 )
 from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
-from ee_dist.viewing.rerun_scene import write_rrd
 
 
 @dataclass
@@ -89,6 +88,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     counts = evaluator.counts
     hardware.close()
     recording = out / "recovery.rrd"
+    from ee_dist.viewing.rerun_scene import write_rrd  # rerun takes half a second to load, and is needed only now
+
     write_rrd(read_run(path), recording)
     final = score(result.intact_m, result.trials_m, result.hypotheses[-1], truth)
     summary = write_summary(out, "recover", config, options, watch, digest.hex, {
