@@ -174,11 +174,11 @@ class DrivePath:
             error = np.where(p["deadband"] > 0, outside, error)
         asked = p["kp"] * error - p["kd"] * speed
         if self.uses_integral:
-            self.integral = np.clip(self.integral + error * self.dt, -self.integral_limit, self.integral_limit)
+            self.integral = _within(self.integral + error * self.dt, self.integral_limit)
             if enabled is not None:
                 self.integral = self.integral * enabled
             asked = asked + p["ki"] * self.integral
-        active = np.clip(asked, -p["torque_limit"], p["torque_limit"])
+        active = _within(asked, p["torque_limit"])
         scale: Array | float = 1.0
         if supply_v is not None:
             nominal = p["supply_nominal_v"]
@@ -212,6 +212,11 @@ class DrivePath:
         over = np.where(past_upper, np.maximum(np.maximum(torque, 0.0) + scale * (qd - highest), 0.0), 0.0)
         under = np.where(past_lower, np.minimum(np.minimum(torque, 0.0) + scale * (qd - lowest), 0.0), 0.0)
         return torque - over - under
+
+
+def _within(value: Array, limit: Array) -> Array:
+    """np.clip to +-limit without its overhead, which a batch pays in every step."""
+    return np.minimum(np.maximum(value, -limit), limit)
 
 
 def _each(robots: Sequence[Robot], facts: Callable[[Robot], Array]) -> Array:
