@@ -135,13 +135,13 @@ def _ladder(hold: int, rungs: Sequence[Rung], problem: FreeRun, held: FreeRun, p
         )
     page.table(
         f"The ladder, kp {hold} held out, mrad",
-        ("step", "fitted gains", "trajectories held out", "gain there", "t", f"kp {hold}"),
+        ("step", "fitted gains", "held out while fitting", "gain there", "t", f"kp {hold}"),
         rows,
     )
     for r in rungs[1:]:
         what = "what else was proposed with it" if r.added != "stopped" else "what did not earn a place at the end"
         page.table(
-            f"{r.added}: {what}, mrad on held-out trajectories",
+            f"{r.added}: {what}, mrad held out while fitting",
             ("effect", "held out", "gain", "t", "why not"),
             [(v.name, f"{1e3 * v.error_heldout:.1f}", f"{v.gain:+.0%}", f"{v.t:.1f}", v.why_not) for v in r.tried],
         )

@@ -221,12 +221,14 @@ def _padded(fit: Fit, proposal: Proposal, size: float = 0.05) -> Array:
 def _promising(
     problem: Problem, fit: Fit, proposals: Sequence[Proposal], count: int, progress: Progress
 ) -> list[Proposal]:
-    """Those that change the prediction at all, the most promising first, at most ``count``."""
+    """Those that change the prediction at all, the most promising first, at most ``count``; and all families, whose
+    members promise little one by one."""
     pool = {c.name: c for p in proposals for c in p}
     screened = screen(problem, list(pool.values()), fit.hypothesis, (0.03, 0.1, 0.3), progress=progress)
     found = {s.candidate.name: s for s in screened}
     seen = [p for p in proposals if max(found[c.name].reach for c in p) > INVISIBLE]
-    return sorted(seen, key=lambda p: -max(found[c.name].promise for c in p))[:count]
+    ranked = sorted(seen, key=lambda p: -max(found[c.name].promise for c in p))
+    return [p for k, p in enumerate(ranked) if k < count or len(p) > 1]
 
 
 def _rung(problem: Problem, added: str, fit: Fit, current: Array, tried: list[Verdict]) -> Rung:
