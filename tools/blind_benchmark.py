@@ -54,7 +54,8 @@ it from luck: about 2 ln(435) + 3 standard deviations."""
 
 @dataclass
 class Case:
-    """``mark``: energy that the hidden effect adds to the residual. ``ratio``: held-out error over the noise floor."""
+    """``mark``: energy that the hidden effect adds to the residual; ``beside``: energy between the residual of what was
+    named and that of the truth. ``ratio``: held-out error over the noise floor."""
 
     index: int
     family: str
@@ -68,6 +69,7 @@ class Case:
     within: bool = False
     flagged: bool = False
     ratio: float = float("nan")
+    beside: float = float("nan")
     value_error: float = float("nan")
     seconds: float = 0.0
 
@@ -145,11 +147,13 @@ class Bench:
         if self.args.two:
             self._two(found, problem, names)
         else:
-            self._one(found, problem, drawn, hidden)
+            self._one(found, problem, drawn, hidden, true)
         found.seconds = time.monotonic() - began
         return found
 
-    def _one(self, found: Case, problem: OpenLoop, drawn: list[Candidate], hidden: Hypothesis) -> None:
+    def _one(
+        self, found: Case, problem: OpenLoop, drawn: list[Candidate], hidden: Hypothesis, true: np.ndarray
+    ) -> None:
         pool = self.pool
         if self.args.withhold:
             pool = [c for c in pool if c.effect.name != drawn[0].effect.name]
@@ -159,6 +163,8 @@ class Bench:
         found.within = bool(set(found.truth) & set(found.named))
         after = x.best.error_heldout if x.best is not None else x.baseline_error
         found.ratio = after / x.noise_floor
+        if x.best is not None:
+            found.beside = float(((x.best.residual - true) ** 2).sum())
         for judged in x.tied:
             if drawn and judged.name == drawn[0].name and drawn[0].size:
                 at = drawn[0].shares(dict(hidden[0].values))
@@ -202,10 +208,15 @@ def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
     flagged = share([c.verdict == UNEXPLAINED or (c.verdict == EFFECT and c.flagged) for c in real])
     if args.withhold:
         print(f"withheld: unexplained, or an effect with the rest flagged: {flagged:.0%}")
-        print("not flagged (a stand-in at 1.00 times the floor does all that the truth would):")
-        for c in real:
-            if c.verdict != UNEXPLAINED and not c.flagged:
-                print(f"  {c.index}: {c.shown} -> {c.verdict} {', '.join(c.named)} (error/floor {c.ratio:.2f})")
+        silent = [c for c in real if c.verdict != UNEXPLAINED and not c.flagged]
+        twins = sum(c.beside < DETECTABLE for c in silent)
+        print(
+            f"not flagged: {len(silent)}, of which {twins} name a stand-in that differs from the truth by less than what"
+        )
+        print(f"makes a case too small ({DETECTABLE:g}):")
+        for c in silent:
+            print(f"  {c.index}: {c.shown} -> {c.verdict} {', '.join(c.named)} (mark {c.mark:.0f}, beside the truth "
+                  f"{c.beside:.0f}, error/floor {c.ratio:.2f})")  # fmt: skip
     if args.two:
         both, falls = share([c.within for c in real]), share([c.flagged for c in real])
         print(f"two effects: both found {both:.0%}, ladder falls at each step {falls:.0%}")
