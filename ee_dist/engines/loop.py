@@ -105,17 +105,24 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     ]
 
 
-def in_batches(
-    rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]], Bodies], largest: int = 256
-) -> list[SensorLog]:
+Cut = Callable[[Sequence[Rollout]], Sequence[Sequence[int]]]
+"""Which of some rollouts of one shape are run together, batch by batch."""
+
+
+def up_to(largest: int) -> Cut:
+    """Batches of that size, in the order asked."""
+    return lambda rollouts: [range(k, min(k + largest, len(rollouts))) for k in range(0, len(rollouts), largest)]
+
+
+def in_batches(rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]], Bodies], cut: Cut) -> list[SensorLog]:
     """Sort rollouts into batches of one shape, run each, and return the logs in the order asked."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for i, r in enumerate(rollouts):
         groups.setdefault(shape_of(r), []).append(i)
     logs: dict[int, SensorLog] = {}
     for members in groups.values():
-        for k in range(0, len(members), largest):
-            part = members[k : k + largest]
+        for chosen in cut([rollouts[i] for i in members]):
+            part = [members[k] for k in chosen]
             batch = [rollouts[i] for i in part]
             bodies = place(batch)
             try:

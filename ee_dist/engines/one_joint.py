@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from ee_dist.engines.contract import EngineError, Rollout, Truth
-from ee_dist.engines.loop import in_batches
+from ee_dist.engines.loop import in_batches, up_to
 from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.model import Drive, Robot
 from ee_dist.trials.log import Array, SensorLog
@@ -44,7 +44,7 @@ class OneJointEngine:
                 raise EngineError(
                     f"one_joint cannot simulate {r.model.name!r}: it is for one driven joint on a fixed base"
                 )
-        return in_batches(rollouts, OneJointBodies, self.largest_batch)
+        return in_batches(rollouts, OneJointBodies, up_to(self.largest_batch))
 
     def close(self) -> None:
         """Nothing is held."""

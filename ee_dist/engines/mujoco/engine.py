@@ -10,7 +10,7 @@ from collections.abc import Hashable, Sequence
 import mujoco
 
 from ee_dist.engines.contract import Rollout
-from ee_dist.engines.loop import in_batches
+from ee_dist.engines.loop import in_batches, up_to
 from ee_dist.engines.mujoco.bodies import Group, MuJoCoBodies
 from ee_dist.engines.mujoco.model import Model, structure_key
 from ee_dist.trials.log import SensorLog
@@ -38,7 +38,7 @@ class MuJoCoEngine:
             mujoco.set_mju_user_warning(_log.debug)
 
     def rollout(self, rollouts: Sequence[Rollout]) -> list[SensorLog]:
-        return in_batches(rollouts, self._place, self.largest_batch)
+        return in_batches(rollouts, self._place, up_to(self.largest_batch))
 
     def close(self) -> None:
         self._models.clear()

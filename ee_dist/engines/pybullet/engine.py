@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pybullet as p
@@ -16,8 +16,12 @@ from ee_dist.trials.log import Array, SensorLog
 
 WORLD_SIZES = (8, 4, 2, 1)
 """Robots a world. Eight share the cost of a call well; more cost Bullet's collision pairs."""
-POOL = 64
-"""Worlds kept for reuse (some 35 MB each), beyond which the longest unused are closed."""
+WORLDS = 16
+"""Worlds in a batch at most: robots that each lack another part need one each, and each takes some 30 MB."""
+POOL = 16
+"""Worlds kept for reuse, beyond which the longest unused are closed."""
+Kind = tuple[str, tuple[float, float, float]]
+"""What robots must share to stand in one world: structure and gravity."""
 
 
 class PyBulletEngine:
@@ -28,9 +32,12 @@ class PyBulletEngine:
     def __init__(self, largest_batch: int = 128) -> None:
         self.largest_batch = largest_batch
         self._idle: OrderedDict[tuple[str, int], list[World]] = OrderedDict()
+        self._structures: dict[int, str] = {}
+        """Of the models of this call, by their identity: finding it is not free."""
 
     def rollout(self, rollouts: Sequence[Rollout]) -> list[SensorLog]:
-        return in_batches(rollouts, self._place, self.largest_batch)
+        self._structures.clear()
+        return in_batches(rollouts, self._place, self._cut)
 
     def close(self) -> None:
         for worlds in self._idle.values():
@@ -38,22 +45,39 @@ class PyBulletEngine:
                 world.close()
         self._idle.clear()
 
-    def _place(self, batch: Sequence[Rollout]) -> BulletBodies:
-        keys: dict[int, str] = {}
-        groups: dict[tuple[str, tuple[float, float, float]], list[int]] = {}
-        for i, r in enumerate(batch):
-            if id(r.model) not in keys:
-                keys[id(r.model)] = structure_key(r.model)
-            groups.setdefault((keys[id(r.model)], gravity_vector(r.model)), []).append(i)
-        placed: list[tuple[World, list[int]]] = []
-        for (structure, _), members in groups.items():
+    def _in_worlds(self, rollouts: Sequence[Rollout]) -> Iterator[list[int]]:
+        """Places of those that share a world, world by world."""
+        kinds: dict[Kind, list[int]] = {}
+        for i, r in enumerate(rollouts):
+            if id(r.model) not in self._structures:
+                self._structures[id(r.model)] = structure_key(r.model)
+            kinds.setdefault((self._structures[id(r.model)], gravity_vector(r.model)), []).append(i)
+        for members in kinds.values():
             for size in WORLD_SIZES:
-                while len(members) >= size:
-                    rows, members = members[:size], members[size:]
-                    idle = self._idle.get((structure, size))
-                    world = idle.pop() if idle else World(batch[rows[0]].model, size)
-                    world.prepare([batch[i].model for i in rows], [batch[i].start for i in rows])
-                    placed.append((world, rows))
+                while len(members) >= size and size <= self.largest_batch:
+                    yield members[:size]
+                    members = members[size:]
+
+    def _cut(self, rollouts: Sequence[Rollout]) -> list[list[int]]:
+        """Batches of ``largest_batch`` robots and ``WORLDS`` worlds at most."""
+        batches: list[list[int]] = []
+        room = 0
+        for rows in self._in_worlds(rollouts):
+            if room == 0 or len(batches[-1]) + len(rows) > self.largest_batch:
+                batches.append([])
+                room = WORLDS
+            batches[-1] += rows
+            room -= 1
+        return batches
+
+    def _place(self, batch: Sequence[Rollout]) -> BulletBodies:
+        placed: list[tuple[World, list[int]]] = []
+        for rows in self._in_worlds(batch):
+            models = [batch[i].model for i in rows]
+            idle = self._idle.get((self._structures[id(models[0])], len(rows)))
+            world = idle.pop() if idle else World(models[0], len(rows))
+            world.prepare(models, [batch[i].start for i in rows])
+            placed.append((world, rows))
         return BulletBodies(self, placed, batch)
 
     def give_back(self, worlds: Sequence[World]) -> None:
