@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, get_args, get_type_hints
 
 from ee_dist.effects.catalogue import Hypothesis, from_dict
 from ee_dist.evolution.ga import Budget
@@ -164,6 +164,18 @@ def unknown_key(owner: str, key: str, known: tuple[str, ...]) -> ConfigError:
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
     where = f"{owner}.{key}" if owner else key
     return ConfigError(f"{where}: no such setting; {hint}")
+
+
+def known_settings(kind: Any = Config, prefix: str = "") -> tuple[str, ...]:
+    """Names of all settings but those of a task, with their owners: ``seed``, ``budget.population``."""
+    names: list[str] = []
+    hints = get_type_hints(kind)
+    for f in fields(kind):
+        names.append(prefix + f.name)
+        inner = next((a for a in (hints[f.name], *get_args(hints[f.name])) if is_dataclass(a)), None)
+        if inner is not None:
+            names += known_settings(inner, f"{prefix}{f.name}.")
+    return tuple(names)
 
 
 def check_keys(owner: str, given: Any, kind: type) -> None:
