@@ -14,7 +14,7 @@ from ee_dist.discrepancy.candidates import candidate, candidates
 from ee_dist.discrepancy.fit import Fit, Model
 from ee_dist.discrepancy.free_run import FreeRun
 from ee_dist.discrepancy.global_fit import search_all
-from ee_dist.discrepancy.ladder import Rule, Rung, climb
+from ee_dist.discrepancy.ladder import Rule, Rung, climb, fit_everything
 from ee_dist.discrepancy.measured import MeasuredTrial
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import ModelFile, read_model, write_model
@@ -133,6 +133,12 @@ def _ladder(hold: int, rungs: Sequence[Rung], problem: FreeRun, held: FreeRun, p
                 f"{_mrad(held, r.hypothesis):.1f}",
             )
         )
+        for v in r.tried:
+            if v.tied:
+                fit = fit_everything(problem, v.model, [v.u]).hypothesis
+                found = (f"{_mrad(problem, fit):.1f}", f"{1e3 * v.error_heldout:.1f}", f"{v.gain:.0%}", f"{v.t:.1f}")
+                rows.append((f"or {v.name}", *found, f"{_mrad(held, fit):.1f}"))
+    page.text("'or': not told from the step above by held-out data", "")
     page.table(
         f"The ladder, kp {hold} held out, mrad",
         ("step", "fitted gains", "held out while fitting", "gain there", "t", f"kp {hold}"),

@@ -45,7 +45,8 @@ class Rule:
 @dataclass(eq=False)
 class Verdict:
     """A proposal on top of the model of its step. ``gain``: share of the held-out error that it takes off; ``residual``
-    (n,): size of each value in the fit that had not seen it; ``u``: values fitted on the first fold."""
+    (n,): size of each value in the fit that had not seen it; ``u``: values fitted on the first fold; ``tied``: held-out
+    data do not tell it from the best."""
 
     name: str
     proposal: Proposal
@@ -56,6 +57,7 @@ class Verdict:
     gain: float
     t: float
     why_not: str
+    tied: bool = False
 
 
 @dataclass(eq=False)
@@ -191,7 +193,29 @@ def judge_all(
     for i, proposal in enumerate(chosen):
         _, residual, u = min(found[i :: len(chosen)], key=lambda f: f[0])
         out.append(_verdict(problem, proposal, models[i], u, residual, current, rule))
-    return sorted(out, key=lambda v: v.error_heldout)
+    ranked = sorted(out, key=lambda v: v.error_heldout)
+    for v in ranked[1:]:
+        behind = _standard_errors(problem, v.residual**2 - ranked[0].residual ** 2)
+        v.tied = not (v.why_not or ranked[0].why_not) and behind < rule.t
+    return ranked
+
+
+def parted_most(problem: Problem, tied: Sequence[Verdict]) -> str:
+    """The trial in which the predictions of some models differ most."""
+    values = problem.residuals([v.model.hypothesis(v.u) for v in tied])
+    finite = np.where(np.isfinite(values).all(axis=0), values, 0.0).var(axis=0)
+    trial = problem.trial_of_segment[problem.segment_of]
+    size = np.bincount(trial, minlength=len(problem.trials))
+    mean = np.bincount(trial, weights=finite, minlength=len(problem.trials)) / np.maximum(size, 1)
+    return problem.trials[int(np.argmax(mean))]
+
+
+def _standard_errors(problem: Problem, gained: Array) -> float:
+    """How many of its standard errors over the segments the mean of values (n,) is above zero."""
+    count = len(problem.segments)
+    by_segment = np.bincount(problem.segment_of, weights=gained, minlength=count)
+    spread = float(by_segment.std(ddof=1)) / math.sqrt(count) if count > 1 else math.inf
+    return float(by_segment.mean()) / spread if spread > 0 else 0.0
 
 
 def cross_fit(
@@ -223,10 +247,7 @@ def _verdict(
     problem: Problem, proposal: Proposal, model: Model, u: Array, residual: Array, current: Array, rule: Rule
 ) -> Verdict:
     before, after = natural(problem, error(current)), natural(problem, error(residual))
-    count = len(problem.segments)
-    gained = np.bincount(problem.segment_of, weights=current**2 - residual**2, minlength=count)
-    spread = float(gained.std(ddof=1)) / math.sqrt(count) if count > 1 else math.inf
-    t = float(gained.mean()) / spread if spread > 0 else 0.0
+    t = _standard_errors(problem, current**2 - residual**2)
     gain = 1.0 - after / before if math.isfinite(after) else -math.inf
     why = ""
     if gain < rule.share:

@@ -12,7 +12,7 @@ from rich.table import Table as Shown
 
 from ee_dist.discrepancy.force_balance import ForceBalance
 from ee_dist.discrepancy.free_run import FreeRun
-from ee_dist.discrepancy.ladder import Rung, Verdict, natural
+from ee_dist.discrepancy.ladder import Rung, Verdict, natural, parted_most
 from ee_dist.discrepancy.words import plain, told
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.model import Robot
@@ -48,8 +48,23 @@ def account(problem: ForceBalance | FreeRun, rungs: Sequence[Rung], robot: Robot
         f"Held-out error ({problem.natural_name}) fell from {shown(problem, first.error_heldout)} to "
         f"{shown(problem, last.error_heldout)}; noise alone would leave {shown(problem, natural(problem, 1.0))}."
     )
+    for rung in rungs[1:-1]:
+        lines += tie_words(problem, rung.tried)
     lines.append("The model: " + "; ".join(told(t, robot) for t in last.hypothesis) + ".")
     return lines
+
+
+def tie_words(problem: ForceBalance | FreeRun, tried: Sequence[Verdict]) -> list[str]:
+    """What the measurements do not tell from the best proposal of a step, and which of them come nearest to it."""
+    tied = [v for v in tried if v.tied]
+    if not tied:
+        return []
+    names = "; ".join(f"{plain(v.name.replace('@', ' at '))} ({shown(problem, v.error_heldout)})" for v in tied)
+    best = plain(tried[0].name.replace("@", " at "))
+    return [
+        f"These measurements do not tell {best} ({shown(problem, tried[0].error_heldout)} held out) from: {names}. Their "
+        f"predictions part most in {parted_most(problem, [tried[0], *tied])}: more trials of that kind would."
+    ]
 
 
 def overlay_section(
@@ -89,7 +104,7 @@ def ranking_section(
             shown(problem, v.error_heldout),
             f"{v.gain:+.1%}",
             f"{v.t:.1f}",
-            v.why_not or "earns its place",
+            v.why_not or ("not told from the best" if v.tied else "earns its place"),
         )
         for v in tried
     ]
@@ -106,6 +121,7 @@ def candidate_entry(v: Verdict, rank: int) -> dict[str, Any]:
         "t": v.t,
         "rank": rank,
         "earned": not v.why_not,
+        "tied_with_best": v.tied,
         "why_not": v.why_not,
     }
 
@@ -136,5 +152,11 @@ def print_tried(console: Console, problem: ForceBalance | FreeRun, tried: Sequen
         table.add_column(column)
     for v in tried:
         value = "; ".join(told(t, robot) for t in new_terms(v))
-        table.add_row(value, shown(problem, v.error_heldout), f"{v.gain:+.1%}", f"{v.t:.1f}", v.why_not)
+        table.add_row(
+            value,
+            shown(problem, v.error_heldout),
+            f"{v.gain:+.1%}",
+            f"{v.t:.1f}",
+            v.why_not or ("not told from the best" if v.tied else ""),
+        )
     console.print(table)

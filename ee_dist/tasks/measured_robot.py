@@ -43,6 +43,7 @@ from ee_dist.tasks.measured_pages import (
     ranking_section,
     shown,
     step_entry,
+    tie_words,
 )
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.summary import Stopwatch, hypothesis_list, write_summary
@@ -149,6 +150,7 @@ def run_explain(config: Config, options: Any, out: Path) -> None:
         words.append(
             f"It takes {found.gain:.0%} off the held-out error ({found.t:.1f} standard errors). Its mark: {entry.signature}"
         )
+        words += tie_words(problem, tried)
     page = Page(
         f"explain: {measured.robot.name}",
         problem.error_definition,
