@@ -31,15 +31,13 @@ Proposal = tuple[Candidate, ...]
 class Rule:
     """When an effect has earned its place on held-out data: it takes at least ``share`` off the error, and its gain is
     at least ``t`` standard errors over the segments. ``judged``: how many proposals are judged in a step (0: all).
-    ``folds``: into how many parts the segments are cut, each held out once. ``beam``: how many ladders are carried on
-    side by side: the best first effect need not be part of the best model."""
+    ``folds``: into how many parts the segments are cut, each held out once."""
 
     share: float = 0.05
     t: float = 2.0
     steps: int = 5
     judged: int = 0
     folds: int = 4
-    beam: int = 1
 
 
 @dataclass(eq=False)
@@ -114,60 +112,31 @@ def climb(
 ) -> list[Rung]:
     """From the model ``start``, whose values are refitted too, to the last effect that earns its place.
 
-    Of ``rule.beam`` ladders the one with the least held-out error at its end is returned. The last entry, ``stopped``,
-    repeats its last rung and holds what was tried on top of it and failed.
+    The last entry, ``stopped``, repeats the last rung and holds what was tried on top of it and failed.
     """
     parts = tuple(known(problem.robot, t) for t in start)
     values = [c.shares(dict(t.values)) for c, t in zip(parts, start, strict=True)]
     folds = folds_of(problem, rule.folds)
     fit = fit_everything(problem, Model(parts), [np.concatenate(values) if values else np.zeros(0)], progress)
     current = cross_fit(problem, [(fit.model, fit.u)], folds, progress)[0][1]
-    growing = [Ladder([_rung(problem, "start", fit, current, [])], current)]
-    ended: list[Ladder] = []
+    rungs = [_rung(problem, "start", fit, current, [])]
+    present = {c.name for c in parts}
+    open_ = [p for p in proposals if not present & {c.name for c in p}]
     for _ in range(rule.steps):
-        found: list[tuple[Verdict, Ladder]] = []
-        for ladder in growing:
-            open_ = [p for p in proposals if not ladder.present & {c.name for c in p}]
-            ladder.tried = judge_all(problem, ladder.top.fit, ladder.current, open_, folds, rule, progress)
-            earned = [(v, ladder) for v in ladder.tried if not v.why_not]
-            ended += [] if earned else [ladder]
-            found += earned
-        growing = [_grown(problem, v, ladder, progress) for v, ladder in _best(found, rule.beam)]
-    best = min([*ended, *growing], key=lambda x: x.top.error_heldout)
-    last = best.top
-    return [*best.rungs, Rung("stopped", last.fit, last.error_fit, last.error_heldout, best.tried)]
-
-
-@dataclass(eq=False)
-class Ladder:
-    """One of those that are carried on. ``current`` (n,): held-out residual of its last model; ``tried`` on top of it."""
-
-    rungs: list[Rung]
-    current: Array
-    tried: list[Verdict] = field(default_factory=list)
-
-    @property
-    def top(self) -> Rung:
-        return self.rungs[-1]
-
-    @property
-    def present(self) -> set[str]:
-        return {c.name for c in self.top.fit.model.parts}
-
-
-def _best(found: Sequence[tuple[Verdict, Ladder]], count: int) -> list[tuple[Verdict, Ladder]]:
-    """The ``count`` best different models: the same effects in another order are one."""
-    chosen: dict[frozenset[str], tuple[Verdict, Ladder]] = {}
-    for verdict, ladder in sorted(found, key=lambda f: f[0].error_heldout):
-        chosen.setdefault(frozenset(c.name for c in verdict.model.parts), (verdict, ladder))
-    return list(chosen.values())[:count]
-
-
-def _grown(problem: Problem, verdict: Verdict, ladder: Ladder, progress: Progress) -> Ladder:
-    starts = [verdict.u, _padded(ladder.top.fit, verdict.proposal)]
-    fit = fit_everything(problem, verdict.model, starts, progress)
-    rung = _rung(problem, verdict.name, fit, verdict.residual, ladder.tried)
-    return Ladder([*ladder.rungs, rung], verdict.residual)
+        tried = judge_all(problem, rungs[-1].fit, current, open_, folds, rule, progress)
+        earned = [v for v in tried if not v.why_not]
+        if not earned:
+            break
+        best = min(earned, key=lambda v: v.error_heldout)
+        grown = fit_everything(problem, best.model, [best.u, _padded(rungs[-1].fit, best.proposal)], progress)
+        current = best.residual
+        rungs.append(_rung(problem, best.name, grown, current, tried))
+        taken = {c.name for c in best.proposal}
+        open_ = [p for p in open_ if not taken & {c.name for c in p}]
+    else:
+        tried = []
+    last = rungs[-1]
+    return [*rungs, Rung("stopped", last.fit, last.error_fit, last.error_heldout, tried)]
 
 
 def judge_all(

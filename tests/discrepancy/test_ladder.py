@@ -1,4 +1,4 @@
-"""The ladder on residuals whose answer is known: what it adds, what it calls tied, and which path it finds."""
+"""The ladder on residuals whose answer is known: what it adds, and what it calls tied."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy.candidates import parse
-from ee_dist.discrepancy.ladder import Rule, climb, parted_most
+from ee_dist.discrepancy.ladder import climb, parted_most
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.trials.log import Array
 
@@ -17,9 +17,9 @@ HIDDEN = (term("motor_weak", "knee_front_left", loss=0.4), term("joint_jam", "hi
 
 
 class Twins(Linear):
-    """``command_gain`` does nearly what ``motor_weak`` does; ``blend``: and what ``joint_jam`` does."""
+    """``command_gain`` does nearly what ``motor_weak`` does."""
 
-    unlike, blend = 0.01, 0.0
+    unlike = 0.01
 
     def shift(self, hypothesis: Hypothesis) -> Array:
         total = super().shift(tuple(t for t in hypothesis if t.effect != "command_gain"))
@@ -28,13 +28,8 @@ class Twins(Linear):
                 size = t.values[0][1]
                 own = super().shift((Term(t.effect, t.target, (("change", 1.0),)),))
                 like = super().shift((term("motor_weak", "knee_front_left", loss=1.0),))
-                other = super().shift((term("joint_jam", "hip_rear_left", loss=1.0),))
-                total = total + size * (like + self.unlike * own + self.blend * other)
+                total = total + size * (like + self.unlike * own)
         return total
-
-
-def added(problem: Linear, beam: int) -> list[str]:
-    return [r.added for r in climb(problem, (), POOL, Rule(beam=beam))[1:-1]]
 
 
 def test_what_is_there_is_added_and_nothing_else() -> None:
@@ -63,11 +58,3 @@ def test_an_effect_that_is_worse_beyond_doubt_is_not_tied() -> None:
     first = climb(problem, (), POOL)[1].tried
     assert first[0].name == WEAK
     assert not any(v.tied for v in first)
-
-
-def test_side_by_side_the_best_model_is_found_where_its_first_effect_is_not_the_best() -> None:
-    """The blend of two effects explains more than either, but not what both do together."""
-    problem = Twins(HIDDEN)
-    problem.blend, problem.unlike = 0.75, 0.15
-    assert added(problem, 1)[0] == GAIN
-    assert set(added(problem, 3)) == {WEAK, JAM}
