@@ -68,6 +68,15 @@ class Improvement:
     stopped: str
     explanations: list[Explanation] = field(default_factory=list)
 
+    def ties(self, step: int) -> list[str]:
+        """What the measurements do not tell from the effect that step ``step`` (from 1) of ``effect=auto`` added."""
+        if not 1 <= step <= min(len(self.explanations), len(self.ladder) - 1):
+            return []
+        tied = self.explanations[step - 1].tied
+        added = {(t.effect, t.target) for t in self.ladder[step].added}
+        others = [j.name for j in tied if (j.candidate.effect.name, j.candidate.target) not in added]
+        return others if len(others) < len(tied) else []
+
 
 def improve(
     problem: Problem,

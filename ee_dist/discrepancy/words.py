@@ -46,6 +46,10 @@ def confidence(best: Judged) -> str:
     )
 
 
+def tie_text(what: str, others: Sequence[str]) -> str:
+    return f"These measurements cannot tell {what} from: {', '.join(plain(n.replace('@', ' at ')) for n in others)}."
+
+
 def explanation_text(found: Explanation, robot: Robot, next_trial: Proposal | None) -> list[str]:
     """Paragraphs: the verdict, what it is, what speaks for it, what stays open, what to do next."""
     lines = [
@@ -63,8 +67,7 @@ def explanation_text(found: Explanation, robot: Robot, next_trial: Proposal | No
         lines.append(f"Missing: {told(term, robot)}. {entry.physics}")
         lines.append(f"What speaks for it: {confidence(best)}. Its mark in a residual: {entry.signature}")
         if best.tied_with:
-            names = ", ".join(f"{plain(n.replace('@', ' at '))}" for n in best.tied_with)
-            lines.append(f"These measurements cannot tell it from: {names}.")
+            lines.append(tie_text("it", best.tied_with))
     else:
         lines.append("Unexplained: something is left that no effect of the catalogue earns its place by.")
         lines += [

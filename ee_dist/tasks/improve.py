@@ -17,7 +17,7 @@ from ee_dist.discrepancy.candidates import Candidate, candidates, parse, shared
 from ee_dist.discrepancy.improve import Improvement, improve
 from ee_dist.discrepancy.open_loop import OpenLoop
 from ee_dist.discrepancy.unmodelled import to_entries, unmodelled_by
-from ee_dist.discrepancy.words import left_text, told
+from ee_dist.discrepancy.words import left_text, tie_text, told
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks import measured_robot
@@ -103,6 +103,11 @@ def improvement_text(found: Improvement, robot: Robot) -> list[str]:
             f"Held-out error fell from {first.error_heldout:.3f} to {last.error_heldout:.3f}; noise alone would leave "
             f"{found.noise_floor:.3f} ({found.floor_source})."
         )
+        lines += [
+            tie_text(told(rung.added[0]).split(" (")[0], others)
+            for k, rung in enumerate(found.ladder)
+            if (others := found.ties(k))
+        ]
         lines.append(f"Stopped because {found.stopped}.")
     flagged = [p for p in found.parameters if p.flag]
     lines += [f"{told(found.terms[p.term]).split(' (')[0]}, {p.name.replace('_', ' ')}: {p.flag}." for p in flagged]
@@ -133,6 +138,7 @@ def summary(found: Improvement) -> dict[str, Any]:
             "error_fit": r.error_fit,
             "error_heldout": r.error_heldout,
             "interval": list(r.interval),
+            "tied_with": found.ties(index),
         }
 
     return {

@@ -14,7 +14,8 @@ from ee_dist.discrepancy.folds import bootstrap, halves
 from ee_dist.discrepancy.improve import WORTH, improve, worth
 from ee_dist.discrepancy.misfit import leftovers
 from ee_dist.discrepancy.screen import screen
-from ee_dist.effects.catalogue import EffectError, term
+from ee_dist.effects.catalogue import EffectError, Hypothesis, term
+from ee_dist.trials.log import Array
 
 POOL = candidates(ROBOT, only=["motor_weak", "joint_jam", "command_gain", "load_friction"])
 QUICK = Effort(first=6, second=4, final=3, starts=1)
@@ -51,6 +52,20 @@ def test_auto_adds_two_effects_and_stops() -> None:
     values = {p.name: p for p in found.parameters}
     assert values["loss"].low < 0.4 < values["loss"].high
     assert not found.left
+    assert found.ties(1) == found.ties(2) == []
+
+
+def test_improve_names_what_its_data_do_not_tell_from_what_it_added() -> None:
+    class Twins(Linear):
+        def shift(self, hypothesis: Hypothesis) -> Array:
+            same = (term("motor_weak", "knee_front_left", loss=t.values[0][1]) for t in hypothesis)
+            return super().shift(tuple(same))
+
+    hidden = (term("motor_weak", "knee_front_left", loss=0.4),)
+    twins = [parse(ROBOT, "motor_weak@knee_front_left"), parse(ROBOT, "load_friction@hip_rear_left")]
+    found = improve(Twins(hidden), twins, effort=QUICK)
+    assert len(found.terms) == 1
+    assert {f"{found.terms[0].effect}@{found.terms[0].target}", *found.ties(1)} == {c.name for c in twins}
 
 
 def test_asked_for_effects_are_added_and_flagged_when_they_do_nothing() -> None:
