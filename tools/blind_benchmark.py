@@ -2,11 +2,11 @@
 
     python tools/blind_benchmark.py --cases 100 --seed 0 --engine mujoco --json blind.json
 
-Every tenth robot is untouched. An effect whose whole mark on the logs is below the noise is said to be too small and is
-left out of the scores. ``--withhold`` takes the drawn effect out of the catalogue: right is then ``unexplained``, or an
-effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``. ``--cross-engine`` tries the
-robot in the other engine, after calibrating the model on an untouched robot there. ``--workers`` runs cases side by
-side; a case is the same whoever runs it.
+Every tenth robot is untouched (``--untouched``). An effect whose whole mark on the logs is below the noise is said to be
+too small and is left out of the scores. ``--withhold`` takes the drawn effect out of the catalogue: right is then
+``unexplained``, or an effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``.
+``--cross-engine`` tries the robot in the other engine, after calibrating the model on an untouched robot there.
+``--workers`` runs cases side by side; a case is the same whoever runs it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ import numpy as np
 
 from ee_dist.discrepancy.candidates import Candidate, candidates, shared
 from ee_dist.discrepancy.draw import draw
-from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
+from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain, gained_untouched
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
 from ee_dist.discrepancy.open_loop import OpenLoop
@@ -108,24 +108,30 @@ class Bench:
         self.pool = candidates(self.robot)
         self.before: Hypothesis = ()
         self.unmodelled: Unmodelled | None = None
+        self.gained = 0.0
 
     def problem(self, trials: list[MeasuredTrial]) -> OpenLoop:
         evaluator = CachedEvaluator(SerialEvaluator(self.inner))
-        return OpenLoop(trials, self.robot, evaluator, before=self.before, unmodelled=self.unmodelled)
+        return OpenLoop(
+            trials, self.robot, evaluator, before=self.before, unmodelled=self.unmodelled, gained=self.gained
+        )
 
     def calibrate(self) -> None:
         """Fit what all joints share to an untouched robot of the other engine, and note what is left by channel."""
-        problem = self.problem(measured(self.outer, self.robot, (), [self.args.seed, 999_999]))
+        trials = measured(self.outer, self.robot, (), [self.args.seed, 999_999])
+        problem = self.problem(trials)
         found = improve(problem, shared(self.pool, self.robot), (), None, most=3)
         self.before = found.terms
         self.unmodelled = unmodelled_by(problem, found.residual)
-        print(f"calibrated on an untouched robot: {'; '.join(map(str, self.before)) or 'nothing to add'}", flush=True)
+        self.gained = gained_untouched(explain(self.problem(trials), self.pool, self.before))
+        print(f"calibrated on an untouched robot: {'; '.join(map(str, self.before)) or 'nothing to add'}; an effect "
+              f"takes {self.gained:.0f} off it", flush=True)  # fmt: skip
 
     def case(self, index: int) -> Case:
         rng = np.random.default_rng([self.args.seed, index])
         drawn: list[Candidate] = []
         hidden: Hypothesis = ()
-        if index % 10 != 9 or self.args.two or self.args.withhold:
+        if (index + 1) % self.args.untouched or self.args.two or self.args.withhold:
             for _ in range(2 if self.args.two else 1):
                 chosen, hidden_term = draw(self.robot, rng)
                 drawn.append(chosen)
@@ -245,7 +251,7 @@ def run(bench: Bench) -> Iterator[Case | str]:
     if bench.args.workers < 2:
         yield from (attempt(bench, k) for k in range(count))
         return
-    settings = (bench.args, bench.before, bench.unmodelled)
+    settings = (bench.args, bench.before, bench.unmodelled, bench.gained)
     with ProcessPoolExecutor(bench.args.workers, get_context("spawn"), _start, settings) as pool:
         yield from pool.map(_attempt, range(count))
 
@@ -261,9 +267,9 @@ _here: list[Bench] = []
 """The bench of a worker process."""
 
 
-def _start(args: argparse.Namespace, before: Hypothesis, unmodelled: Unmodelled | None) -> None:
+def _start(args: argparse.Namespace, before: Hypothesis, unmodelled: Unmodelled | None, gained: float) -> None:
     bench = Bench(args)
-    bench.before, bench.unmodelled = before, unmodelled
+    bench.before, bench.unmodelled, bench.gained = before, unmodelled, gained
     _here.append(bench)
 
 
@@ -276,6 +282,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", type=float, default=0.02, help="share of each channel's range")
+    parser.add_argument("--untouched", type=int, default=10, metavar="K", help="every K-th robot is untouched (1: all)")
     parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--json", type=Path)

@@ -93,6 +93,12 @@ def explain(
     return Explanation(verdict, error(base), floor, source, found, screened, left, base, before, len(pool))
 
 
+def gained_untouched(found: Explanation) -> float:
+    """Energy that the most promising effect takes off held-out data of an untouched robot: none of it is its own."""
+    energies = [c.gain * float(np.sum(found.base**2)) for c in found.candidates]
+    return max([0.0, *(e for e in energies if np.isfinite(e))])
+
+
 def calm_trials(problem: Problem, base: Array) -> list[int]:
     """Trials to search on: those that can be predicted, where the residual follows a parameter smoothly. One trial in
     which a controller was in the loop is always among them: only there does wiring show. All, where the calm ones have

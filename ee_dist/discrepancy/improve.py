@@ -12,7 +12,7 @@ from ee_dist.discrepancy.candidates import Candidate, known
 from ee_dist.discrepancy.explain import STANDARD_EFFORT, Effort, Explanation, explain, fit_out
 from ee_dist.discrepancy.fit import WIDTHS, Fit, Model, fit_all
 from ee_dist.discrepancy.folds import bootstrap, halves
-from ee_dist.discrepancy.judge import LEAST_SHARE, LOST_SHARE, Judged, least_energy, lost
+from ee_dist.discrepancy.judge import LEAST_SHARE, LOST_SHARE, Judged, lost, needed
 from ee_dist.discrepancy.misfit import Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.scan import scan
@@ -119,7 +119,7 @@ def improve(
                 model, at = _with_best_start(problem, parts, u, group, now, found)
                 judged = fit_out(problem, [(model, at)], base, (), half, len(pool), progress)[0]
                 step = _rung(problem, judged, len(group), ladder[-1])
-                if not _earns(step, ladder[-1], least_energy(len(pool), sum(c.size for c in group))):
+                if not _earns(step, ladder[-1], needed(problem, len(pool), sum(c.size for c in group))):
                     continue
                 if worth(ladder[-1].error_heldout, step.error_heldout, floor) < WORTH:
                     stopped = TOO_LITTLE

@@ -20,6 +20,9 @@ LEAST_SHARE = 0.002
 LOST_SHARE = 0.3
 """An interval that reaches zero counts against an effect only where it makes some segments worse by this share of its
 gain: an effect that shows in one window of twenty, and harms none, is no less true for that."""
+CAUTION = 2.0
+"""By how much more an effect must gain than one did on an untouched robot: there the model's own error happened to look
+like an effect, and on the next robot noise adds to it."""
 TIE_ENERGY = 9.0
 """Two explanations closer than this (3 standard deviations, squared) on held-out data are not told apart."""
 
@@ -60,6 +63,12 @@ def least_energy(tried: int, parameters: int = 1) -> float:
     return 2.0 * math.log(max(tried, 2)) + 8.0 + 2.0 * parameters
 
 
+def needed(problem: Problem, tried: int, parameters: int = 1) -> float:
+    """Energy that an effect must take off held-out data: more than luck, and clearly more than the most promising effect
+    took where nothing was wrong (``gained`` of a calibrated problem)."""
+    return least_energy(tried, parameters) + CAUTION * float(getattr(problem, "gained", 0.0))
+
+
 def judge(problem: Problem, base: Array, fits: Sequence[Fit], halves: Array, tried: int) -> Judged:
     """``fits`` are two of one model: fitted on half 0 and on half 1 of the segments. ``base`` (n,) is the residual of
     the model without it. Each judges the half that it has not seen."""
@@ -72,7 +81,7 @@ def judge(problem: Problem, base: Array, fits: Sequence[Fit], halves: Array, tri
     gained = before - held
     low, high = bootstrap(gained, groups=problem.trial_of_segment)
     gain = float(gained.sum())
-    enough = least_energy(tried, max(1, len(first.u)))
+    enough = needed(problem, tried, max(1, len(first.u)))
     why = ""
     if not np.isfinite(gain) or gain < enough:
         why = "its gain on held-out data is no more than luck"

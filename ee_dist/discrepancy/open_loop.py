@@ -56,8 +56,9 @@ class OpenLoop:
     """Implements ``ee_dist.discrepancy.problem.Problem``.
 
     ``block`` rows are averaged into a value, ``window`` rows (a multiple) are a segment. ``unmodelled`` widens the
-    scales by what a calibrated model is known to leave. ``before``: what the model is believed to have; the spread
-    of ``members`` neighbours of that model weighs the residuals.
+    scales by what a calibrated model is known to leave; ``gained``: energy that an effect took off an untouched robot.
+    ``before``: what the model is believed to have; the spread of ``members`` neighbours of that model weighs the
+    residuals.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class OpenLoop:
         block: int = 4,
         window: int = 60,
         unmodelled: Unmodelled | None = None,
+        gained: float = 0.0,
         before: Hypothesis = (),
         members: int = MEMBERS,
     ) -> None:
@@ -76,7 +78,7 @@ class OpenLoop:
         self._members = members
         self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}
         self.scale = channel_scale(robot, trials)
-        self._unmodelled = unmodelled or {}
+        self._unmodelled, self.gained = unmodelled or {}, gained
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self.trials = tuple(t.name for t in trials)
         self.looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +14,22 @@ from rich.console import Console
 from rich.table import Table
 
 from ee_dist.discrepancy.candidates import Candidate, candidates, parse, shared
+from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import Improvement, improve
 from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.screen import Progress
 from ee_dist.discrepancy.unmodelled import to_entries, unmodelled_by
 from ee_dist.discrepancy.words import left_text, tie_text, told
 from ee_dist.effects.model_file import write_model
+from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.robots.model import Robot
 from ee_dist.tasks import measured_robot
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.measured import load, problem_of
+from ee_dist.tasks.measured import Measurements, load, problem_of
 from ee_dist.tasks.pictures import improve_page, write_pictures
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.summary import Stopwatch, hypothesis_list, write_summary
 from ee_dist.tasks.wiring import evaluator_of
-from ee_dist.trials.log import Array
 from ee_dist.viewing.report import write_page
 
 
@@ -61,12 +63,17 @@ def run(config: Config, options: Options, out: Path) -> None:
         if options.calibrate:
             pool = shared(pool, measured.robot)
         found = improve(problem, pool, measured.model, wanted, most=options.most, progress=progress)
+        calibration = calibrated(problem, measured, evaluator, found, options, progress) if options.calibrate else None
     words = improvement_text(found, measured.robot)
     out.mkdir(parents=True, exist_ok=True)
     path = out / "model.yaml"
     write_model(path, measured.source, measured.folder, found.terms, words)
-    if options.calibrate:
-        write_calibration(problem, found.residual, path.with_suffix(".calibration.yaml"))
+    if calibration is not None:
+        path.with_suffix(".calibration.yaml").write_text(
+            "# What the model beside this file leaves on an untouched robot, and the energy that the most promising effect\n"
+            "# takes off it.\n" + yaml.safe_dump(calibration, sort_keys=False),
+            encoding="utf-8",
+        )
     write_page(improve_page(problem, measured, found, words, base), out / "report.html")
     if options.rerun:
         write_pictures(problem, found.terms, out / "improve.rrd", "improve")
@@ -115,15 +122,23 @@ def improvement_text(found: Improvement, robot: Robot) -> list[str]:
     return lines
 
 
-def write_calibration(problem: OpenLoop, residual: Array, path: Path) -> None:
-    """What the calibrated model still leaves on each channel in each trial, beyond noise."""
-    robot = problem.robot
-    entries = to_entries(unmodelled_by(problem, residual), robot.sensor_names, [s.unit for s in robot.sensors])
-    path.write_text(
-        "# What the model beside this file leaves on an untouched robot.\n"
-        + yaml.safe_dump({"unmodelled": entries}, sort_keys=False),
-        encoding="utf-8",
-    )
+def calibrated(
+    problem: OpenLoop,
+    measured: Measurements,
+    evaluator: Evaluator,
+    found: Improvement,
+    options: Options,
+    progress: Progress,
+) -> dict[str, Any]:
+    """What the calibrated model still leaves on each channel in each trial beyond noise, and how much of that an effect
+    takes off although nothing is wrong."""
+    robot = measured.robot
+    unmodelled = unmodelled_by(problem, found.residual)
+    again = problem_of(replace(measured, unmodelled=unmodelled, model=found.terms), evaluator)
+    pool = candidates(robot, options.without)
+    gained = gained_untouched(explain(again, pool, found.terms, progress=progress))
+    entries = to_entries(unmodelled, robot.sensor_names, [s.unit for s in robot.sensors])
+    return {"gained": gained, "unmodelled": entries}
 
 
 def summary(found: Improvement) -> dict[str, Any]:

@@ -41,6 +41,8 @@ class Measurements:
     folder: Path
     unmodelled: Unmodelled | None = None
     """What the model is known to leave on an untouched robot (from calibration)."""
+    gained: float = 0.0
+    """Energy that the most promising effect took off there."""
 
 
 def load(config: Config) -> Measurements:
@@ -66,8 +68,9 @@ def load(config: Config) -> Measurements:
     if believed.robot.motor_names != robot.motor_names:
         raise ConfigError(f"model={config.model}: it is of {believed.robot.name}, the log of {robot.name}")
     apply(robot, believed.terms)
-    left = _calibration(Path(config.model), robot)
-    return Measurements(robot, tuple(trials), tuple(files), believed.terms, believed.source, believed.folder, left)
+    left, gained = _calibration(Path(config.model), robot)
+    source, folder = believed.source, believed.folder
+    return Measurements(robot, tuple(trials), tuple(files), believed.terms, source, folder, left, gained)
 
 
 def files_of(measured: Any) -> list[Path]:
@@ -140,13 +143,14 @@ def _same_robot(file: Path, run: RunRecord, robot: Robot) -> None:
         raise LogError(f"{file}: a log of another robot ({run.robot.name}) than the first ({robot.name})")
 
 
-def _calibration(path: Path, robot: Robot) -> Unmodelled | None:
+def _calibration(path: Path, robot: Robot) -> tuple[Unmodelled | None, float]:
     """What task=improve task.calibrate=true wrote beside the model file. Raises ConfigError for another kind of file."""
     beside = path.with_suffix(".calibration.yaml")
     if not beside.is_file():
-        return None
+        return None, 0.0
     try:
-        return from_entries(yaml.safe_load(beside.read_text(encoding="utf-8"))["unmodelled"], robot.sensor_names)
+        content = yaml.safe_load(beside.read_text(encoding="utf-8"))
+        return from_entries(content["unmodelled"], robot.sensor_names), float(content["gained"])
     except (KeyError, TypeError, ValueError, AttributeError, yaml.YAMLError):
         raise ConfigError(
             f"{beside}: not a calibration; write it with task=improve task.calibrate=true on an untouched robot"
@@ -156,5 +160,11 @@ def _calibration(path: Path, robot: Robot) -> Unmodelled | None:
 def problem_of(measured: Measurements, evaluator: Evaluator, **settings: Any) -> OpenLoop:
     """The problem that the measurements make."""
     return OpenLoop(
-        measured.trials, measured.robot, evaluator, unmodelled=measured.unmodelled, before=measured.model, **settings
+        measured.trials,
+        measured.robot,
+        evaluator,
+        unmodelled=measured.unmodelled,
+        gained=measured.gained,
+        before=measured.model,
+        **settings,
     )

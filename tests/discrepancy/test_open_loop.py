@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from ee_dist.discrepancy.candidates import candidates
+from ee_dist.discrepancy.judge import needed
 from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
 from ee_dist.discrepancy.misfit import leftovers
 from ee_dist.discrepancy.open_loop import OpenLoop
@@ -102,3 +104,14 @@ def test_a_calibration_survives_its_file_and_serves_trials_it_did_not_see(tmp_pa
     path.with_suffix(".calibration.yaml").write_text("unmodelled: {roll: {deviation: 1}}\n")
     with pytest.raises(ConfigError, match="not a calibration"):
         _calibration(path, ROBOT)
+    entries = to_entries(before, names, units)  # type: ignore[arg-type]
+    path.with_suffix(".calibration.yaml").write_text(yaml.safe_dump({"unmodelled": entries, "gained": 21.5}))
+    left, gained = _calibration(path, ROBOT)
+    assert left is not None and set(left) == set(before) and gained == 21.5
+
+
+def test_what_an_effect_took_off_an_untouched_robot_is_no_evidence(mujoco: MuJoCoEngine) -> None:
+    p = problem(mujoco, trials(mujoco, ()))
+    plain = needed(p, 100)
+    p.gained = 50.0
+    assert plain + 50.0 < needed(p, 100) <= plain + 200.0
