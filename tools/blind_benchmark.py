@@ -216,10 +216,11 @@ def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
         print(f"withheld: unexplained, or an effect with the rest flagged: {flagged:.0%}")
         silent = [c for c in real if c.verdict != UNEXPLAINED and not c.flagged]
         twins = sum(c.beside < DETECTABLE for c in silent)
-        print(
-            f"not flagged: {len(silent)}, of which {twins} name a stand-in that differs from the truth by less than what"
-        )
-        print(f"makes a case too small ({DETECTABLE:g}):")
+        print(f"not flagged: {len(silent)}, of which {twins} name a twin of the truth: one that differs from it by less than "
+              f"what makes a case too small ({DETECTABLE:g})")  # fmt: skip
+        seen = len(real) - twins
+        right = len(real) - len(silent)
+        print(f"of the {seen} that left something to be flagged: {right / seen if seen else float('nan'):.0%}")
         for c in silent:
             print(f"  {c.index}: {c.shown} -> {c.verdict} {', '.join(c.named)} (mark {c.mark:.0f}, beside the truth "
                   f"{c.beside:.0f}, error/floor {c.ratio:.2f})")  # fmt: skip
