@@ -290,6 +290,8 @@ def main() -> int:
     for flag in ("withhold", "two", "cross-engine"):
         parser.add_argument(f"--{flag}", action="store_true")
     args = parser.parse_args()
+    if args.untouched < 1:
+        parser.error(f"--untouched {args.untouched}: every which robot? 1 or more")
     bench = Bench(args)
     cases: list[Case] = []
     if args.cross_engine:

@@ -16,6 +16,11 @@ def plain(name: str) -> str:
     return name.replace("_", " ")
 
 
+def placed(name: str) -> str:
+    """``coulomb friction at knee front left`` of a candidate's name."""
+    return plain(name.replace("@", " at "))
+
+
 def without_unit(key: str, unit: str) -> str:
     """``torque_nm`` in N.m is ``torque``: the unit is told behind the value."""
     tail, parts = unit.lower().replace(".", "").replace("/", "").replace("^", ""), key.split("_")
@@ -47,7 +52,7 @@ def confidence(best: Judged) -> str:
 
 
 def tie_text(what: str, others: Sequence[str]) -> str:
-    return f"These measurements cannot tell {what} from: {', '.join(plain(n.replace('@', ' at ')) for n in others)}."
+    return f"These measurements cannot tell {what} from: {', '.join(map(placed, others))}."
 
 
 def explanation_text(found: Explanation, robot: Robot, next_trial: Proposal | None) -> list[str]:

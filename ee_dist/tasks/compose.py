@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import importlib
 import re
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, get_type_hints
+from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.config import Config, ConfigError, check_keys, one_of
+from ee_dist.tasks.config import Config, ConfigError, check_keys, groups_of, one_of
 
 TASKS = ("recover", "view", "online", "study", "trial", "compare", "explain", "improve", "reveal", "import")
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([0-9, ]+)$")
@@ -59,11 +58,9 @@ def settings(composed: DictConfig) -> tuple[Config, ModuleType, Any]:
     tree = {str(k): v for k, v in composed.items() if k != "hydra"}
     task = tree.pop("task")
     check_keys("", tree, Config)
-    hints = get_type_hints(Config)
-    for f in fields(Config):
-        kind = next((a for a in (hints[f.name], *getattr(hints[f.name], "__args__", ())) if is_dataclass(a)), None)
-        if kind is not None and isinstance(tree.get(f.name), DictConfig):
-            check_keys(f.name, tree[f.name], kind)  # type: ignore[arg-type]
+    for name, kind in groups_of(Config).items():
+        if isinstance(tree.get(name), DictConfig):
+            check_keys(name, tree[name], kind)
     module = task_module(str(task.name))
     check_keys("task", task, module.Options)
     config = _typed(Config, OmegaConf.create(tree), "")

@@ -159,22 +159,29 @@ class Config:
             raise ConfigError(f"noise={self.noise}: must be a share of the channels' range, from 0 to 1")
 
 
-def unknown_key(owner: str, key: str, known: tuple[str, ...]) -> ConfigError:
+def unknown_key(owner: str, key: str, known: tuple[str, ...], otherwise: str = "") -> ConfigError:
+    """``otherwise`` is said where no name is near; without it all are listed."""
     near = difflib.get_close_matches(key, known, n=3, cutoff=0.6)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
+    hint = f"did you mean {' or '.join(near)}?" if near else otherwise or f"there are: {', '.join(known)}"
     where = f"{owner}.{key}" if owner else key
     return ConfigError(f"{where}: no such setting; {hint}")
 
 
+def groups_of(kind: Any) -> dict[str, Any]:
+    """The fields of a dataclass of settings that are dataclasses of settings themselves, optional or not."""
+    hints = get_type_hints(kind)
+    found = {f.name: [a for a in (hints[f.name], *get_args(hints[f.name])) if is_dataclass(a)] for f in fields(kind)}
+    return {name: inner[0] for name, inner in found.items() if inner}
+
+
 def known_settings(kind: Any = Config, prefix: str = "") -> tuple[str, ...]:
     """Names of all settings but those of a task, with their owners: ``seed``, ``budget.population``."""
+    groups = groups_of(kind)
     names: list[str] = []
-    hints = get_type_hints(kind)
     for f in fields(kind):
         names.append(prefix + f.name)
-        inner = next((a for a in (hints[f.name], *get_args(hints[f.name])) if is_dataclass(a)), None)
-        if inner is not None:
-            names += known_settings(inner, f"{prefix}{f.name}.")
+        if f.name in groups:
+            names += known_settings(groups[f.name], f"{prefix}{f.name}.")
     return tuple(names)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 
 from hydra.errors import HydraException
@@ -12,7 +11,7 @@ from ee_dist.engines.contract import EngineError
 from ee_dist.evaluation.ray_actors import EvaluatorError
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
-from ee_dist.tasks.config import ConfigError, known_settings
+from ee_dist.tasks.config import ConfigError, known_settings, unknown_key
 from ee_dist.trials.excitation import ExcitationError
 from ee_dist.trials.log import LogError
 
@@ -49,6 +48,4 @@ def _absent(name: str) -> str:
     """A setting without a plus that the configuration does not have."""
     if name == "scenario":
         return "scenario: there is none yet; add it with a plus sign: +scenario=8"
-    near = difflib.get_close_matches(name, known_settings(), n=3, cutoff=0.6)
-    hint = f"did you mean {' or '.join(near)}?" if near else "'python -m ee_dist --help' lists them"
-    return f"{name}: no such setting; {hint}"
+    return str(unknown_key("", name, known_settings(), "'python -m ee_dist --help' lists them"))

@@ -13,7 +13,7 @@ from rich.table import Table as Shown
 from ee_dist.discrepancy.force_balance import ForceBalance
 from ee_dist.discrepancy.free_run import FreeRun
 from ee_dist.discrepancy.ladder import Rung, Verdict, natural, parted_most
-from ee_dist.discrepancy.words import plain, told
+from ee_dist.discrepancy.words import placed, told
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.summary import hypothesis_list
@@ -39,11 +39,7 @@ def shown(problem: ForceBalance | FreeRun, value: float) -> str:
 def account(problem: ForceBalance | FreeRun, rungs: Sequence[Rung], robot: Robot) -> list[str]:
     first, last = rungs[0], rungs[-1]
     added = [r.added for r in rungs[1:-1]]
-    lines = [
-        "Added, in this order: " + "; ".join(plain(a.replace("@", " at ")) for a in added) + "."
-        if added
-        else "Nothing was added."
-    ]
+    lines = ["Added, in this order: " + "; ".join(placed(a) for a in added) + "." if added else "Nothing was added."]
     lines.append(
         f"Held-out error ({problem.natural_name}) fell from {shown(problem, first.error_heldout)} to "
         f"{shown(problem, last.error_heldout)}; noise alone would leave {shown(problem, natural(problem, 1.0))}."
@@ -59,8 +55,8 @@ def tie_words(problem: ForceBalance | FreeRun, tried: Sequence[Verdict]) -> list
     tied = [v for v in tried if v.tied]
     if not tied:
         return []
-    names = "; ".join(f"{plain(v.name.replace('@', ' at '))} ({shown(problem, v.error_heldout)})" for v in tied)
-    best = plain(tried[0].name.replace("@", " at "))
+    names = "; ".join(f"{placed(v.name)} ({shown(problem, v.error_heldout)})" for v in tied)
+    best = placed(tried[0].name)
     return [
         f"These measurements do not tell {best} ({shown(problem, tried[0].error_heldout)} held out) from: {names}. Their "
         f"predictions part most in {parted_most(problem, [tried[0], *tied])}: more trials of that kind would."

@@ -13,7 +13,7 @@ from ee_dist.discrepancy.improve import Improvement
 from ee_dist.discrepancy.locate import Comparison, circumstances, joint_of_channel
 from ee_dist.discrepancy.open_loop import OpenLoop
 from ee_dist.discrepancy.prediction import rollout_of
-from ee_dist.discrepancy.words import plain, told
+from ee_dist.discrepancy.words import placed, plain, told
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.jobs import Job, Whole
@@ -205,7 +205,7 @@ def explain_page(problem: OpenLoop, measured: Measurements, found: Explanation, 
             "best" if best and c is best else "tied" if c.name in tied else "earned" if c.earned else "not"
             for c in found.candidates
         ]
-        names = [plain(c.name.replace("@", " at ")) for c in found.candidates]
+        names = [placed(c.name) for c in found.candidates]
         rows = [
             [str(c.rank), told(c.hypothesis[-1], problem.robot), f"{c.error_heldout:.3f}", f"{c.gain:.1%}",
              f"{max(c.interval[0], -9.99):.1%} to {c.interval[1]:.1%}", "earned" if c.earned else c.why_not]
