@@ -68,7 +68,7 @@ def bare_pybullet(engine: Any, rollouts: Sequence[Rollout], torques: Array) -> S
 
     bodies = engine._place(rollouts)
     try:
-        order = [(row, client, body, links) for row, client, body, links, *_ in bodies.robots]
+        order = [(row, client, body, links) for row, client, body, links, _ in bodies.robots]
         clients = [world.client for world in bodies.worlds]
         present = {row: [k for k, link in enumerate(w.links) if link >= 0] for w, row in _rows(bodies)}
         ready = [[at[row, present[row]].tolist() for row, *_ in order] for at in torques[:-1]]

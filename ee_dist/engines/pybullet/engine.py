@@ -7,10 +7,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pybullet as p
-from numpy.typing import NDArray
 
 from ee_dist.engines.contract import Rollout, Truth
 from ee_dist.engines.loop import gravity_vector, in_batches
+from ee_dist.engines.pybullet.native import interface
+from ee_dist.engines.pybullet.reading import NativeReading, PublicReading, Reading
 from ee_dist.engines.pybullet.world import World, structure_key
 from ee_dist.trials.log import Array, SensorLog
 
@@ -25,12 +26,16 @@ Kind = tuple[str, tuple[float, float, float]]
 
 
 class PyBulletEngine:
-    """Implements ``ee_dist.engines.contract.Engine``."""
+    """Implements ``ee_dist.engines.contract.Engine``.
+
+    ``native`` reads by Bullet's C interface where there is one: faster, and the same bits.
+    """
 
     name = "pybullet"
 
-    def __init__(self, largest_batch: int = 128) -> None:
+    def __init__(self, largest_batch: int = 128, native: bool = True) -> None:
         self.largest_batch = largest_batch
+        self.native = native
         self._idle: OrderedDict[tuple[str, int], list[World]] = OrderedDict()
         self._structures: dict[int, str] = {}
         """Of the models of this call, by their identity: finding it is not free."""
@@ -102,86 +107,44 @@ class BulletBodies:
     def __init__(self, engine: PyBulletEngine, placed: list[tuple[World, list[int]]], batch: Sequence[Rollout]) -> None:
         self.engine = engine
         self.worlds = [world for world, _ in placed]
-        self.touches = len(placed[0][0].touch_links)
-        self.robots: list[tuple[int, int, int, list[int], tuple[float, ...]]] = []
-        """Row, client, body and links of each robot, and a zero for each joint that it lost."""
-        self.feet: list[tuple[int, int, dict[tuple[int, int], int]]] = []
-        self.frame_in_com: dict[int, tuple[tuple[float, ...], tuple[float, ...]] | None] = {}
-        columns: list[list[int]] = []
+        motors = len(batch[0].model.drives)
+        found = interface() if engine.native else None
+        self.reading: Reading = PublicReading(placed, motors) if found is None else NativeReading(found, placed, motors)
+        self.robots: list[tuple[int, int, int, list[int], list[int] | None]] = []
+        """Row, client, body and links of each robot, and the motors of those links where some joint is lost."""
+        self.shifted: list[tuple[int, tuple[tuple[float, ...], tuple[float, ...]]]] = []
+        """Rows whose root's own frame is not that of its centre of mass, and its pose in that."""
         for world, rows in placed:
             links = [link for link in world.links if link >= 0]
-            lost = (0.0,) * (len(world.links) - len(links))
-            feet: dict[tuple[int, int], int] = {}
+            some = None if len(links) == motors else [k for k, link in enumerate(world.links) if link >= 0]
             for row, body in zip(rows, world.bodies, strict=True):
-                self.robots.append((row, world.client, body, links, lost))
-                columns.append(sorted(range(len(world.links)), key=lambda k: world.links[k] < 0))
-                feet.update({(body, link): row * self.touches + k for k, link in enumerate(world.touch_links)})
+                self.robots.append((row, world.client, body, links, some))
                 root = batch[row].model.root
-                self.frame_in_com[row] = _inverse(root.com_m, world.frames[root.name][1])
-            self.feet.append((world.client, world.floor, feet))
-        self._order(columns, len(batch[0].model.drives))
-
-    def _order(self, columns: list[list[int]], motors: int) -> None:
-        """Engine order is that of ``robots``, present joints first; None where it is that of the batch."""
-        shape = (len(self.robots), motors)
-        flat = np.array([row * motors + k for (row, *_), ks in zip(self.robots, columns, strict=True) for k in ks])
-        plain = bool((flat == np.arange(flat.size)).all())
-        self.to_engine = None if plain else flat.reshape(shape)
-        self.from_engine = None if plain else np.argsort(flat).reshape(shape)
+                shift = _inverse(root.com_m, world.frames[root.name][1])
+                if shift is not None:
+                    self.shifted.append((row, shift))
 
     def read(self, touch: bool, pose: bool, twist: bool) -> Truth:
-        states = p.getJointStates
-        positions, rates = [], []
-        for _, client, body, links, lost in self.robots:
-            if links:
-                q, qd, _, _ = zip(*states(body, links, client), strict=True)
-                if lost:
-                    q, qd = q + lost, qd + lost
-            else:
-                q = qd = lost
-            positions.append(q)
-            rates.append(qd)
-        joints, speeds = np.array(positions), np.array(rates)
-        if self.from_engine is not None:
-            joints, speeds = joints.reshape(-1)[self.from_engine], speeds.reshape(-1)[self.from_engine]
-        truth = Truth(joints, speeds)
+        truth = Truth(*self.reading.joints())
         if touch:
-            truth.touch = self._touch()
+            truth.touch = self.reading.touching()
         if pose:
-            truth.base_pose = self._poses()
+            truth.base_pose = self.reading.poses()
+            for row, shift in self.shifted:
+                place = truth.base_pose[row].tolist()
+                truth.base_pose[row] = np.concatenate(p.multiplyTransforms(place[:3], place[3:], *shift))
         if twist:
-            truth.base_twist = np.empty((len(self.robots), 6))
-            for row, client, body, _, _ in self.robots:
-                truth.base_twist[row] = np.concatenate(p.getBaseVelocity(body, physicsClientId=client))
+            truth.base_twist = self.reading.twists()
         return truth
-
-    def _touch(self) -> NDArray[np.bool_]:
-        down = np.zeros(len(self.robots) * self.touches, dtype=bool)
-        pressed = []
-        for client, floor, feet in self.feet:
-            for contact in p.getContactPoints(floor, physicsClientId=client):
-                if contact[9] > 0:
-                    pressed.append(feet.get((contact[2], contact[4]), -1))
-        down[[k for k in pressed if k >= 0]] = True
-        return down.reshape(-1, self.touches)
-
-    def _poses(self) -> Array:
-        out = np.empty((len(self.robots), 7))
-        for row, client, body, _, _ in self.robots:
-            position, turn = p.getBasePositionAndOrientation(body, physicsClientId=client)
-            shift = self.frame_in_com[row]
-            if shift is not None:
-                position, turn = p.multiplyTransforms(position, turn, *shift)
-            out[row, :3] = position
-            out[row, 3:] = turn
-        return out
 
     def step(self, torques: Array, force: Array | None) -> None:
         send, simulate, mode = p.setJointMotorControlArray, p.stepSimulation, p.TORQUE_CONTROL
-        rows = (torques if self.to_engine is None else torques.reshape(-1)[self.to_engine]).tolist()
-        for (row, client, body, links, lost), values in zip(self.robots, rows, strict=True):
+        values = torques.tolist()
+        for row, client, body, links, motors in self.robots:
+            mine = values[row]
             if links:
-                send(body, links, mode, forces=values[: len(links)] if lost else values, physicsClientId=client)
+                forces = mine if motors is None else [mine[k] for k in motors]
+                send(body, links, mode, forces=forces, physicsClientId=client)
             if force is not None and force[row].any():
                 position, _ = p.getBasePositionAndOrientation(body, physicsClientId=client)
                 p.applyExternalForce(body, -1, force[row].tolist(), position, p.WORLD_FRAME, physicsClientId=client)

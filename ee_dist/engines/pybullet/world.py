@@ -72,6 +72,11 @@ class World:
         by_name = {j.name: link[j.child] for j in robot.present_joints}
         self.links = [by_name.get(d.joint, -1) for d in robot.drives]
         self.joint_links = [(j, link[j.child]) for j in robot.present_joints if j.kind != "fixed"]
+        movable = [k for k in sorted(link.values()) if k >= 0 and joints[self.order[k]].kind != "fixed"]
+        self.freedoms = len(movable)
+        """Joints that can move, in Bullet's order."""
+        self.joint_places = [movable.index(k) if k >= 0 else -1 for k in self.links]
+        """Place of motor k's joint among them."""
         self.touch_links = [link.get(s.target, -2) for s in robot.sensors if s.kind == "touch"]
         self.frames = {q.name: _principal(_with_rotor(robot, q)) for q in robot.present_parts}
         self.bodies = [self._add(robot, link) for _ in range(size)]
