@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.effects.laws import LAWS, LawContext, LawFunction, drive_law, find_law
+from ee_dist.engines.compiled import compiled
 from ee_dist.engines.friction import Friction
 from ee_dist.engines.transmission import Transmission
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
@@ -43,10 +44,12 @@ class DrivePath:
         p = self.p
         neutral = {f.name: f.default for f in fields(Drive)}
         self.uses = {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}
-        self.back_emf = np.where(np.isfinite(p["speed_limit"]), p["torque_limit"] / p["speed_limit"], 0.0)
+        own_emf = np.where(np.isfinite(p["speed_limit"]), p["torque_limit"] / p["speed_limit"], 0.0)
+        integral_limit = np.divide(p["torque_limit"], p["ki"], out=np.zeros(shape), where=p["ki"] > 0) * 0.25
+        derived = {"own_emf": own_emf, "integral_limit": integral_limit}
+        self.motor = np.stack([derived[n] if n in derived else p[n] for n in MOTOR])
+        self.shape, self.one = shape, np.ones(shape)
         self.integral = np.zeros(shape)
-        self.uses_integral = bool(np.any(p["ki"] != 0))
-        self.integral_limit = np.divide(p["torque_limit"], p["ki"], out=np.zeros(shape), where=p["ki"] > 0) * 0.25
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
         self.all_torque = np.maximum(p["torque_limit"].sum(axis=1, keepdims=True), 1e-300)
@@ -141,7 +144,7 @@ class DrivePath:
             np.add.at(torque, (rows, columns), added)
         if self.friction is not None:
             torque = self.friction(torque, active, qd, enabled)
-        torque = self._stops(torque, q, qd) * self.present
+        torque = self._stops(torque, q, qd)
         if self.friction is not None:
             self.friction.record(torque, qd)
         return torque
@@ -165,58 +168,114 @@ class DrivePath:
     ) -> tuple[Array, Array, Array]:
         """Torque of the motor, and how it falls with its position and speed: (B, M) each, the last two for an elastic
         transmission only."""
-        p = self.p
-        error = wanted - position
-        if self.uses["zero_offset"]:
-            error = error - p["zero_offset"]
-        if self.uses["deadband"]:
-            outside = error - np.clip(error, -p["deadband"], p["deadband"])
-            error = np.where(p["deadband"] > 0, outside, error)
-        asked = p["kp"] * error - p["kd"] * speed
-        if self.uses_integral:
-            self.integral = _within(self.integral + error * self.dt, self.integral_limit)
-            if enabled is not None:
-                self.integral = self.integral * enabled
-            asked = asked + p["ki"] * self.integral
-        active = _within(asked, p["torque_limit"])
-        scale: Array | float = 1.0
+        shape = self.shape
+        scale, closed = self.one, self.one
         if supply_v is not None:
-            nominal = p["supply_nominal_v"]
+            nominal = self.p["supply_nominal_v"]
             scale = np.where(nominal > 0, supply_v / np.where(nominal > 0, nominal, 1.0), 1.0)
-            active = active * scale
         if enabled is not None:
-            active = active * enabled
+            closed = np.ascontiguousarray(np.broadcast_to(enabled, shape))
+        left = self.one
         if self.uses_sag:
             load = np.abs(self.last_active).sum(axis=1, keepdims=True) / self.all_torque
-            self.last_active = active
-            left = 1.0 - np.clip(self.sag * load, 0.0, 0.95)
-            scale, active = scale * left, active * left
-        back_emf = self.back_emf if enabled is None else self.back_emf * enabled
-        active = active - back_emf * speed
-        if self.uses["strength"]:
-            active = active * p["strength"]
-        if self.transmission is None:
-            return active, active, active
-        free = (np.abs(asked) < p["torque_limit"]) * scale * (1.0 if enabled is None else enabled)
-        return active, p["kp"] * free * p["strength"], (p["kd"] * free + back_emf) * p["strength"]
+            left = np.ascontiguousarray(np.broadcast_to(1.0 - np.clip(self.sag * load, 0.0, 0.95), shape))
+        active = np.empty(shape)
+        stiffness, damping = (active, active) if self.transmission is None else (np.empty(shape), np.empty(shape))
+        _drive(
+            self.motor, wanted, position, speed, scale, closed, left, self.dt, self.transmission is not None,
+            self.integral, self.last_active, active, stiffness, damping,
+        )  # fmt: skip
+        return active, stiffness, damping
 
     def _stops(self, torque: Array, q: Array, qd: Array) -> Array:
-        """A joint that would pass its stop in this step is slowed to reach it, or sent back if it is past it already."""
-        dt = self.dt
-        ahead = q + qd * dt
-        past_upper, past_lower = ahead > self.upper, ahead < self.lower
-        if not (past_upper | past_lower).any():
-            return torque
-        scale = STOP_SHARE * self.at_stop / dt
-        highest, lowest = STOP_SHARE * (self.upper - q) / dt, STOP_SHARE * (self.lower - q) / dt
-        over = np.where(past_upper, np.maximum(np.maximum(torque, 0.0) + scale * (qd - highest), 0.0), 0.0)
-        under = np.where(past_lower, np.minimum(np.minimum(torque, 0.0) + scale * (qd - lowest), 0.0), 0.0)
-        return torque - over - under
+        """A joint that would pass its stop in this step is slowed to reach it, or sent back if it is past it already.
+        A joint that is not there takes no torque."""
+        out = np.empty(self.shape)
+        _stop(torque, q, qd, self.lower, self.upper, self.at_stop, self.present, self.dt, out)
+        return out
 
 
-def _within(value: Array, limit: Array) -> Array:
-    """np.clip to +-limit without its overhead, which a batch pays in every step."""
-    return np.minimum(np.maximum(value, -limit), limit)
+MOTOR = ("kp", "ki", "kd", "zero_offset", "deadband", "torque_limit", "strength", "own_emf", "integral_limit")
+"""Rows of the table that ``_drive`` reads, in this order."""
+
+
+@compiled
+def _drive(
+    motor: Array,
+    wanted: Array,
+    position: Array,
+    speed: Array,
+    scale: Array,
+    closed: Array,
+    left: Array,
+    dt: float,
+    elastic: bool,
+    integral: Array,
+    last_active: Array,
+    active: Array,
+    stiffness: Array,
+    damping: Array,
+) -> None:
+    """Controller and motor of every joint. ``motor`` (len(MOTOR), B, M); the others (B, M), of which those from
+    ``integral`` on are written.
+
+    ``scale`` is the supply over the nominal one, ``closed`` whether the circuit is, ``left`` what the sag leaves.
+    """
+    kp, ki, kd, zero_offset, deadband = motor[0], motor[1], motor[2], motor[3], motor[4]
+    torque_limit, strength, own_emf, integral_limit = motor[5], motor[6], motor[7], motor[8]
+    for i in range(active.shape[0]):
+        for j in range(active.shape[1]):
+            error = wanted[i, j] - position[i, j] - zero_offset[i, j]
+            if deadband[i, j] > 0.0:
+                error = error - _within(error, deadband[i, j])
+            asked = kp[i, j] * error - kd[i, j] * speed[i, j]
+            if ki[i, j] != 0.0:
+                integral[i, j] = _within(integral[i, j] + error * dt, integral_limit[i, j]) * closed[i, j]
+                asked = asked + ki[i, j] * integral[i, j]
+            torque = _within(asked, torque_limit[i, j]) * scale[i, j] * closed[i, j]
+            last_active[i, j] = torque
+            back_emf = own_emf[i, j] * closed[i, j]
+            active[i, j] = (torque * left[i, j] - back_emf * speed[i, j]) * strength[i, j]
+            if elastic:
+                free = 1.0 if abs(asked) < torque_limit[i, j] else 0.0
+                free = free * (scale[i, j] * left[i, j]) * closed[i, j]
+                stiffness[i, j] = kp[i, j] * free * strength[i, j]
+                damping[i, j] = (kd[i, j] * free + back_emf) * strength[i, j]
+
+
+@compiled
+def _stop(
+    torque: Array,
+    q: Array,
+    qd: Array,
+    lower: Array,
+    upper: Array,
+    inertia: Array,
+    present: Array,
+    dt: float,
+    out: Array,
+) -> None:
+    """Torque (B, M) with what the stops add, where ``present``; all (B, M)."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            value = torque[i, j]
+            ahead = q[i, j] + qd[i, j] * dt
+            scale = STOP_SHARE * inertia[i, j] / dt
+            if ahead > upper[i, j]:
+                over = max(value, 0.0) + scale * (qd[i, j] - STOP_SHARE * (upper[i, j] - q[i, j]) / dt)
+                value = value - max(over, 0.0)
+            elif ahead < lower[i, j]:
+                under = min(value, 0.0) + scale * (qd[i, j] - STOP_SHARE * (lower[i, j] - q[i, j]) / dt)
+                value = value - min(under, 0.0)
+            out[i, j] = value if present[i, j] else 0.0
+
+
+@compiled
+def _within(value: float, limit: float) -> float:
+    """Value within +-limit; not a number stays so."""
+    if value > limit:
+        return limit
+    return -limit if value < -limit else value
 
 
 def _each(robots: Sequence[Robot], facts: Callable[[Robot], Array]) -> Array:

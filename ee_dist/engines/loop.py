@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import Bodies, Rollout, Truth
 from ee_dist.engines.drive import DrivePath
 from ee_dist.engines.drivers import Controllers, scaling
@@ -133,53 +134,62 @@ def in_batches(rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]],
     return [logs[i] for i in range(len(rollouts))]
 
 
+OF_JOINT = {"position": 0, "velocity": 1, "torque": 2, "angle": 3}
+TOUCH, OF_BASE = 4, 5
+
+
 class _Channels:
     """True values of the channels (B, S) from the true state."""
 
     def __init__(self, robots: Sequence[Robot], scales: Sequence[tuple[Array, Array]]) -> None:
         first = robots[0]
         motor = {name: k for k, name in enumerate(first.motor_names)}
+        touches = iter(range(len(first.sensors)))
         self.shape = (len(robots), len(first.sensors))
-        by_kind: dict[str, tuple[list[int], list[int]]] = {}
-        touches = 0
-        for k, sensor in enumerate(first.sensors):
-            columns, sources = by_kind.setdefault(sensor.kind, ([], []))
-            columns.append(k)
-            if sensor.kind == "touch":
-                sources.append(touches)
-                touches += 1
-            else:
-                sources.append(motor.get(sensor.target, 0))
-        self.by_kind = [(kind, _places(columns), _places(sources)) for kind, (columns, sources) in by_kind.items()]
-        angles = _places(by_kind["angle"][1]) if "angle" in by_kind else slice(0)
-        self.middle = np.array([s[0] for s in scales])[:, angles].copy()
-        self.half = np.array([s[1] for s in scales])[:, angles].copy()
+        kinds = [TOUCH if s.kind == "touch" else OF_JOINT.get(s.kind, OF_BASE) for s in first.sensors]
+        self.kinds = np.array(kinds, dtype=np.intp)
+        places = [next(touches) if s.kind == "touch" else motor.get(s.target, 0) for s in first.sensors]
+        self.places = np.array(places, dtype=np.intp)
+        self.of_base = [(k, s.kind) for k, s in enumerate(first.sensors) if kinds[k] == OF_BASE]
+        self.middle = np.array([s[0] for s in scales])
+        self.half = np.array([s[1] for s in scales])
+        self.untouched = np.zeros((len(robots), 0), dtype=bool)
 
     def __call__(self, truth: Truth, torque: Array) -> Array:
         out = np.empty(self.shape)
-        for kind, columns, sources in self.by_kind:
-            if kind == "touch":
-                assert truth.touch is not None
-                out[:, columns] = np.where(truth.touch[:, sources], TOUCHING, LIFTED)
-            elif kind == "angle":
-                out[:, columns] = (truth.joints[:, sources] - self.middle) / self.half
-            elif kind == "position":
-                out[:, columns] = truth.joints[:, sources]
-            elif kind == "velocity":
-                out[:, columns] = truth.speeds[:, sources]
-            elif kind == "torque":
-                out[:, columns] = torque[:, sources]
-            else:
-                out[:, columns] = _of_base(kind, truth)[:, None]
+        touch = self.untouched if truth.touch is None else truth.touch
+        _fill(self.kinds, self.places, truth.joints, truth.speeds, torque, touch, self.middle, self.half, out)
+        for k, kind in self.of_base:
+            out[:, k] = _of_base(kind, truth)
         return out
 
 
-def _places(places: list[int]) -> slice | NDArray[np.intp]:
-    """The places as a slice where they are evenly spaced: NumPy then needs no list of addresses."""
-    apart = places[1] - places[0] if len(places) > 1 else 1
-    if apart > 0 and places == list(range(places[0], places[-1] + 1, apart)):
-        return slice(places[0], places[-1] + 1, apart)
-    return np.array(places, dtype=np.intp)
+@compiled
+def _fill(
+    kinds: NDArray[np.intp],
+    places: NDArray[np.intp],
+    joints: Array,
+    speeds: Array,
+    torque: Array,
+    touch: NDArray[np.bool_],
+    middle: Array,
+    half: Array,
+    out: Array,
+) -> None:
+    """The channels (B, S) of joints and touch sensors: channel k is of ``kinds[k]`` and shows motor or sensor ``places[k]``."""
+    for k in range(len(kinds)):
+        kind, j = kinds[k], places[k]
+        for i in range(len(out)):
+            if kind == 0:
+                out[i, k] = joints[i, j]
+            elif kind == 1:
+                out[i, k] = speeds[i, j]
+            elif kind == 2:
+                out[i, k] = torque[i, j]
+            elif kind == 3:
+                out[i, k] = (joints[i, j] - middle[i, j]) / half[i, j]
+            elif kind == 4:
+                out[i, k] = TOUCHING if touch[i, j] else LIFTED
 
 
 def _of_base(kind: str, truth: Truth) -> Array:

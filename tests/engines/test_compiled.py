@@ -1,0 +1,99 @@
+"""Compiled functions do what is written: the bits of Python's own arithmetic, and no need for a file to keep them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ee_dist.engines import compiled as module
+from ee_dist.engines import drive, drivers, loop
+
+
+def both(function: Callable[..., None], arguments: list[Any]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What the function leaves in its arrays: compiled, and run by Python."""
+    results = []
+    for run in (function, function.py_func):  # type: ignore[attr-defined]
+        mine = [a.copy() if isinstance(a, np.ndarray) else a for a in arguments]
+        with np.errstate(all="ignore"):
+            run(*mine)
+        results.append([a for a in mine if isinstance(a, np.ndarray)])
+    return results[0], results[1]
+
+
+def assert_same_bits(function: Callable[..., None], arguments: list[Any]) -> None:
+    for found, known in zip(*both(function, arguments), strict=True):
+        assert found.tobytes() == known.tobytes()
+
+
+sizes = {"robots": st.integers(1, 5), "seed": st.integers(0, 2**32 - 1)}
+
+
+@settings(max_examples=30, deadline=None)
+@given(channels=st.integers(1, 20), hidden=st.integers(1, 9), motors=st.integers(1, 12), **sizes)
+def test_a_network(robots: int, channels: int, hidden: int, motors: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+
+    def some(*shape: int) -> np.ndarray:
+        return rng.uniform(-1, 1, (robots, *shape))
+
+    weights = [some(hidden, channels + 1 + hidden), some(hidden), some(motors, hidden + 1)]
+    kept = [some(channels + 1 + hidden), some(hidden + 1)]
+    assert_same_bits(drivers._think, [some(channels), *weights, some(motors), some(motors), *kept, some(motors)])
+
+
+@settings(max_examples=30, deadline=None)
+@given(motors=st.integers(1, 9), elastic=st.booleans(), **sizes)
+def test_a_drive_and_its_stops(robots: int, motors: int, elastic: bool, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = (robots, motors)
+    table = rng.uniform(0, 3, (len(drive.MOTOR), *shape)) * (rng.random((len(drive.MOTOR), *shape)) < 0.7)
+    state = [rng.normal(0, 2, shape) for _ in range(3)]
+    switched = [rng.uniform(0, 1, shape) for _ in range(3)]
+    written = [rng.normal(0, 1, shape) for _ in range(5)]
+    assert_same_bits(drive._drive, [table, *state, *switched, 0.01, elastic, *written])
+    lower = rng.uniform(-2, 0, shape)
+    present = rng.random(shape) < 0.8
+    stops = [*state, lower, lower + rng.uniform(0, 2, shape), rng.uniform(0.001, 0.1, shape), present, 0.01]
+    assert_same_bits(drive._stop, [*stops, written[0]])
+
+
+def test_not_a_number_is_not_made_one() -> None:
+    """A motion that left the finite numbers must show in the log."""
+    assert np.isnan(drive._within(np.nan, 1.0))
+    assert np.isnan(drivers._clipped(np.nan))
+    one = np.ones((1, 1))
+    out = one.copy()
+    drive._stop(np.nan * one, one, one, -one, 2 * one, one, one > 0, 0.01, out)
+    assert np.isnan(out).all()
+
+
+def test_channels_show_their_joint_or_touch() -> None:
+    rng = np.random.default_rng(3)
+    joints, speeds, torque = rng.normal(size=(3, 2, 4))
+    touch = np.array([[True, False], [False, True]])
+    middle, half = rng.normal(size=(2, 2, 4))
+    kinds, places = np.array([3, 4, 0, 1, 2, 5, 4]), np.array([2, 0, 1, 3, 0, 0, 1])
+    out = np.full((2, 7), 7.0)
+    loop._fill(kinds, places, joints, speeds, torque, touch, middle, half, out)
+    assert np.array_equal(out[:, 0], (joints[:, 2] - middle[:, 2]) / half[:, 2])
+    assert np.array_equal(out[:, [1, 6]], np.where(touch, 1.0, -1.0))
+    assert np.array_equal(out[:, 2:5], np.stack([joints[:, 1], speeds[:, 3], torque[:, 0]], axis=1))
+    assert (out[:, 5] == 7.0).all()  # of the base: not filled here
+
+
+def test_without_a_folder_to_write_to_a_function_is_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    compile_in_memory = numba.njit
+
+    def nowhere(*arguments: Any, cache: bool = False, **options: Any) -> Any:
+        if cache:
+            raise RuntimeError("cannot cache function: no locator available")
+        return compile_in_memory(*arguments, **options)
+
+    monkeypatch.setattr(module.numba, "njit", nowhere)
+    assert module.compiled(lambda x: x + 1.0)(1.5) == 2.5
