@@ -267,7 +267,7 @@ def _stop(
             elif ahead < lower[i, j]:
                 under = min(value, 0.0) + scale * (qd[i, j] - STOP_SHARE * (lower[i, j] - q[i, j]) / dt)
                 value = value - min(under, 0.0)
-            out[i, j] = value if present[i, j] else 0.0
+            out[i, j] = value * present[i, j]
 
 
 @compiled
