@@ -144,7 +144,8 @@ class DrivePath:
             np.add.at(torque, (rows, columns), added)
         if self.friction is not None:
             torque = self.friction(torque, active, qd, enabled)
-        torque = self._stops(torque, q, qd)
+        # Every stage made a new array, so that this one may be written to.
+        _stop(torque, q, qd, self.lower, self.upper, self.at_stop, self.present, self.dt)
         if self.friction is not None:
             self.friction.record(torque, qd)
         return torque
@@ -186,13 +187,6 @@ class DrivePath:
             self.integral, self.last_active, active, stiffness, damping,
         )  # fmt: skip
         return active, stiffness, damping
-
-    def _stops(self, torque: Array, q: Array, qd: Array) -> Array:
-        """A joint that would pass its stop in this step is slowed to reach it, or sent back if it is past it already.
-        A joint that is not there takes no torque."""
-        out = np.empty(self.shape)
-        _stop(torque, q, qd, self.lower, self.upper, self.at_stop, self.present, self.dt, out)
-        return out
 
 
 MOTOR = ("kp", "ki", "kd", "zero_offset", "deadband", "torque_limit", "strength", "own_emf", "integral_limit")
@@ -245,19 +239,12 @@ def _drive(
 
 @compiled
 def _stop(
-    torque: Array,
-    q: Array,
-    qd: Array,
-    lower: Array,
-    upper: Array,
-    inertia: Array,
-    present: Array,
-    dt: float,
-    out: Array,
+    torque: Array, q: Array, qd: Array, lower: Array, upper: Array, inertia: Array, present: Array, dt: float
 ) -> None:
-    """Torque (B, M) with what the stops add, where ``present``; all (B, M)."""
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
+    """Add the stops to ``torque`` (B, M): a joint that would pass its stop in this step is slowed to reach it, or sent
+    back if it is past it already. A joint that is not ``present`` takes no torque."""
+    for i in range(torque.shape[0]):
+        for j in range(torque.shape[1]):
             value = torque[i, j]
             ahead = q[i, j] + qd[i, j] * dt
             scale = STOP_SHARE * inertia[i, j] / dt
@@ -267,7 +254,7 @@ def _stop(
             elif ahead < lower[i, j]:
                 under = min(value, 0.0) + scale * (qd[i, j] - STOP_SHARE * (lower[i, j] - q[i, j]) / dt)
                 value = value - min(under, 0.0)
-            out[i, j] = value * present[i, j]
+            torque[i, j] = value * present[i, j]
 
 
 @compiled

@@ -106,15 +106,15 @@ NEWEST = 0.3
 """Weight of the newest measurement of a worker's speed."""
 
 
-def helping(left: int, total: int, share: float) -> int:
-    """How many of the ``left`` of ``total`` jobs a worker gets that does ``share`` of the work.
+def helping(left: int, total: int, share: float, of_idle: float) -> int:
+    """How many of the ``left`` of ``total`` jobs a worker gets that does ``share`` of the work, ``of_idle`` of what those do
+    that have none now.
 
     A large lot goes out in ever smaller helpings, so that all finish together; a small one in one helping each, since
     a batch of half the size is nearly as slow as a whole one.
     """
-    whole = math.ceil(total * share)
-    if whole <= 2 * WORTH_A_CALL:
-        return min(left, max(1, whole))
+    if total * share <= 2 * WORTH_A_CALL:
+        return min(left, max(1, round(left * of_idle)))
     return min(left, max(WORTH_A_CALL, math.ceil(left * share / 2)))
 
 
@@ -129,12 +129,13 @@ class Shares:
         now, before = steps / max(seconds, 1e-9), self.speed[who]
         self.speed[who] = now if before is None else before + NEWEST * (now - before)
 
-    def of(self, who: int) -> float:
-        """Share of worker ``who``. One of unknown speed counts as an average one."""
+    def now(self) -> list[float]:
+        """Share of each worker; they sum to 1. One of unknown speed counts as an average one."""
         known = [s for s in self.speed if s is not None]
         usual = sum(known) / len(known) if known else 1.0
-        mine = self.speed[who]
-        return (usual if mine is None else mine) / sum(usual if s is None else s for s in self.speed)
+        speeds = [usual if s is None else s for s in self.speed]
+        whole = sum(speeds)
+        return [s / whole for s in speeds]
 
 
 class RayEvaluator:
@@ -162,12 +163,13 @@ class RayEvaluator:
         self.counts.steps += steps
         results: list[Any] = [None] * len(jobs)
         running: dict[Any, tuple[int, int, int]] = {}
-        idle = list(range(self.workers))
+        idle, share, free = list(range(self.workers)), self.shares.now(), 1.0
         given = 0
         while given < len(jobs) or running:
             while given < len(jobs) and idle:
                 who = idle.pop(0)
-                size = self.chunk or helping(len(jobs) - given, len(jobs), self.shares.of(who))
+                size = self.chunk or helping(len(jobs) - given, len(jobs), share[who], share[who] / free)
+                free -= share[who]
                 some = list(jobs[given : given + size])
                 running[self.actors[who].run.remote(some, size)] = (given, len(some), who)
                 given += len(some)
@@ -175,6 +177,7 @@ class RayEvaluator:
             for reference in done:
                 first, count, who = running.pop(reference)
                 idle.append(who)
+                free += share[who]
                 found, seconds = ray.get(reference)
                 self.shares.measured(who, sum(j.rollout.steps for j in jobs[first : first + count]), seconds)
                 results[first : first + count] = found

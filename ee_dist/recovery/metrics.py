@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -64,7 +65,7 @@ class _RollingMeanError:
     window: int
     means: Array
 
-    @property
+    @cached_property
     def key(self) -> str:
         return f"rolling_mean:{self.window}:{array_key(self.means)}"
 

@@ -59,8 +59,8 @@ def test_a_drive_and_its_stops(robots: int, motors: int, elastic: bool, seed: in
     assert_same_bits(drive._drive, [table, *state, *switched, 0.01, elastic, *written])
     lower = rng.uniform(-2, 0, shape)
     present = rng.random(shape) < 0.8
-    stops = [*state, lower, lower + rng.uniform(0, 2, shape), rng.uniform(0.001, 0.1, shape), present, 0.01]
-    assert_same_bits(drive._stop, [*stops, written[0]])
+    upper, inertia = lower + rng.uniform(0, 2, shape), rng.uniform(0.001, 0.1, shape)
+    assert_same_bits(drive._stop, [*state, lower, upper, inertia, present, 0.01])
 
 
 def test_not_a_number_is_not_made_one() -> None:
@@ -68,9 +68,9 @@ def test_not_a_number_is_not_made_one() -> None:
     assert np.isnan(drive._within(np.nan, 1.0))
     assert np.isnan(drivers._clipped(np.nan))
     one = np.ones((1, 1))
-    out = one.copy()
-    drive._stop(np.nan * one, one, one, -one, 2 * one, one, one > 0, 0.01, out)
-    assert np.isnan(out).all()
+    torque = np.nan * one
+    drive._stop(torque, one, one, -one, 2 * one, one, one > 0, 0.01)
+    assert np.isnan(torque).all()
 
 
 def test_channels_show_their_joint_or_touch() -> None:

@@ -92,7 +92,7 @@ def _generation(g: Generation, costs: Costs, workers: int, clock: float) -> tupl
     left, sending, worked = g.simulated, 0.0, 0.0
     while left or running:
         while left and idle:
-            size = helping(left, g.simulated, 1.0 / workers)
+            size = helping(left, g.simulated, 1.0 / workers, 1.0 / len(idle))
             left -= size
             spent = costs.per_call_s / 2 + size * costs.per_sent_s
             clock, sending = clock + spent, sending + spent

@@ -8,12 +8,14 @@ import numpy as np
 from mujoco import batch as native
 from numpy.typing import NDArray
 
+from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import Rollout, Truth
 from ee_dist.engines.mujoco.contact import LEAST_FRICTION, contact
 from ee_dist.engines.mujoco.model import OWN, Model, scalar_first
 from ee_dist.trials.log import Array
 
 Index = slice | NDArray[np.intp]
+Places = NDArray[np.intp]
 
 
 class Group:
@@ -31,8 +33,11 @@ class Group:
         self.torques: Array = bind("qfrc_applied")
         self.force: Array = bind("xfrc_applied")[:, model.root, :3]
         self.pressed: Array = bind("sensordata")
-        self.motors, self.qpos, self.dof = _index(model.motors), _index(model.qpos), _index(model.dof)
-        self.touches = _index(model.touches)
+        self.motors, self.dof = _index(model.motors), _index(model.dof)
+        drives = len(members[0].model.drives)
+        self.qpos_of, self.dof_of = _places(model.motors, model.qpos, drives), _places(model.motors, model.dof, drives)
+        sensors = sum(s.kind == "touch" for s in members[0].model.sensors)
+        self.touch_of = _places(model.touches, range(len(model.touches)), sensors)
         self.pose: Array = np.empty((len(members), 7))
         self._stand(members)
 
@@ -115,10 +120,8 @@ class Group:
             twist[:, :3] = self.speeds[:, :3] + _cross(twist[:, 3:], _turned(turn, self.com))
         return twist
 
-    def step(self, torques: Array, force: Array | None) -> None:
-        self.torques[:, self.dof] = torques[:, self.motors]
-        if force is not None:
-            self.force[:] = force
+    def step(self) -> None:
+        """Advance under the torques and forces that were set."""
         try:
             self.batch.step()
         except native.SimulationError as error:
@@ -130,52 +133,76 @@ class MuJoCoBodies:
     """The bodies of one batch. Implements ``ee_dist.engines.contract.Bodies``."""
 
     def __init__(self, placed: Sequence[tuple[list[int], Group]], batch: Sequence[Rollout]) -> None:
-        self.shape = (len(batch), len(batch[0].model.drives))
+        self.count, self.motors = len(batch), len(batch[0].model.drives)
         self.touches = sum(s.kind == "touch" for s in batch[0].model.sensors)
-        self.groups = [(_index(rows), group) for rows, group in placed]
-        # The usual batch: one structure with every joint present needs no arrays but the copies that leave here.
-        only = placed[0][1]
-        self.only = only if len(placed) == 1 and len(only.model.motors) == self.shape[1] else None
+        self.groups = [(np.array(rows, dtype=np.intp), group) for rows, group in placed]
 
     def read(self, touch: bool, pose: bool, twist: bool) -> Truth:
-        if self.only is not None:
-            only = self.only
-            return Truth(
-                only.positions[:, only.qpos].copy(),
-                only.speeds[:, only.dof].copy(),
-                only.pressed > 0 if touch and len(only.model.touches) == self.touches else self._touch(touch),
-                only.base_pose().copy() if pose else None,
-                only.base_twist() if twist else None,
-            )
-        truth = Truth(np.zeros(self.shape), np.zeros(self.shape), self._touch(touch))
-        for rows, group in self.groups:
-            _put(truth.joints, rows, group.motors, group.positions[:, group.qpos])
-            _put(truth.speeds, rows, group.motors, group.speeds[:, group.dof])
+        joints, speeds = np.empty((self.count, self.motors)), np.empty((self.count, self.motors))
+        down = np.empty((self.count, self.touches), dtype=bool)
+        for rows, g in self.groups:
+            _gather(
+                rows, g.positions, g.speeds, g.pressed, g.qpos_of, g.dof_of, g.touch_of, joints, speeds, down
+            )  # fmt: skip
+        truth = Truth(joints, speeds, down if touch else None)
         if pose:
-            truth.base_pose = np.empty((self.shape[0], 7))
+            truth.base_pose = np.empty((self.count, 7))
             for rows, group in self.groups:
                 truth.base_pose[rows] = group.base_pose()
         if twist:
-            truth.base_twist = np.empty((self.shape[0], 6))
+            truth.base_twist = np.empty((self.count, 6))
             for rows, group in self.groups:
                 truth.base_twist[rows] = group.base_twist()
         return truth
 
-    def _touch(self, wanted: bool) -> NDArray[np.bool_] | None:
-        if not wanted:
-            return None
-        down = np.zeros((self.shape[0], self.touches), dtype=bool)
-        for rows, group in self.groups:
-            _put(down, rows, group.touches, group.pressed > 0)
-        return down
-
     def step(self, torques: Array, force: Array | None) -> None:
         for rows, group in self.groups:
-            group.step(torques[rows], None if force is None else force[rows])
+            _scatter(rows, torques, group.dof_of, group.torques)
+            if force is not None:
+                group.force[:] = force[rows]
+            group.step()
 
     def close(self) -> None:
         self.groups = []
-        self.only = None
+
+
+@compiled
+def _gather(
+    rows: Places,
+    positions: Array,
+    velocities: Array,
+    pressed: Array,
+    qpos_of: Places,
+    dof_of: Places,
+    touch_of: Places,
+    joints: Array,
+    speeds: Array,
+    down: NDArray[np.bool_],
+) -> None:
+    """MuJoCo's state of a group's robots into the ``rows`` of the batch; zero and open for what is lost."""
+    for i in range(len(rows)):
+        row = rows[i]
+        for k in range(len(qpos_of)):
+            joints[row, k] = positions[i, qpos_of[k]] if qpos_of[k] >= 0 else 0.0
+            speeds[row, k] = velocities[i, dof_of[k]] if dof_of[k] >= 0 else 0.0
+        for k in range(len(touch_of)):
+            down[row, k] = touch_of[k] >= 0 and pressed[i, touch_of[k]] > 0.0
+
+
+@compiled
+def _scatter(rows: Places, torques: Array, dof_of: Places, applied: Array) -> None:
+    """Torques of the batch's ``rows`` to where MuJoCo takes them for a group."""
+    for i in range(len(rows)):
+        for k in range(len(dof_of)):
+            if dof_of[k] >= 0:
+                applied[i, dof_of[k]] = torques[rows[i], k]
+
+
+def _places(members: Sequence[int], at: Sequence[int], count: int) -> Places:
+    """For each of ``count`` motors or sensors where it is found, -1 for one that is not among the ``members``."""
+    found = np.full(count, -1, dtype=np.intp)
+    found[list(members)] = list(at)
+    return found
 
 
 def _index(places: Sequence[int]) -> Index:
@@ -183,14 +210,6 @@ def _index(places: Sequence[int]) -> Index:
     if places and list(places) == list(range(places[0], places[-1] + 1)):
         return slice(places[0], places[-1] + 1)
     return np.array(places, dtype=np.intp)
-
-
-def _put(into: NDArray, rows: Index, columns: Index, values: NDArray) -> None:  # type: ignore[type-arg]
-    """into[rows, columns] = values for any mix of slices and lists."""
-    if isinstance(rows, np.ndarray) and isinstance(columns, np.ndarray):
-        into[rows[:, None], columns] = values
-    else:
-        into[rows, columns] = values
 
 
 def _turned(turn: Array, vector: Array) -> Array:
