@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ee_dist.robots.model import Drive, Joint, Robot, RobotError, Wiring
+from ee_dist.robots.model import Joint, Robot, RobotError
 
 Array = NDArray[np.float64]
 
 POSES = 4
 """Poses beside position zero at which ``steady_inertia`` looks."""
-_PLAIN = Drive("", kp=0.0, ki=0.0, kd=0.0, torque_limit=0.0, speed_limit=0.0)
 
 
 def rotation_matrix(quaternion: tuple[float, float, float, float]) -> Array:
@@ -98,7 +96,7 @@ def felt_inertia(robot: Robot) -> Array:
 
     Read-only.
     """
-    return _felt(_body(robot))
+    return _felt(_Body(robot))
 
 
 def steady_inertia(robot: Robot) -> Array:
@@ -108,19 +106,33 @@ def steady_inertia(robot: Robot) -> Array:
     d_j * sum_k |(M^-1)_jk| are at most 1 here (Gershgorin), so nothing is amplified. It is the least value over position
     zero and some others, and over both ways in which engines count rotors. For one joint on a bolted base it is the true inertia.
     """
-    return _steady(_body(robot))
+    return _steady(_Body(robot))
 
 
-def _body(robot: Robot) -> Robot:
-    """What the inertia of a robot depends on, in a robot that is equal for equal answers."""
-    drives = tuple(replace(_PLAIN, joint=d.joint, rotor_inertia=d.rotor_inertia) for d in robot.drives)
-    parts = tuple(replace(p, shapes=()) for p in robot.parts)
-    joints = tuple(replace(j, freedom=1.0) for j in robot.joints)
-    return Robot("", parts, joints, drives, (), Wiring(()), free_base=robot.free_base, lost=robot.lost)
+class _Body:
+    """A robot that is equal to others with the same answers: a hypothesis seldom changes what inertia depends on."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.key = (
+            tuple((p.name, p.mass_kg, p.com_m, p.inertia_kg_m2) for p in robot.parts),
+            tuple((j.name, j.kind, j.parent, j.child) for j in robot.joints),
+            tuple((j.position_m, j.rotation, j.axis, j.lower, j.upper) for j in robot.joints),
+            tuple((d.joint, d.rotor_inertia) for d in robot.drives),
+            robot.free_base,
+            robot.lost,
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Body) and self.key == other.key
 
 
 @lru_cache(maxsize=2048)
-def _felt(robot: Robot) -> Array:
+def _felt(body: _Body) -> Array:
+    robot = body.robot
     inverse = np.linalg.inv(mass_matrix(robot))
     free = 6 if robot.free_base else 0
     felt = {j.name: 1.0 / float(inverse[free + i, free + i]) for i, j in enumerate(_moving(robot))}
@@ -128,7 +140,8 @@ def _felt(robot: Robot) -> Array:
 
 
 @lru_cache(maxsize=2048)
-def _steady(robot: Robot) -> Array:
+def _steady(body: _Body) -> Array:
+    robot = body.robot
     joints, driven = _moving(robot), {d.joint for d in robot.drives}
     free = 6 if robot.free_base else 0
     rows = [free + i for i, j in enumerate(joints) if j.name in driven]
