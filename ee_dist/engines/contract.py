@@ -40,8 +40,8 @@ class Rollout:
     @property
     def key(self) -> str:
         """Content address of all that decides the result, for the cache."""
-        noisy = any(s.noise or s.dropout for s in self.model.sensors)
-        parts = [self.model.digest, self.driver.key, str(self.steps), str(self.seed if noisy else None), str(self.pose)]
+        seed = self.seed if self.model.noisy else None
+        parts = [self.model.digest, self.driver.key, str(self.steps), str(seed), str(self.pose)]
         for a in (self.supply_v, self.enabled, *_arrays(self.start)):
             parts.append("-" if a is None else hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest())
         return "|".join(parts)

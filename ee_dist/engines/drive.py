@@ -9,7 +9,7 @@ for bit, so a result never depends on what else is in the batch.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ee_dist.effects.laws import LAWS, LawContext, LawFunction, drive_law, find_law
 from ee_dist.engines.compiled import compiled
 from ee_dist.engines.friction import Friction
+from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.transmission import Transmission
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
 from ee_dist.robots.model import Drive, Robot
@@ -36,11 +37,10 @@ class DrivePath:
         self.dt = time_step_s
         shape = (len(robots), len(robots[0].drives))
         names = [f.name for f in fields(Drive) if f.name != "joint"]
-        table = np.array([[[getattr(d, n) for n in names] for d in r.drives] for r in robots], dtype=float)
-        table = table.reshape(*shape, len(names))
+        rows = per_robot(robots, lambda r: np.array([[getattr(d, n) for n in names] for d in r.drives], dtype=float))
+        table = np.array(rows).reshape(*shape, len(names))
         self.p = {n: np.ascontiguousarray(table[:, :, i]) for i, n in enumerate(names)}
-        present = [{j.name for j in r.present_joints} for r in robots]
-        self.present = np.array([[d.joint in have for d in r.drives] for r, have in zip(robots, present, strict=True)])
+        self.present = np.array(per_robot(robots, _present))
         p = self.p
         neutral = {f.name: f.default for f in fields(Drive)}
         self.uses = {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}
@@ -71,22 +71,21 @@ class DrivePath:
         self.rows, self.columns = np.indices(shape)
 
     def _prepare_joints(self, robots: Sequence[Robot], shape: tuple[int, int]) -> None:
-        stops = np.array([[r.joint(d.joint).stops for d in r.drives] for r in robots]).reshape(*shape, 2)
+        stops = np.array(per_robot(robots, lambda r: [r.joint(d.joint).stops for d in r.drives])).reshape(*shape, 2)
         self.lower, self.upper = np.ascontiguousarray(stops[:, :, 0]), np.ascontiguousarray(stops[:, :, 1])
-        self.inertia = _each(robots, felt_inertia).reshape(shape)
+        self.inertia = np.array(per_robot(robots, felt_inertia)).reshape(shape)
         self.transmission: Transmission | None = None
         self.friction: Friction | None = None
         self.at_stop = self.inertia
-        jammed = np.array([[r.joint(d.joint).freedom != 1.0 for d in r.drives] for r in robots], dtype=bool).reshape(
-            shape
-        )
+        frees = per_robot(robots, lambda r: [r.joint(d.joint).freedom for d in r.drives])
+        jammed = np.array(frees, dtype=float).reshape(shape) != 1.0
         elastic, rubbing = Transmission.rows(self.p), Friction.rows(self.p)
         special = jammed | elastic | rubbing
         if not special.any():
             return
         some: NDArray[np.bool_] = np.any(special, axis=1)
         steady = self.inertia.copy()
-        steady[some] = _each([r for r, wanted in zip(robots, some.tolist(), strict=True) if wanted], steady_inertia)
+        steady[some] = per_robot([r for r, wanted in zip(robots, some.tolist(), strict=True) if wanted], steady_inertia)
         # A jammed joint is at a stop all the time: the stop must not shake the joints that move with it.
         self.at_stop = np.where(jammed, steady, self.inertia)
         if elastic.any():
@@ -265,7 +264,6 @@ def _within(value: float, limit: float) -> float:
     return -limit if value < -limit else value
 
 
-def _each(robots: Sequence[Robot], facts: Callable[[Robot], Array]) -> Array:
-    """``facts`` of every robot, asked once of each."""
-    known = {id(robot): facts(robot) for robot in {id(r): r for r in robots}.values()}
-    return np.array([known[id(robot)] for robot in robots])
+def _present(robot: Robot) -> list[bool]:
+    have = {j.name for j in robot.present_joints}
+    return [d.joint in have for d in robot.drives]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,7 +35,7 @@ class Network:
 
     weights: tuple[float, ...]
 
-    @property
+    @cached_property
     def key(self) -> str:
         return "network:" + hashlib.sha256(np.asarray(self.weights).tobytes()).hexdigest()
 
@@ -45,7 +46,7 @@ class Commands:
 
     values: Array
 
-    @property
+    @cached_property
     def key(self) -> str:
         return "commands:" + hashlib.sha256(np.ascontiguousarray(self.values).tobytes()).hexdigest()
 

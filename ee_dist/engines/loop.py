@@ -12,6 +12,7 @@ from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import Bodies, Rollout, Truth
 from ee_dist.engines.drive import DrivePath
 from ee_dist.engines.drivers import Controllers, scaling
+from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.sensing import LIFTED, TOUCHING, SensingPath
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
@@ -47,7 +48,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     kinds = {s.kind for s in first.sensors}
     drive = DrivePath(robots, dt)
     sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
-    scales = [scaling(r) for r in robots]
+    scales = per_robot(robots, scaling)
     control = Controllers(robots, [r.driver for r in rollouts], scales, steps)
     truth_to_channels = _Channels(robots, scales)
     force = _Force(robots)

@@ -12,6 +12,7 @@ from dataclasses import fields
 
 import numpy as np
 
+from ee_dist.engines.per_robot import per_robot
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import Array
 
@@ -23,8 +24,8 @@ class SensingPath:
 
     def __init__(self, robots: Sequence[Robot], time_step_s: float, steps: int, seeds: Sequence[int | None]) -> None:
         names = [f.name for f in fields(Sensor) if isinstance(f.default, float)]
-        table = np.array([[[getattr(s, n) for n in names] for s in r.sensors] for r in robots], dtype=float)
-        table = table.reshape(len(robots), len(robots[0].sensors), len(names))
+        rows = per_robot(robots, lambda r: np.array([[getattr(s, n) for n in names] for s in r.sensors], dtype=float))
+        table = np.array(rows).reshape(len(robots), len(robots[0].sensors), len(names))
         self.p = {n: np.ascontiguousarray(table[:, :, i]) for i, n in enumerate(names)}
         neutral = {f.name: f.default for f in fields(Sensor)}
         self.uses = {n: bool(np.any(self.p[n] != neutral[n])) for n in names}

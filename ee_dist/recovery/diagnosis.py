@@ -34,6 +34,14 @@ class Judge:
             (driver, metric.against(log), metric.steps(len(log))) for driver, log in trials
         ]
         self._models: dict[Hypothesis, Robot] = {}
+        self._meanings: dict[bytes, Hypothesis] = {}
+
+    def hypothesis(self, genome: Genomes) -> Hypothesis:
+        """What a genome means. Most offspring are copies."""
+        genome_bytes = genome.tobytes()
+        if genome_bytes not in self._meanings:
+            self._meanings[genome_bytes] = decode(genome, self.robot)
+        return self._meanings[genome_bytes]
 
     def model(self, hypothesis: Hypothesis) -> Robot:
         if hypothesis not in self._models:
@@ -59,7 +67,6 @@ def diagnose(
     pass_index: int,
 ) -> tuple[Genomes, float]:
     """Genome of the best hypothesis found, and its error. Genomes of the database join the start."""
-    robot = judge.robot
     (start,) = seed.spawn(1)
     fresh = first_hypotheses(budget.population, np.random.default_rng(start))
     known = np.array(database, dtype=np.int16).reshape(-1, LENGTH)
@@ -68,7 +75,7 @@ def diagnose(
     while not ga.done:
         genomes = ga.ask()
         before = judge.evaluator.counts.copy()
-        errors = judge.errors([decode(g, robot) for g in genomes])
+        errors = judge.errors([judge.hypothesis(g) for g in genomes])
         ga.tell(-errors)
         finite = ga.scores[np.isfinite(ga.scores)]
         observer.generation(
@@ -83,9 +90,9 @@ def diagnose(
                 simulated=judge.evaluator.counts.simulated - before.simulated,
             )
         )
-        best = decode(ga.genomes[0], robot)
+        best = judge.hypothesis(ga.genomes[0])
         observer.hypotheses([HypothesisRecord(pass_index, ga.generation - 1, 0, best, float(-ga.scores[0]))])
-    observer.hypotheses(_final(ga, robot, pass_index))
+    observer.hypotheses(_final(ga, judge, pass_index))
     return ga.genomes[0].copy(), float(-ga.scores[0])
 
 
@@ -96,7 +103,7 @@ def polish(judge: Judge, genome: Genomes, error: float, rounds: int) -> tuple[Ge
     """
     for _ in range(rounds):
         around = np.array(neighbours(genome, judge.robot), dtype=np.int16)
-        errors = judge.errors([decode(g, judge.robot) for g in around])
+        errors = judge.errors([judge.hypothesis(g) for g in around])
         k = int(np.argmin(errors))
         if not errors[k] < error:
             break
@@ -120,10 +127,10 @@ def prune(judge: Judge, hypothesis: Hypothesis, error: float, parsimony: float) 
     return hypothesis, error
 
 
-def _final(ga: GeneticAlgorithm, robot: Robot, pass_index: int) -> list[HypothesisRecord]:
+def _final(ga: GeneticAlgorithm, judge: Judge, pass_index: int) -> list[HypothesisRecord]:
     different: dict[Hypothesis, float] = {}
     for genome, score in zip(ga.genomes, ga.scores, strict=True):
-        different.setdefault(decode(genome, robot), float(-score))
+        different.setdefault(judge.hypothesis(genome), float(-score))
         if len(different) == FINAL_RANKS:
             break
     last = ga.generation - 1

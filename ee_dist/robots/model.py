@@ -245,6 +245,11 @@ class Robot:
         """Content address: equal robots, and only they, have equal digests."""
         return hashlib.sha256(repr(self).encode()).hexdigest()
 
+    @cached_property
+    def noisy(self) -> bool:
+        """Whether a sensor draws random numbers."""
+        return any(s.noise or s.dropout for s in self.sensors)
+
     def __getstate__(self) -> dict[str, Any]:
         # Cached look-ups are rebuilt where they are needed: they would double the bytes sent to a worker.
         return {f.name: getattr(self, f.name) for f in fields(self)}

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 from rich.box import SIMPLE
@@ -81,6 +83,8 @@ def run(config: Config, options: Options, out: Path) -> None:
         RunWriter(path, robot, metadata, {"config.yaml": config_yaml(config, options).encode()}) as writer,
         PassProgress(console, passes, weights) as progress,
     ):
+        # Slow to load, and needed only later: done while the first controllers run.
+        Thread(target=_load, args=("scipy.stats", "ee_dist.viewing.rerun_scene"), daemon=True).start()
         observer = Observers(Recorder(writer), digest, progress)
         result = recover(robot, intact, changed, metric, plan, evaluator, search_seed, observer)
         truth = changed.reveal()
@@ -88,7 +92,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     counts = evaluator.counts
     hardware.close()
     recording = out / "recovery.rrd"
-    from ee_dist.viewing.rerun_scene import write_rrd  # rerun takes half a second to load, and is needed only now
+    from ee_dist.viewing.rerun_scene import write_rrd
 
     write_rrd(read_run(path), recording)
     final = score(result.intact_m, result.trials_m, result.hypotheses[-1], truth)
@@ -123,6 +127,11 @@ def run(config: Config, options: Options, out: Path) -> None:
     console.print(
         f"Look at it: python -m ee_dist task=view log={os.path.relpath(path)}", highlight=False, soft_wrap=True
     )
+
+
+def _load(*modules: str) -> None:
+    for name in modules:
+        import_module(name)
 
 
 def _print(console: Console, result: Recovery, truth: Hypothesis, final: Score) -> None:
