@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import gc
 import os
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ from ee_dist.effects.catalogue import load_plugin
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
-from ee_dist.evaluation.ray_actors import RayEvaluator
+from ee_dist.evaluation.ray_actors import RayEvaluator, stop_ray
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.describe import robot_of
 from ee_dist.robots.model import Robot
@@ -82,8 +83,15 @@ def evaluator_of(config: Config) -> Evaluator:
     return evaluator
 
 
-@atexit.register
 def close_evaluators() -> None:
     """End the actors and close the worlds of all evaluators made so far."""
     while _kept:
         _kept.popitem()[1].close()
+
+
+@atexit.register
+def _leave() -> None:
+    close_evaluators()
+    stop_ray()
+    # Memory goes back with the process. To look through it for garbage first takes half a second.
+    gc.freeze()

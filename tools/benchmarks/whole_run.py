@@ -20,7 +20,7 @@ import psutil
 
 FIRST_GENERATION = re.compile(rb"repair 1 of \d+.*?\b([1-9]\d*)/\d+", re.DOTALL)
 """The bar of the first pass with at least one generation done."""
-LOOK_S = 0.25
+LOOK_S = 0.5
 """How often the processes are looked at."""
 
 
@@ -62,7 +62,7 @@ class _Tree:
                 try:
                     times = process.cpu_times()
                     self.cpu[process.pid, process.create_time()] = times.user + times.system
-                    if count % 8 == 0:
+                    if count % 20 == 0:
                         total += process.memory_full_info().pss / 1e6
                 except (psutil.Error, OSError):
                     continue
