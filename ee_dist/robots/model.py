@@ -243,7 +243,12 @@ class Robot:
     @cached_property
     def digest(self) -> str:
         """Content address: equal robots, and only they, have equal digests."""
-        return hashlib.sha256(repr(self).encode()).hexdigest()
+        made_of = (*self.parts, *self.joints, *self.drives, *self.sensors)
+        counts = (len(self.parts), len(self.joints), len(self.drives), len(self.sensors))
+        rest = (self.name, self.wiring, self.world, self.laws, self.free_base, self.start_position_m)
+        more = (self.start_rotation, self.time_step_s, self.lost)
+        text = "".join([repr((counts, rest, more)), *map(_text, made_of)])
+        return hashlib.sha256(text.encode()).hexdigest()
 
     @cached_property
     def noisy(self) -> bool:
@@ -286,6 +291,22 @@ class Robot:
         self.joint_of(part)
         gone = set(self.lost) | set(self.subtree(part))
         return replace(self, lost=tuple(p.name for p in self.parts if p.name in gone))
+
+
+_texts: dict[int, tuple[object, str]] = {}
+TEXTS = 65536
+"""Texts that are kept at most."""
+
+
+def _text(item: object) -> str:
+    """What an immutable part of a robot is, in full. Found once of each object: robots that differ in one share the others."""
+    known = _texts.get(id(item))
+    if known is None:
+        if len(_texts) >= TEXTS:
+            _texts.clear()
+        # The object is kept as well, so that its identity cannot become another's.
+        known = _texts[id(item)] = (item, repr(item))
+    return known[1]
 
 
 def _find(items: tuple[Any, ...], key: str, value: str, what: str) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands, weight_count
 from ee_dist.engines.pybullet.engine import PyBulletEngine
-from ee_dist.robots.model import RobotError
+from ee_dist.robots.model import Law, Robot, RobotError
 from ee_dist.robots.quadruped import quadruped
 
 ROBOT = quadruped()
@@ -28,6 +29,27 @@ def test_nine_parts_eight_hinges_of_45_degrees_four_and_four_sensors():
 def test_equal_robots_have_equal_digests_and_others_do_not():
     assert quadruped().digest == ROBOT.digest == pickle.loads(pickle.dumps(ROBOT)).digest
     assert ROBOT.with_drive("knee_front_left", kp=14.0).digest != ROBOT.digest
+
+
+def test_every_field_counts_in_the_digest():
+    other = {
+        "name": "another",
+        "parts": (replace(ROBOT.parts[0], mass_kg=9.0), *ROBOT.parts[1:]),
+        "joints": ROBOT.joints[::-1],
+        "drives": ROBOT.drives[::-1],
+        "sensors": ROBOT.sensors[::-1],
+        "wiring": replace(ROBOT.wiring, source=ROBOT.wiring.source[::-1]),
+        "world": replace(ROBOT.world, friction=0.1),
+        "laws": (Law("damper", "knee_front_left", (("share", 0.1),)),),
+        "free_base": False,
+        "start_position_m": (0.0, 0.0, 7.0),
+        "start_rotation": (1.0, 0.0, 0.0, 0.0),
+        "time_step_s": 0.5,
+        "lost": ("upper_rear_left",),
+    }
+    assert set(other) == {f.name for f in fields(Robot)}
+    digests = {replace(ROBOT, **{name: value}).digest for name, value in other.items()}
+    assert len(digests - {ROBOT.digest}) == len(other)
 
 
 def test_a_lost_leg_takes_both_its_parts():
