@@ -40,7 +40,7 @@ class DrivePath:
         rows = per_robot(robots, lambda r: np.array([[getattr(d, n) for n in names] for d in r.drives], dtype=float))
         table = np.array(rows).reshape(*shape, len(names))
         self.p = {n: np.ascontiguousarray(table[:, :, i]) for i, n in enumerate(names)}
-        self.present = np.array(per_robot(robots, _present))
+        self.present = np.array(per_robot(robots, _present), dtype=bool).reshape(shape)
         p = self.p
         neutral = {f.name: f.default for f in fields(Drive)}
         self.uses = {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}

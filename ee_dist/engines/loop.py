@@ -14,7 +14,7 @@ from ee_dist.engines.drive import DrivePath
 from ee_dist.engines.drivers import Controllers, scaling
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.sensing import LIFTED, TOUCHING, SensingPath
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Robot, RobotError
 from ee_dist.trials.log import Array, SensorLog
 
 POSE_KINDS = frozenset({"height", "roll", "pitch", "x", "y"})
@@ -149,6 +149,11 @@ class _Channels:
         self.shape = (len(robots), len(first.sensors))
         kinds = [TOUCH if s.kind == "touch" else OF_JOINT.get(s.kind, OF_BASE) for s in first.sensors]
         self.kinds = np.array(kinds, dtype=np.intp)
+        for sensor, kind in zip(first.sensors, kinds, strict=True):
+            if kind < TOUCH and sensor.target not in motor:
+                raise RobotError(
+                    f"sensor {sensor.name!r} shows joint {sensor.target!r}, which no drive moves; there are: {', '.join(motor)}"
+                )
         places = [next(touches) if s.kind == "touch" else motor.get(s.target, 0) for s in first.sensors]
         self.places = np.array(places, dtype=np.intp)
         self.of_base = [(k, s.kind) for k, s in enumerate(first.sensors) if kinds[k] == OF_BASE]

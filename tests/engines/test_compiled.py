@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numba
 import numpy as np
 import pytest
+from engine_robots import no_commands
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ee_dist.engines import compiled as module
 from ee_dist.engines import drive, drivers, loop
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.robots.model import RobotError, Sensor
+from ee_dist.robots.quadruped import quadruped
 
 
 def both(function: Callable[..., None], arguments: list[Any]) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -85,6 +91,16 @@ def test_channels_show_their_joint_or_touch() -> None:
     assert np.array_equal(out[:, [1, 6]], np.where(touch, 1.0, -1.0))
     assert np.array_equal(out[:, 2:5], np.stack([joints[:, 1], speeds[:, 3], torque[:, 0]], axis=1))
     assert (out[:, 5] == 7.0).all()  # of the base: not filled here
+
+
+def test_a_sensor_of_a_joint_without_a_drive_is_said() -> None:
+    """Compiled code does not look whether a place is there."""
+    robot = quadruped()
+    blind = replace(robot, sensors=(*robot.sensors, Sensor("tail", "position", "tail_joint")))
+    with pytest.raises(
+        RobotError, match="'tail' shows joint 'tail_joint', which no drive moves; there are: hip_front_left"
+    ):
+        MuJoCoEngine(threads=1).rollout([Rollout(blind, no_commands(blind), 2)])
 
 
 def test_without_a_folder_to_write_to_a_function_is_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
