@@ -22,7 +22,7 @@ def compiled(function: Function) -> Function:
 
     Without a folder that it may write (beside the module, or the user's own), every process compiles for itself.
     """
-    options: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": False}
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
     try:
         return cast(Function, numba.njit(cache=True, **options)(function))
     except RuntimeError:

@@ -135,8 +135,8 @@ def in_batches(rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]],
     return [logs[i] for i in range(len(rollouts))]
 
 
-OF_JOINT = {"position": 0, "velocity": 1, "torque": 2, "angle": 3}
-TOUCH, OF_BASE = 4, 5
+POSITION, VELOCITY, TORQUE, ANGLE, TOUCH, OF_BASE = range(6)
+OF_JOINT = {"position": POSITION, "velocity": VELOCITY, "torque": TORQUE, "angle": ANGLE}
 
 
 class _Channels:
@@ -150,7 +150,7 @@ class _Channels:
         kinds = [TOUCH if s.kind == "touch" else OF_JOINT.get(s.kind, OF_BASE) for s in first.sensors]
         self.kinds = np.array(kinds, dtype=np.intp)
         for sensor, kind in zip(first.sensors, kinds, strict=True):
-            if kind < TOUCH and sensor.target not in motor:
+            if kind in OF_JOINT.values() and sensor.target not in motor:
                 raise RobotError(
                     f"sensor {sensor.name!r} shows joint {sensor.target!r}, which no drive moves; there are: {', '.join(motor)}"
                 )
@@ -186,15 +186,15 @@ def _fill(
     for k in range(len(kinds)):
         kind, j = kinds[k], places[k]
         for i in range(len(out)):
-            if kind == 0:
+            if kind == POSITION:
                 out[i, k] = joints[i, j]
-            elif kind == 1:
+            elif kind == VELOCITY:
                 out[i, k] = speeds[i, j]
-            elif kind == 2:
+            elif kind == TORQUE:
                 out[i, k] = torque[i, j]
-            elif kind == 3:
+            elif kind == ANGLE:
                 out[i, k] = (joints[i, j] - middle[i, j]) / half[i, j]
-            elif kind == 4:
+            elif kind == TOUCH:
                 out[i, k] = TOUCHING if touch[i, j] else LIFTED
 
 

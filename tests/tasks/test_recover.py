@@ -140,8 +140,9 @@ def test_the_runs_of_a_sweep_go_side_by_side_with_the_same_digests(cli, tiny):
     assert len(digests[0]) == 2
 
 
-def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny):
-    base = ["+scenario=3", *tiny, "budget.compensating_trials=1"]
+@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
+def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny, engine):
+    base = ["+scenario=3", f"engine={engine}", *tiny, "budget.compensating_trials=1"]
     same = [
         ["evaluator=serial"],
         ["evaluator=serial", "evaluator.cache=false", "evaluator.chunk=3"],

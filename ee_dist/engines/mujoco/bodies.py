@@ -12,6 +12,7 @@ from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import Rollout, Truth
 from ee_dist.engines.mujoco.contact import LEAST_FRICTION, contact
 from ee_dist.engines.mujoco.model import OWN, Model, scalar_first
+from ee_dist.engines.per_robot import per_robot
 from ee_dist.trials.log import Array
 
 Index = slice | NDArray[np.intp]
@@ -44,17 +45,14 @@ class Group:
     def _fill(self, members: Sequence[Rollout], threads: int) -> native.Batch:
         """A batch with each robot's own numbers; a field that is the same for all is held once."""
         model = self.model
-        robots = {id(r.model): r.model for r in members}
-        place = {key: k for k, key in enumerate(robots)}
-        own = [model.numbers(robot) for robot in robots.values()]
+        own = per_robot([r.model for r in members], model.numbers)
         model.fill(own[0])
         batch = native.Batch(model.compiled, len(members), min(threads, len(members)))
-        which = [place[id(r.model)] for r in members]
         derived = False
         for k, name in enumerate(OWN):
             values = np.array([numbers[k] for numbers in own])
             if (values != values[0]).any():
-                batch.expand(name)[:] = values[which]
+                batch.expand(name)[:] = values
                 derived = derived or name != "opt.gravity"
         if derived:
             batch.set_const()

@@ -13,6 +13,7 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.engines.loop import in_batches, up_to
 from ee_dist.engines.mujoco.bodies import Group, MuJoCoBodies
 from ee_dist.engines.mujoco.model import Model, structure_key
+from ee_dist.engines.per_robot import per_robot
 from ee_dist.trials.log import SensorLog
 
 _log = logging.getLogger(__name__)
@@ -44,12 +45,9 @@ class MuJoCoEngine:
         self._models.clear()
 
     def _place(self, batch: Sequence[Rollout]) -> MuJoCoBodies:
-        keys: dict[int, Hashable] = {}
         groups: dict[Hashable, list[int]] = {}
-        for i, r in enumerate(batch):
-            if id(r.model) not in keys:
-                keys[id(r.model)] = structure_key(r.model)
-            groups.setdefault(keys[id(r.model)], []).append(i)
+        for i, structure in enumerate(per_robot([r.model for r in batch], structure_key)):
+            groups.setdefault(structure, []).append(i)
         placed = []
         for key, rows in groups.items():
             model = self._model(key, batch[rows[0]])
