@@ -70,7 +70,7 @@ class PassProgress(Observer):
 
     def _say(self, text: str) -> None:
         seconds = time.monotonic() - self.started
-        left = seconds * (self.total - self.done) / self.done if self.done else float("nan")
+        left = seconds * max(self.total - self.done, 0.0) / self.done if self.done else float("nan")
         self.bars.console.print(
             f"[dim]{seconds:6.0f} s[/dim]  {text}  [dim]about {left:.0f} s left[/dim]", highlight=False
         )

@@ -1,0 +1,24 @@
+"""What the terminal says while a run goes on."""
+
+from __future__ import annotations
+
+import io
+
+from rich.console import Console
+
+from ee_dist.recording.records import REPAIR, GenerationRecord
+from ee_dist.tasks.progress import PassProgress
+
+
+def test_a_finished_run_has_nothing_left_to_wait_for() -> None:
+    """Five shares of a pass sum to a little more than the pass: no less than no time is left all the same."""
+    out = io.StringIO()
+    passes, generations = 3, 4
+    with PassProgress(Console(file=out, width=200), {REPAIR: passes}, {REPAIR: 1.0}) as progress:
+        for index in range(passes):
+            progress.pass_started(REPAIR, index, generations)
+            for k in range(generations + 1):
+                progress.generation(GenerationRecord(REPAIR, index, k, 1.0, 0.5, 1, 10, 5))
+    lines = [line for line in out.getvalue().splitlines() if "left" in line]
+    assert len(lines) == passes
+    assert lines[-1].rstrip().endswith("about 0 s left")
