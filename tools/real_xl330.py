@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from real_tables import Page
 
-from ee_dist.discrepancy.candidates import candidate, candidates
-from ee_dist.discrepancy.fit import Fit, Model
-from ee_dist.discrepancy.free_run import FreeRun
-from ee_dist.discrepancy.global_fit import search_all
+from ee_dist.discrepancy.search.candidates import candidate, candidates
+from ee_dist.discrepancy.search.slopes import Fit, Model
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.search.cloud import search_all
 from ee_dist.discrepancy.ladder import Rule, Rung, climb, fit_everything
-from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import ModelFile, read_model, write_model
 from ee_dist.engines.one_joint import OneJointEngine

@@ -23,6 +23,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ee_dist.effects.groups import common, members_of, shared_targets
 from ee_dist.effects.laws import LAWS
 from ee_dist.effects.scales import Range, Ranges
 from ee_dist.robots.model import Robot, RobotError
@@ -84,6 +85,12 @@ class Effect:
     """Whether ``explain`` proposes it by itself."""
     ranges: Ranges | None = None
     """Values worth trying on a robot at a target, for parameters whose scale depends on them."""
+    contains: tuple[str, ...] = ()
+    """Simpler laws that this one becomes for some of its values: it must beat them to be named."""
+
+    def shared(self, robot: Robot) -> tuple[str, ...]:
+        """Groups of joints or sensors that it can act on with one set of values (see groups.py)."""
+        return shared_targets(robot, self.targets(robot))
 
     @property
     def main(self) -> Parameter:
@@ -102,7 +109,13 @@ class Effect:
         return {p.name: p.neutral for p in self.parameters}
 
     def bounds(self, robot: Robot, target: str) -> dict[str, Range]:
-        """(lower, upper) worth trying at this target, by parameter: finite, around neutral, within the hard bounds."""
+        """(lower, upper) worth trying at this target, by parameter: finite, around neutral, within the hard bounds.
+
+        For a group, what is worth trying at every member.
+        """
+        allowed = self.targets(robot)
+        if target not in allowed and (members := members_of(robot, target, allowed)):
+            return common([self.bounds(robot, m) for m in members])
         own = {} if self.ranges is None else self.ranges(robot, target)
         found = {}
         for p in self.parameters:
@@ -115,6 +128,7 @@ class Effect:
     def unit(self, parameter: str, robot: Robot, target: str) -> str:
         """The unit of a parameter at this target: N on a slide where it is N.m on a hinge, or the unit of a channel."""
         unit = self.parameter(parameter).unit
+        target = next(iter(members_of(robot, target, self.targets(robot))), target)
         if unit == "channel":
             return next((s.unit for s in robot.sensors if s.name == target), unit)
         slide = any(j.name == target and j.kind == "slide" for j in robot.joints)
@@ -132,6 +146,11 @@ class Term:
     def as_dict(self) -> dict[str, Any]:
         """{effect, target, <parameter>: value, ...}: the form of a model file."""
         return {"effect": self.effect, "target": self.target, **dict(self.values)}
+
+    @property
+    def name(self) -> str:
+        """``effect@target``, as typed on the command line."""
+        return f"{self.effect}@{self.target}" if self.target else self.effect
 
     def __str__(self) -> str:
         entry = CATALOGUE.get(self.effect)
@@ -161,6 +180,7 @@ def effect(
     reference: str = "",
     searchable: bool = True,
     ranges: Ranges | None = None,
+    contains: tuple[str, ...] = (),
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
@@ -177,7 +197,7 @@ def effect(
             if ranges is None and not (math.isfinite(p.lower) and math.isfinite(p.upper)):
                 raise EffectError(f"{name}: {p.name} has no finite bounds, so the effect must give ranges")
         _registry[name] = Effect(
-            name, family, transform, targets, parameters, physics, signature, reference, searchable, ranges
+            name, family, transform, targets, parameters, physics, signature, reference, searchable, ranges, contains
         )
         return transform
 
@@ -223,13 +243,15 @@ def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
     for t in hypothesis:
         entry = find(t.effect)
         allowed = entry.targets(robot)
-        if t.target not in allowed:
+        places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
+        if not places:
             near = difflib.get_close_matches(t.target, allowed, n=3, cutoff=0.4) or allowed
             raise EffectError(
                 f"{t.effect} cannot act on {t.target!r} of {robot.name}; it can act on: {', '.join(near)}"
             )
         try:
-            robot = entry.transform(robot, t.target, dict(t.values))
+            for place in places:
+                robot = entry.transform(robot, place, dict(t.values))
         except RobotError as error:
             raise EffectError(f"{t}: {error}") from error
     return robot

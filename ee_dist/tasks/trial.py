@@ -14,9 +14,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ee_dist.discrepancy.candidates import candidate
 from ee_dist.discrepancy.draw import draw
-from ee_dist.discrepancy.measured import driver_of
+from ee_dist.discrepancy.measured_trial import driver_of
+from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, apply, find, from_dict, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.physical import PhysicalRobot

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
 
-from ee_dist.discrepancy.candidates import parse
+from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.ladder import climb, parted_most
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.trials.log import Array

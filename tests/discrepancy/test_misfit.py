@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ee_dist.discrepancy.misfit import leftovers
+from ee_dist.discrepancy.evidence.left import leftovers
 
 TRIALS, CHANNELS, PER = 6, 20, 15
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
-from ee_dist.discrepancy.candidates import candidates
-from ee_dist.discrepancy.judge import needed
-from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
-from ee_dist.discrepancy.misfit import leftovers
-from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.search.candidates import candidates
+from ee_dist.discrepancy.evidence.judge import needed
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
+from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.screen import screen
-from ee_dist.discrepancy.unmodelled import from_entries, of_trial, to_entries, unmodelled_by
+from ee_dist.discrepancy.search.screen import screen
+from ee_dist.discrepancy.ways.open_loop.unmodelled import from_entries, of_trial, to_entries, unmodelled_by
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.contract import Engine
 from ee_dist.engines.mujoco.engine import MuJoCoEngine

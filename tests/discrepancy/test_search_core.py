@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from linear_problem import ROBOT, Linear
 
-from ee_dist.discrepancy.candidates import Candidate, candidate, candidates, known, parse
+from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates, known, parse
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, Effort, explain
-from ee_dist.discrepancy.folds import bootstrap, halves
+from ee_dist.discrepancy.evidence.holdout import bootstrap, halves
 from ee_dist.discrepancy.improve import WORTH, improve, worth
-from ee_dist.discrepancy.misfit import leftovers
-from ee_dist.discrepancy.screen import screen
+from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.search.screen import screen
 from ee_dist.effects.catalogue import EffectError, Hypothesis, term
 from ee_dist.trials.log import Array
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.candidates import candidates
+from ee_dist.discrepancy.search.candidates import candidates
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Effort, explain
-from ee_dist.discrepancy.locate import compare
-from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
-from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.separate import ENOUGH, proposals
+from ee_dist.discrepancy.plan import ENOUGH, proposals
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.evaluation.cache import CachedEvaluator
