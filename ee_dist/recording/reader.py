@@ -8,7 +8,7 @@ from pathlib import Path
 from google.protobuf.message import DecodeError
 
 from ee_dist.recording import codec, schemas, topics
-from ee_dist.recording.contents import Contents, read_contents
+from ee_dist.recording.contents import Contents, damage, read_contents
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.records import HARDWARE, GenerationRecord, HypothesisRecord, RunRecord, TrialRecord
 from ee_dist.robots.serial import RobotFormatError, robot_from_json
@@ -28,12 +28,14 @@ def read_run(path: str | Path) -> RunRecord:
 def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
     """The run, and its records in the order in which they were written. Raises RecordingError as ``read_run`` does."""
     contents, metadata, status = _read(path)
+    if contents.damaged:
+        raise damage(path, f"attachment {contents.damaged[0]!r:.60}")
     robot = contents.attachments.pop(topics.ROBOT_FILE, None)
     if robot is None:
         raise RecordingError(f"{path}: cut off before its robot was recorded; nothing can be recovered")
     try:
         run = RunRecord(robot_from_json(robot), metadata, contents.attachments)
-    except (RobotFormatError, UnicodeError) as error:
+    except (RobotFormatError, UnicodeError, RecursionError) as error:
         raise RecordingError(f"{path}: the attachment {topics.ROBOT_FILE} is not a robot of ours: {error}") from error
     records = list(_records(path, contents))
     for record in records:
@@ -48,7 +50,10 @@ def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
 
 
 def read_logs(path: str | Path) -> list[TrialRecord]:
-    """The hardware trials of a recording, in the order of the file. Raises RecordingError if there is none."""
+    """The hardware trials of a recording, in the order of the file. Raises RecordingError if there is none.
+
+    They have checksums of their own: a damaged robot or settings beside them do no harm here.
+    """
     path = Path(path)
     contents = _read(path)[0]
     found = [r for r in _records(path, contents) if isinstance(r, TrialRecord) and r.source == HARDWARE]

@@ -34,6 +34,8 @@ SOURCES = (HARDWARE, PREDICTION)
 PHASES = (REPAIR, DIAGNOSIS)
 
 FORMAT_RECORD, RUN_RECORD, STATUS_RECORD = "ee_dist", "run", "status"
+CHECKSUM = "crc32"
+"""Entry of a metadata record: checksum of the others, since MCAP has one for attachments and chunks alone."""
 ROBOT_FILE = "robot.json"
 FLOOR_FRAME = "floor"
 HYPOTHESIS_TOPIC = f"/{DIAGNOSIS}/hypothesis"

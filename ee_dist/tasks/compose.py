@@ -11,7 +11,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.config import Config, ConfigError, check_keys, groups_of, one_of
+from ee_dist.tasks.config import Config, ConfigError, Handling, check_keys, groups_of, one_of
 
 TASKS = ("recover", "view", "online", "study", "trial", "compare", "explain", "improve", "reveal", "import")
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([0-9, ]+)$")
@@ -53,11 +53,20 @@ def task_module(name: str) -> ModuleType:
     return importlib.import_module(f"ee_dist.tasks.{name}_" if name == "import" else f"ee_dist.tasks.{name}")
 
 
+_HANDLING = Handling.__dataclass_fields__
+
+
+def handling(composed: DictConfig) -> Handling:
+    """How the folder of the run is to be treated. Raises ConfigError."""
+    found: Handling = _typed(Handling, OmegaConf.create({k: composed[k] for k in _HANDLING if k in composed}), "")
+    return found
+
+
 def settings(composed: DictConfig) -> tuple[Config, ModuleType, Any]:
     """Checked settings, the module of the task and its options. Raises ConfigError in one line."""
-    tree = {str(k): v for k, v in composed.items() if k != "hydra"}
+    tree = {str(k): v for k, v in composed.items() if k != "hydra" and k not in _HANDLING}
     task = tree.pop("task")
-    check_keys("", tree, Config)
+    check_keys("", tree, Config, tuple(_HANDLING))
     for name, kind in groups_of(Config).items():
         if isinstance(tree.get(name), DictConfig):
             check_keys(name, tree[name], kind)

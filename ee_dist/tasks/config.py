@@ -159,6 +159,13 @@ class Config:
             raise ConfigError(f"noise={self.noise}: must be a share of the channels' range, from 0 to 1")
 
 
+@dataclass
+class Handling:
+    """How the folder of a run is treated. Decides nothing of the result, so it is not part of the recorded settings."""
+
+    overwrite: bool = False
+
+
 def unknown_key(owner: str, key: str, known: tuple[str, ...], otherwise: str = "") -> ConfigError:
     """``otherwise`` is said where no name is near; without it all are listed."""
     near = difflib.get_close_matches(key, known, n=3, cutoff=0.6)
@@ -177,7 +184,7 @@ def groups_of(kind: Any) -> dict[str, Any]:
 def known_settings(kind: Any = Config, prefix: str = "") -> tuple[str, ...]:
     """Names of all settings but those of a task, with their owners: ``seed``, ``budget.population``."""
     groups = groups_of(kind)
-    names: list[str] = []
+    names = [f.name for f in fields(Handling)] if kind is Config else []
     for f in fields(kind):
         names.append(prefix + f.name)
         if f.name in groups:
@@ -185,9 +192,9 @@ def known_settings(kind: Any = Config, prefix: str = "") -> tuple[str, ...]:
     return tuple(names)
 
 
-def check_keys(owner: str, given: Any, kind: type) -> None:
-    """Raise ConfigError for keys that the dataclass does not have."""
-    known = tuple(f.name for f in fields(kind))
+def check_keys(owner: str, given: Any, kind: type, others: tuple[str, ...] = ()) -> None:
+    """Raise ConfigError for keys that the dataclass does not have; ``others`` are known beside its own."""
+    known = (*(f.name for f in fields(kind)), *others)
     for key in given:
         if str(key) not in known:
             raise unknown_key(owner, str(key), known)

@@ -16,7 +16,6 @@ from rich.table import Table
 
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.evaluation.physical import PhysicalRobot
-from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, REPAIR
 from ee_dist.recording.writer import RunWriter
 from ee_dist.recovery.loop import Recovery, recover
@@ -26,6 +25,7 @@ from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.observers import Recorder
 from ee_dist.tasks.outcome import ResultDigest, Score, score
 from ee_dist.tasks.progress import PassProgress
+from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.summary import (
     Stopwatch,
     config_digest,
@@ -91,10 +91,6 @@ def run(config: Config, options: Options, out: Path) -> None:
         writer.finish({"result_digest": digest.hex, "truth": json.dumps([t.as_dict() for t in truth])})
     counts = evaluator.counts
     hardware.close()
-    recording = out / "recovery.rrd"
-    from ee_dist.viewing.rerun_scene import write_rrd
-
-    write_rrd(read_run(path), recording)
     final = score(result.intact_m, result.trials_m, result.hypotheses[-1], truth)
     summary = write_summary(out, "recover", config, options, watch, digest.hex, {
         "scenario": scenario.number,
@@ -114,6 +110,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "evaluations": {"asked": counts.asked, "simulated": counts.simulated, "steps": counts.steps,
                         "asked_steps": counts.asked_steps},
     })  # fmt: skip
+    recording = drawn(path)
     wall, _ = watch.read()
     _print(console, result, truth, final)
     saved = 1 - counts.simulated / max(counts.asked, 1)

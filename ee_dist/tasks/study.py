@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections import defaultdict
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from rich.table import Table
 from scipy.stats import mannwhitneyu
 
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.folder import write_whole
 from ee_dist.tasks.outcome import RESTORED
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.viewing.study_figures import write_figures
@@ -39,16 +41,16 @@ def run(config: Config, options: Options, out: Path) -> None:
         raise ConfigError("log=: which runs? name the folder of a sweep, such as log=logs/recover/..._sweep")
     runs = load(Path(config.log))
     rows = [row(r) for r in runs]
-    with (out / "study.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(rows)
-    text = markdown(rows)
-    (out / "study.md").write_text(text, encoding="utf-8")
-    write_figures(runs, out / "figures.html")
+    table = io.StringIO(newline="")
+    writer = csv.DictWriter(table, COLUMNS)
+    writer.writeheader()
+    writer.writerows(rows)
+    write_whole(out / "study.csv", table.getvalue())
+    write_whole(out / "study.md", markdown(rows))
     _print(console, rows)
     totals = total(rows)
     write_summary(out, "study", config, options, watch, digest_of(rows), {"runs": len(rows), "totals": totals})
+    write_figures(runs, out / "figures.html")
     for name in ("study.csv", "study.md", "figures.html"):
         console.print(f"  {out / name}", highlight=False, soft_wrap=True)
 
