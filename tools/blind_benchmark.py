@@ -36,7 +36,8 @@ from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain, gained_unt
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
-from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, unmodelled_by
+from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
+from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.contract import Engine, EngineError
 from ee_dist.evaluation.cache import CachedEvaluator
@@ -174,11 +175,11 @@ class Bench:
         for judged in x.tied:
             if drawn and judged.name == drawn[0].name and drawn[0].size:
                 at = drawn[0].shares(dict(hidden[0].values))
-                found.value_error = float(abs(judged.u[0] - at[0]))
+                found.value_error = float(abs(judged.own[0] - at[0]))
 
     def _two(self, found: Case, problem: OpenLoop, names: list[str]) -> None:
         result = improve(problem, self.pool, self.before, None, most=4)
-        found.named = [f"{t.effect}@{t.target}" if t.target else t.effect for t in result.terms]
+        found.named = [t.name for t in result.terms]
         errors = [r.error_heldout for r in result.ladder]
         found.within = set(names) <= set(found.named)
         found.first = found.within and len(found.named) == 2

@@ -7,7 +7,7 @@ the model has already and judge them on data that the fits had not seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -55,7 +55,7 @@ class Current:
     """The model so far: free parts and their values u on top of what the search has fixed."""
 
     parts: tuple[Candidate, ...] = ()
-    u: Array = np.zeros(0)
+    u: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def hypothesis(self) -> Hypothesis:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands, Driver, Network
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array, SensorLog, State
+
+SMOOTHED = 15
+"""Rows that a parabola is laid through to smooth a noisy speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +63,13 @@ def start_of(log: SensorLog, robot: Robot) -> State | None:
 
 
 def speeds_of(log: SensorLog, robot: Robot) -> Array:
-    """Measured speeds (T, M); differences of the positions where a joint has no sensor for it."""
+    """Measured speeds (T, M); differences of the positions where a joint has no sensor for it. Of a sensor that is known to
+    be noisy, a smooth course: a start that is off by the noise of one row goes on for seconds."""
     assert log.joints is not None
     out = np.gradient(log.joints, float(np.median(np.diff(log.times_s))), axis=0)
     for k, motor in enumerate(robot.motor_names):
         for c, sensor in enumerate(robot.sensors):
             if sensor.kind == "velocity" and sensor.target == motor:
-                out[:, k] = log.sensors[:, c]
+                seen = log.sensors[:, c]
+                out[:, k] = savgol_filter(seen, SMOOTHED, 2) if sensor.noise and len(seen) > SMOOTHED else seen
     return out

@@ -77,6 +77,8 @@ class Problem(ABC):
     natural_unit: str = "standard deviations"
     families: frozenset[str] = frozenset(FAMILIES)
     """Families of effects that can show in this way of comparing."""
+    switches: bool = True
+    """Whether effects without a parameter (a part that is lost) can be told in this way of comparing."""
     rugged: bool = False
     """Whether the error jumps with its parameters, so that a fit must search rather than follow a slope."""
     effort: float = 1.0

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
-from ee_dist.discrepancy.search.candidates import candidates
+from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.words import explain_account
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import Config
@@ -44,7 +44,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     way = way_of(measured, options.by)
     with SearchProgress(console) as progress:
         problem = way.make(measured, config)
-        pool = candidates(measured.robot, options.without, options.only or None, problem.families)
+        pool = pool_of(problem, options.without, options.only)
         count = len(measured.trials)
         console.print(
             f"{count} trial{'s' if count > 1 else ''} of {measured.robot.name}, {len(pool)} candidate explanations, "

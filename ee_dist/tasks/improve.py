@@ -12,7 +12,8 @@ from rich.console import Console
 
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, Improvement, improve
-from ee_dist.discrepancy.search.candidates import Candidate, candidates, parse, shared
+from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
+from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Progress
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
@@ -57,7 +58,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     with SearchProgress(console) as progress:
         calibrating = open_loop(measured, config) if options.calibrate else None
         problem = calibrating or way.make(measured, config)
-        pool = candidates(measured.robot, options.without, options.only or None, problem.families)
+        pool = pool_of(problem, options.without, options.only)
         calibration = None
         found = improve(
             problem,

@@ -85,7 +85,7 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
     """What speaks for it, the files, and last the finding in one sentence with the command to type next."""
     for line in account.lines:
         console.print(line, highlight=False, markup=False)
-    for file in sorted(p.name for p in out.iterdir() if p.is_file()):
+    for file in sorted(p.name for p in out.iterdir() if p.is_file() and not p.name.startswith(".")):
         console.print(f"  {os.path.relpath(out / file)}", highlight=False, markup=False, soft_wrap=True)
     console.print(account.headline, highlight=False, markup=False, style="bold")
     if following:

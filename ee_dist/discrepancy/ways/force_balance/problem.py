@@ -77,18 +77,28 @@ class Motion:
 
 def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
     """Raises MeasurementError where the log lacks positions or torques, or is too short."""
-    if log.joints is None or log.torques is None:
-        what = "joint positions" if log.joints is None else "torques of the drives"
+    joints = log.joints if log.joints is not None else _channels(log, robot, "position")
+    torques = log.torques if log.torques is not None else _channels(log, robot, "torque")
+    if joints is None or torques is None:
+        what = "joint positions" if joints is None else "torques of the drives"
         raise MeasurementError(f"the log of {robot.name} has no {what}: a balance of forces needs both")
     if len(log) < processing.drop_rows + 10 * processing.keep_every:
         raise MeasurementError(f"the log of {robot.name} has only {len(log)} rows: too few for the filters")
     dt = float(np.median(np.diff(log.times_s)))
     smooth = processing.filter_for(dt)
-    position = np.stack([smooth(q, dt) for q in log.joints.T], axis=1)
+    position = np.stack([smooth(q, dt) for q in joints.T], axis=1)
     speed = np.gradient(position, dt, axis=0)
     acceleration = np.gradient(speed, dt, axis=0)
     cut = slice(processing.drop_rows, None)
-    return Motion(position[cut], speed[cut], acceleration[cut], np.array(log.torques[cut]))
+    return Motion(position[cut], speed[cut], acceleration[cut], np.array(torques[cut]))
+
+
+def _channels(log: SensorLog, robot: Robot, kind: str) -> Array | None:
+    """(T, M) what the sensors of one kind read, if every drive has one."""
+    of = {s.target: k for k, s in enumerate(robot.sensors) if s.kind == kind}
+    if not set(robot.motor_names) <= set(of):
+        return None
+    return np.array(log.sensors[:, [of[m] for m in robot.motor_names]])
 
 
 class ForceBalance(Problem):
@@ -100,6 +110,7 @@ class ForceBalance(Problem):
 
     way = "force_balance"
     families = frozenset({"body", "drive", "world"})
+    switches = False
     natural_name = "relative force error"
     natural_unit = "1"
 

@@ -59,6 +59,7 @@ class FreeRun(Problem):
 
     way = "free_run"
     families = frozenset({"body", "drive", "world"})
+    switches = False
     rugged = True
     """Errors jump where a joint sticks or slips: fits search rather than follow a slope."""
     natural_name = "mean absolute position error"
