@@ -30,13 +30,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 
-from ee_dist.discrepancy.search.candidates import Candidate, candidates, shared
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain, gained_untouched
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
-from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.discrepancy.search.candidates import Candidate, candidates, shared
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.contract import Engine, EngineError

@@ -5,16 +5,16 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from ee_dist.discrepancy.ladder import Rule, climb, cross_fit, fit_everything, folds_of
 from real_tables import Page
 
-from ee_dist.discrepancy.search.candidates import candidate, candidates
-from ee_dist.discrepancy.ways.free_run.closed_loop import closed_loop
-from ee_dist.discrepancy.search.slopes import Fit, Model
-from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
-from ee_dist.discrepancy.ladder import Rule, climb, cross_fit, fit_everything, folds_of
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.candidates import candidate, candidates
+from ee_dist.discrepancy.search.slopes import Fit, Model
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.force_balance.ripple import describe, remains
+from ee_dist.discrepancy.ways.free_run.closed_loop import closed_loop
 from ee_dist.effects.catalogue import apply
 from ee_dist.effects.model_file import ModelFile, read_model, write_model
 from ee_dist.engines.one_joint import OneJointEngine

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from ee_dist.discrepancy.ladder import Rule, Rung, climb, fit_everything
 from real_tables import Page
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate, candidates
+from ee_dist.discrepancy.search.cloud import search_all
 from ee_dist.discrepancy.search.slopes import Fit, Model
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.search.cloud import search_all
-from ee_dist.discrepancy.ladder import Rule, Rung, climb, fit_everything
-from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import ModelFile, read_model, write_model
 from ee_dist.engines.one_joint import OneJointEngine

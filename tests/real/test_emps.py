@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ee_dist.discrepancy.ladder import Rule, climb, fit_everything
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate, candidates
-from ee_dist.discrepancy.ways.free_run.closed_loop import closed_loop
 from ee_dist.discrepancy.search.slopes import Model
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
-from ee_dist.discrepancy.ladder import Rule, climb, fit_everything
-from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.ways.force_balance.ripple import remains
+from ee_dist.discrepancy.ways.free_run.closed_loop import closed_loop
 from ee_dist.effects.catalogue import apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.engines.one_joint import OneJointEngine

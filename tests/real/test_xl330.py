@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.cloud import search_all
 from ee_dist.discrepancy.search.slopes import Model
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.search.cloud import search_all
-from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.effects.model_file import read_model
 from ee_dist.engines.one_joint import OneJointEngine

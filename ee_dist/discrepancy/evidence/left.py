@@ -64,6 +64,8 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
             sd = math.sqrt(2.0) * math.sqrt(max(float((mean_floor[:, c] ** 2).sum()), 1.0)) + events
             sd += VARIES * bias[c]
             slow_z = (slow[:, c].sum() - mean_floor[:, c].sum() - bias[c]) / sd if windows else 0.0
+            if max(quick_z, slow_z) <= limit:
+                continue
             # A sum of few squares is far from normal: two windows exceed six of its standard deviations once in 500 times.
             quick_z = min(quick_z, _rarity(energy[c], floor[c] / count[c], count[c]))
             slow_z = min(slow_z, _rarity(slow[:, c].sum(), mean_floor[:, c].sum() / max(windows, 1.0), windows))

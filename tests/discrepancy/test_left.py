@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
+from linear_problem import Linear
 
 from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.problem import Layout
 
 TRIALS, CHANNELS, PER = 6, 20, 15
 
 
-def problem() -> SimpleNamespace:
+def problem(known: float = 0.0) -> Linear:
     """Trials of 2 to 7 windows: in short ones a sum of squares is far from normal."""
     trial_of_segment = np.repeat(np.arange(TRIALS), np.arange(TRIALS) + 2)
     segments = len(trial_of_segment)
-    return SimpleNamespace(
-        segments=range(segments),
-        channels=[f"channel {c}" for c in range(CHANNELS)],
-        trials=[f"trial {k}" for k in range(TRIALS)],
+    size = segments * CHANNELS * PER
+    layout = Layout(
+        segments=tuple(f"window {k}" for k in range(segments)),
         trial_of_segment=trial_of_segment,
         segment_of=np.repeat(np.arange(segments), CHANNELS * PER),
         channel_of=np.tile(np.repeat(np.arange(CHANNELS), PER), segments),
-        floor=np.ones(segments * CHANNELS * PER),
+        time_s=np.zeros(size),
+        reading=np.ones(size, dtype=bool),
+        floor=np.full(size, 1.0 + known),
+        known=np.full(size, known),
+        channels=tuple(f"channel {c}" for c in range(CHANNELS)),
+        units=("1",) * CHANNELS,
+        joint_of_channel=(None,) * CHANNELS,
     )
+    found = Linear(())
+    found.layout = layout
+    found.measured = tuple(MeasuredTrial(f"trial {k}", found.measured[0].log) for k in range(TRIALS))
+    return found
 
 
 def test_noise_alone_raises_no_alarm_in_two_hundred_robots() -> None:
@@ -43,9 +53,7 @@ def test_a_small_steady_offset_and_a_burst_are_found_where_they_are() -> None:
 
 
 def test_what_calibration_left_is_no_news_but_much_more_of_it_is() -> None:
-    p = problem()
-    p.known = np.full(len(p.floor), 0.5)
-    p.floor = p.floor + p.known
+    p = problem(known=0.5)
     rng = np.random.default_rng(2)
     cell = p.segment_of * CHANNELS + p.channel_of
     steady = rng.standard_normal(cell.max() + 1)[cell]
