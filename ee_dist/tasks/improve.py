@@ -14,7 +14,7 @@ from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, Improvement, improve
 from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
 from ee_dist.discrepancy.search.pool import pool_of
-from ee_dist.discrepancy.search.search import Progress
+from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import to_entries
@@ -56,20 +56,13 @@ def run(config: Config, options: Options, out: Path) -> None:
     if options.calibrate and way.name != OpenLoop.way:
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
     with SearchProgress(console) as progress:
-        calibrating = open_loop(measured, config) if options.calibrate else None
-        problem = calibrating or way.make(measured, config)
+        problem = way.make(measured, config)
         pool = pool_of(problem, options.without, options.only)
         calibration = None
-        found = improve(
-            problem,
-            shared(pool, measured.robot) if options.calibrate else pool,
-            measured.model,
-            wanted,
-            most=options.most,
-            progress=progress,
-        )
-        if calibrating:
-            calibration = calibrated(calibrating, measured, config, found, pool, progress)
+        if options.calibrate:
+            found, calibration = calibrated(measured, config, pool, wanted, options.most, progress)
+        else:
+            found = improve(problem, pool, measured.model, wanted, most=options.most, progress=progress)
     account = improve_account(problem, found)
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
@@ -108,18 +101,19 @@ def effects_of(asked: Any, robot: Robot) -> list[Candidate] | None:
 
 
 def calibrated(
-    problem: OpenLoop,
     measured: Measurements,
     config: Config,
-    found: Improvement,
     pool: list[Candidate],
-    progress: Progress,
-) -> dict[str, Any]:
-    """What the calibrated model still leaves on each channel in each trial beyond noise, and how much of that an effect
-    takes off although nothing is wrong."""
-    robot = measured.robot
+    wanted: list[Candidate] | None = None,
+    most: int = MOST,
+    progress: Progress = quiet,
+) -> tuple[Improvement, dict[str, Any]]:
+    """The model of an untouched robot, and what goes into a file beside it: what it still leaves on each channel in each
+    trial beyond noise, and how much of that an effect takes off although nothing is wrong."""
+    robot, problem = measured.robot, open_loop(measured, config)
+    found = improve(problem, shared(pool, robot), measured.model, wanted, most=most, progress=progress)
     unmodelled = unmodelled_by(problem, found.residual)
     again = open_loop(replace(measured, unmodelled=unmodelled, model=found.terms), config)
     gained = gained_untouched(explain(again, pool, found.terms, progress=progress))
     entries = to_entries(unmodelled, robot.sensor_names, [s.unit for s in robot.sensors])
-    return {"way": OpenLoop.way, "gained": gained, "unmodelled": entries}
+    return found, {"way": OpenLoop.way, "gained": gained, "unmodelled": entries}
