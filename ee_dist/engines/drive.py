@@ -1,6 +1,7 @@
-"""The drive path: from commanded position to joint torque, for a whole batch at once and the same for every engine.
+"""The drive path: from command to joint torque, for a whole batch at once and the same for every engine.
 
-    command -> delay -> gain -> controller (deadband, zero offset) -> motor (torque limit, back-EMF, strength, supply)
+    command -> delay -> gain -> controller (of position, with deadband and zero offset, of speed, or none)
+            -> motor (torque limit, back-EMF, strength, supply)
             -> transmission (backlash, compliance) -> joint (spring, offset, a user's own laws, friction, brake, stops)
 
 Each stage runs only if some row of the batch needs it, and a row at neutral values passes through it unchanged, bit
@@ -21,7 +22,7 @@ from ee_dist.engines.friction import Friction
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.transmission import Transmission
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
-from ee_dist.robots.model import Drive, Robot
+from ee_dist.robots.model import COMMANDS, DRIVE_NUMBERS, Drive, Robot
 from ee_dist.trials.log import Array
 
 __all__ = ["LAWS", "DrivePath", "LawContext", "LawFunction", "drive_law"]
@@ -36,7 +37,7 @@ class DrivePath:
     def __init__(self, robots: Sequence[Robot], time_step_s: float) -> None:
         self.dt = time_step_s
         shape = (len(robots), len(robots[0].drives))
-        names = [f.name for f in fields(Drive) if f.name != "joint"]
+        names = list(DRIVE_NUMBERS)
         rows = per_robot(robots, lambda r: np.array([[getattr(d, n) for n in names] for d in r.drives], dtype=float))
         table = np.array(rows).reshape(*shape, len(names))
         self.p = {n: np.ascontiguousarray(table[:, :, i]) for i, n in enumerate(names)}
@@ -44,7 +45,11 @@ class DrivePath:
         p = self.p
         neutral = {f.name: f.default for f in fields(Drive)}
         self.uses = {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}
-        own_emf = np.where(np.isfinite(p["speed_limit"]), p["torque_limit"] / p["speed_limit"], 0.0)
+        kinds = per_robot(robots, lambda r: [COMMANDS.index(d.command) for d in r.drives])
+        self.kind = np.array(kinds, dtype=np.intp).reshape(shape)
+        # A current controller makes up for back-EMF.
+        by_voltage = np.isfinite(p["speed_limit"]) & (self.kind <= SPEED)
+        own_emf = np.where(by_voltage, p["torque_limit"] / p["speed_limit"], 0.0)
         integral_limit = np.divide(p["torque_limit"], p["ki"], out=np.zeros(shape), where=p["ki"] > 0) * 0.25
         derived = {"own_emf": own_emf, "integral_limit": integral_limit}
         self.motor = np.stack([derived[n] if n in derived else p[n] for n in MOTOR])
@@ -52,7 +57,8 @@ class DrivePath:
         self.integral = np.zeros(shape)
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
-        self.all_torque = np.maximum(p["torque_limit"].sum(axis=1, keepdims=True), 1e-300)
+        limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
+        self.all_torque = np.maximum(np.where(limited, p["torque_limit"], 0.0).sum(axis=1, keepdims=True), 1e-300)
         self.last_active = np.zeros(shape)
         self._prepare_delay(shape)
         self._prepare_joints(robots, shape)
@@ -118,7 +124,7 @@ class DrivePath:
         supply_v: Array | None = None,
         enabled: Array | None = None,
     ) -> Array:
-        """Joint torques (B, M) from commanded positions, joint positions and speeds, all (B, M).
+        """Joint torques (B, M) from commands (of position, speed or torque), joint positions and speeds, all (B, M).
 
         ``supply_v`` (B, 1) is the measured supply. ``enabled``, (B, 1) or (B, M), is 0 where the motor's circuit is
         open: no torque and no back-EMF; what sits on the joint (friction, spring, stops) stays.
@@ -182,7 +188,7 @@ class DrivePath:
         active = np.empty(shape)
         stiffness, damping = (active, active) if self.transmission is None else (np.empty(shape), np.empty(shape))
         _drive(
-            self.motor, wanted, position, speed, scale, closed, left, self.dt, self.transmission is not None,
+            self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, self.transmission is not None,
             self.integral, self.last_active, active, stiffness, damping,
         )  # fmt: skip
         return active, stiffness, damping
@@ -190,10 +196,12 @@ class DrivePath:
 
 MOTOR = ("kp", "ki", "kd", "zero_offset", "deadband", "torque_limit", "strength", "own_emf", "integral_limit")
 """Rows of the table that ``_drive`` reads, in this order."""
+POSITION, SPEED, TORQUE, NONE = range(len(COMMANDS))
 
 
 @compiled
 def _drive(
+    kind: NDArray[np.intp],
     motor: Array,
     wanted: Array,
     position: Array,
@@ -209,8 +217,8 @@ def _drive(
     stiffness: Array,
     damping: Array,
 ) -> None:
-    """Controller and motor of every joint. ``motor`` (len(MOTOR), B, M); the others (B, M), of which those from
-    ``integral`` on are written.
+    """Controller and motor of every joint. ``kind`` (B, M) is the place in COMMANDS, ``motor`` (len(MOTOR), B, M); the
+    others (B, M), of which those from ``integral`` on are written.
 
     ``scale`` is the supply over the nominal one, ``closed`` whether the circuit is, ``left`` what the sag leaves.
     """
@@ -218,11 +226,21 @@ def _drive(
     torque_limit, strength, own_emf, integral_limit = motor[5], motor[6], motor[7], motor[8]
     for i in range(active.shape[0]):
         for j in range(active.shape[1]):
-            error = wanted[i, j] - position[i, j] - zero_offset[i, j]
-            if deadband[i, j] > 0.0:
-                error = error - _within(error, deadband[i, j])
-            asked = kp[i, j] * error - kd[i, j] * speed[i, j]
-            if ki[i, j] != 0.0:
+            how = kind[i, j]
+            stiff, damped, error = kp[i, j], kd[i, j], 0.0
+            if how == POSITION:
+                error = wanted[i, j] - position[i, j] - zero_offset[i, j]
+                if deadband[i, j] > 0.0:
+                    error = error - _within(error, deadband[i, j])
+                asked = kp[i, j] * error - kd[i, j] * speed[i, j]
+            elif how == SPEED:
+                error = wanted[i, j] - speed[i, j]
+                asked = kp[i, j] * error
+                stiff, damped = 0.0, kp[i, j]
+            else:
+                asked = wanted[i, j] if how == TORQUE else 0.0
+                stiff, damped = 0.0, 0.0
+            if ki[i, j] != 0.0 and how <= SPEED:
                 integral[i, j] = _within(integral[i, j] + error * dt, integral_limit[i, j]) * closed[i, j]
                 asked = asked + ki[i, j] * integral[i, j]
             torque = _within(asked, torque_limit[i, j]) * scale[i, j] * closed[i, j]
@@ -232,8 +250,8 @@ def _drive(
             if elastic:
                 free = 1.0 if abs(asked) < torque_limit[i, j] else 0.0
                 free = free * (scale[i, j] * left[i, j]) * closed[i, j]
-                stiffness[i, j] = kp[i, j] * free * strength[i, j]
-                damping[i, j] = (kd[i, j] * free + back_emf) * strength[i, j]
+                stiffness[i, j] = stiff * free * strength[i, j]
+                damping[i, j] = (damped * free + back_emf) * strength[i, j]
 
 
 @compiled

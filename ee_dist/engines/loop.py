@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import Bodies, Rollout, Truth
 from ee_dist.engines.drive import DrivePath
-from ee_dist.engines.drivers import Controllers, scaling
+from ee_dist.engines.drivers import Controllers, command_scaling, scaling
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.sensing import LIFTED, TOUCHING, SensingPath
 from ee_dist.robots.model import Robot, RobotError
@@ -49,7 +49,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     drive = DrivePath(robots, dt)
     sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
     scales = per_robot(robots, scaling)
-    control = Controllers(robots, [r.driver for r in rollouts], scales, steps)
+    control = Controllers(robots, [r.driver for r in rollouts], per_robot(robots, command_scaling), steps)
     truth_to_channels = _Channels(robots, scales)
     force = _Force(robots)
     supply = None if rollouts[0].supply_v is None else np.stack([_held(r.supply_v, steps) for r in rollouts])

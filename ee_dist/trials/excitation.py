@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import command_span
 from ee_dist.trials.log import Array
 
 RISE_S = 0.5
@@ -74,9 +75,9 @@ class Excitation:
         return gait_weights(robot, self.amplitude, self.seed) if self.kind == "gait" else None
 
     def commands(self, robot: Robot) -> Array:
-        """Planned positions (T, M) in rad (m for a slide), within the joints' limits. Not for a gait."""
+        """Planned commands (T, M) in the units of the drives, positions within the joints' limits. Not for a gait."""
         t = np.arange(self.steps(robot)) * robot.time_step_s
-        limits = np.array([(robot.joint(d.joint).lower, robot.joint(d.joint).upper) for d in robot.drives])
+        limits = np.array([command_span(robot, d) for d in robot.drives])
         middle, half = limits.mean(axis=1), (limits[:, 1] - limits[:, 0]) / 2
         shape = _SHAPES[self.kind](t, len(middle), np.random.default_rng([self.seed, len(self.kind)]))
         rise = np.minimum(t / RISE_S, 1.0)[:, None]

@@ -82,7 +82,7 @@ class Model:
         m = self.compiled
         self._scratch = mujoco.MjData(m)
         parts = [p.name for p in robot.present_parts]
-        self.bodies = np.array([m.body(name).id for name in parts])
+        self.bodies = np.array([m.body(_body(name)).id for name in parts])
         self.root = int(self.bodies[0])
         moving = {j.name for j in robot.present_joints if j.kind != "fixed"}
         self.motors = [k for k, name in enumerate(robot.motor_names) if name in moving]
@@ -134,13 +134,13 @@ def _spec(robot: Robot) -> Any:
         joint = carried_by.get(part.name)
         if joint is None:
             body = spec.worldbody.add_body(
-                name=part.name, pos=_plain(robot.start_position_m), quat=_turn(robot.start_rotation)
+                name=_body(part.name), pos=_plain(robot.start_position_m), quat=_turn(robot.start_rotation)
             )
             if robot.free_base:
                 body.add_freejoint(name="free base")
         else:
             body = bodies[joint.parent].add_body(
-                name=part.name, pos=_plain(joint.position_m), quat=_turn(joint.rotation)
+                name=_body(part.name), pos=_plain(joint.position_m), quat=_turn(joint.rotation)
             )
             if joint.kind != "fixed":
                 body.add_joint(name=joint.name, type=_JOINTS[joint.kind], axis=_plain(joint.axis))
@@ -159,6 +159,11 @@ def _spec(robot: Robot) -> Any:
                 name=name, type=mujoco.mjtSensor.mjSENS_TOUCH, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name
             )
     return spec
+
+
+def _body(part: str) -> str:
+    """The name of a part's body: MuJoCo keeps "world" to itself."""
+    return "world " if part == "world" else part
 
 
 def _parents_first(robot: Robot) -> Sequence[Part]:
