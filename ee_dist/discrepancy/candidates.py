@@ -118,7 +118,7 @@ def candidates(robot: Robot, without: Iterable[str] = (), only: Iterable[str] | 
     for entry in CATALOGUE.values():
         if not entry.searchable or entry.name in banned:
             continue
-        for target in entry.targets(robot):
+        for target in entry.proposed(robot):
             name = f"{entry.name}@{target}" if target else entry.name
             if name in banned or (wanted is not None and not {entry.name, name} & wanted):
                 continue

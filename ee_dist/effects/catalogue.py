@@ -84,6 +84,13 @@ class Effect:
     """Whether ``explain`` proposes it by itself."""
     ranges: Ranges | None = None
     """Values worth trying on a robot at a target, for parameters whose scale depends on them."""
+    worth_proposing: Callable[[Robot], bool] | None = None
+    """On which robots ``explain`` proposes it, where that is not all of them."""
+
+    def proposed(self, robot: Robot) -> tuple[str, ...]:
+        """The targets at which ``explain`` proposes it by itself: all or none."""
+        sought = self.searchable and (self.worth_proposing is None or self.worth_proposing(robot))
+        return self.targets(robot) if sought else ()
 
     @property
     def main(self) -> Parameter:
@@ -161,6 +168,7 @@ def effect(
     reference: str = "",
     searchable: bool = True,
     ranges: Ranges | None = None,
+    worth_proposing: Callable[[Robot], bool] | None = None,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
@@ -177,7 +185,17 @@ def effect(
             if ranges is None and not (math.isfinite(p.lower) and math.isfinite(p.upper)):
                 raise EffectError(f"{name}: {p.name} has no finite bounds, so the effect must give ranges")
         _registry[name] = Effect(
-            name, family, transform, targets, parameters, physics, signature, reference, searchable, ranges
+            name,
+            family,
+            transform,
+            targets,
+            parameters,
+            physics,
+            signature,
+            reference,
+            searchable,
+            ranges,
+            worth_proposing,
         )
         return transform
 
