@@ -27,6 +27,9 @@ from ee_dist.trials.log import Array
 
 __all__ = ["LAWS", "DrivePath", "LawContext", "LawFunction", "drive_law"]
 
+STIFF_SHARE, LOOK_SHARE = 0.9, 0.1
+"""A controller whose damping stops its joint in less than a step (this share of it) would shake it: from there on the engine
+takes the damping at the end of the step. Below the second share of the joint's own inertia nothing needs to be looked at."""
 STOP_SHARE = 0.5
 """How much of the needed change of speed a stop makes in one step: below 1, because felt inertia is an estimate."""
 
@@ -49,7 +52,7 @@ class DrivePath:
         self.kind = np.array(kinds, dtype=np.intp).reshape(shape)
         # A current controller makes up for back-EMF.
         by_voltage = np.isfinite(p["speed_limit"]) & (self.kind <= SPEED)
-        own_emf = np.where(by_voltage, p["torque_limit"] / p["speed_limit"], 0.0)
+        own_emf = np.divide(p["torque_limit"], p["speed_limit"], out=np.zeros(shape), where=by_voltage)
         integral_limit = np.divide(p["torque_limit"], p["ki"], out=np.zeros(shape), where=p["ki"] > 0) * 0.25
         derived = {"own_emf": own_emf, "integral_limit": integral_limit}
         self.motor = np.stack([derived[n] if n in derived else p[n] for n in MOTOR])
@@ -80,6 +83,9 @@ class DrivePath:
         stops = np.array(per_robot(robots, lambda r: [r.joint(d.joint).stops for d in r.drives])).reshape(*shape, 2)
         self.lower, self.upper = np.ascontiguousarray(stops[:, :, 0]), np.ascontiguousarray(stops[:, :, 1])
         self.inertia = np.array(per_robot(robots, felt_inertia)).reshape(shape)
+        self.give: Array | None = None
+        """N.m.s/rad (B, M) by which the torque of the last step falls with speed, for the engine to take at the step's end."""
+        self.stiff = self._stiff(robots, shape)
         self.transmission: Transmission | None = None
         self.friction: Friction | None = None
         self.at_stop = self.inertia
@@ -98,6 +104,11 @@ class DrivePath:
             self.transmission = Transmission(self.p, steady, self.dt)
         if rubbing.any():
             self.friction = Friction(self.p, self.uses, steady, self.dt)
+
+    def _stiff(self, robots: Sequence[Robot], shape: tuple[int, int]) -> NDArray[np.bool_] | None:
+        """Joints (B, M) whose controller is too steep for an explicit step; None where there are none."""
+        stiff = np.array(per_robot(robots, stiff_joints), dtype=bool).reshape(shape)
+        return stiff if stiff.any() else None
 
     def _prepare_laws(self, robots: Sequence[Robot]) -> None:
         groups: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, tuple[float, ...]]]] = {}
@@ -134,6 +145,10 @@ class DrivePath:
         active, stiffness, damping = self._motor(wanted, position, speed, supply_v, enabled)
         if self.transmission is not None:
             active = self.transmission(active, stiffness, damping, q, qd)
+        self.give = None
+        if self.stiff is not None:
+            rigid = self.stiff if self.transmission is None else self.stiff & ~self.transmission.elastic
+            self.give = np.where(rigid, damping, 0.0)
         torque = active
         if self.uses["spring"]:
             pulled = torque - self.p["spring"] * (q - self.p["spring_rest"])
@@ -148,11 +163,11 @@ class DrivePath:
             torque = torque.copy()
             np.add.at(torque, (rows, columns), added)
         if self.friction is not None:
-            torque = self.friction(torque, active, qd, enabled)
+            torque = self.friction(torque, active, qd, enabled, self.give)
         # Every stage made a new array, so that this one may be written to.
         _stop(torque, q, qd, self.lower, self.upper, self.at_stop, self.present, self.dt)
         if self.friction is not None:
-            self.friction.record(torque, qd)
+            self.friction.record(torque, qd, self.give)
         return torque
 
     def _command(self, command: Array) -> Array:
@@ -173,7 +188,7 @@ class DrivePath:
         self, wanted: Array, position: Array, speed: Array, supply_v: Array | None, enabled: Array | None
     ) -> tuple[Array, Array, Array]:
         """Torque of the motor, and how it falls with its position and speed: (B, M) each, the last two for an elastic
-        transmission only."""
+        transmission or a stiff controller only."""
         shape = self.shape
         scale, closed = self.one, self.one
         if supply_v is not None:
@@ -186,9 +201,10 @@ class DrivePath:
             load = np.abs(self.last_active).sum(axis=1, keepdims=True) / self.all_torque
             left = np.ascontiguousarray(np.broadcast_to(1.0 - np.clip(self.sag * load, 0.0, 0.95), shape))
         active = np.empty(shape)
-        stiffness, damping = (active, active) if self.transmission is None else (np.empty(shape), np.empty(shape))
+        sloped = self.transmission is not None or self.stiff is not None
+        stiffness, damping = (np.empty(shape), np.empty(shape)) if sloped else (active, active)
         _drive(
-            self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, self.transmission is not None,
+            self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, sloped,
             self.integral, self.last_active, active, stiffness, damping,
         )  # fmt: skip
         return active, stiffness, damping
@@ -280,6 +296,15 @@ def _within(value: float, limit: float) -> float:
     if value > limit:
         return limit
     return -limit if value < -limit else value
+
+
+def stiff_joints(robot: Robot) -> NDArray[np.bool_]:
+    """(M,) whether the controller of a joint is too steep for an explicit step."""
+    slopes = np.array([{"position": d.kd, "speed": d.kp}.get(d.command, 0.0) for d in robot.drives]) * robot.time_step_s
+    if not np.any(slopes > LOOK_SHARE * felt_inertia(robot)):
+        return np.zeros(len(slopes), dtype=bool)
+    found: NDArray[np.bool_] = slopes > STIFF_SHARE * steady_inertia(robot)
+    return found
 
 
 def _present(robot: Robot) -> list[bool]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from ee_dist.engines.drivers import Controllers, command_scaling, scaling
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.sensing import LIFTED, TOUCHING, SensingPath
 from ee_dist.robots.model import Robot, RobotError
-from ee_dist.trials.log import Array, SensorLog
+from ee_dist.trials.log import Array, SensorLog, State, start_of
 
 POSE_KINDS = frozenset({"height", "roll", "pitch", "x", "y"})
 TWIST_KINDS = frozenset({"speed_x", "turn_rate"})
@@ -84,7 +85,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
         if poses is not None and joints is not None and torques is not None and truth.base_pose is not None:
             poses[step], joints[step], torques[step] = truth.base_pose, truth.joints, torque
         if not last:
-            bodies.step(torque, force(step, truth))
+            bodies.step(torque, force(step, truth), drive.give)
     assert begin is not None and truth.base_pose is not None
     travel = truth.base_pose[:, 0] - begin[:, 0]
     times: Array = np.arange(steps, dtype=np.float64) * dt
@@ -119,6 +120,7 @@ def up_to(largest: int) -> Cut:
 def in_batches(rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]], Bodies], cut: Cut) -> list[SensorLog]:
     """Sort rollouts into batches of one shape, run each, and return the logs in the order asked."""
     groups: dict[tuple[object, ...], list[int]] = {}
+    rollouts = [_started(r) for r in rollouts]
     for i, r in enumerate(rollouts):
         groups.setdefault(shape_of(r), []).append(i)
     logs: dict[int, SensorLog] = {}
@@ -133,6 +135,14 @@ def in_batches(rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]],
                 bodies.close()
             logs.update(zip(part, found, strict=True))
     return [logs[i] for i in range(len(rollouts))]
+
+
+def _started(rollout: Rollout) -> Rollout:
+    """The rollout with its robot's own start, where that is not zero and no other was asked for."""
+    if rollout.start is not None:
+        return rollout
+    joints = start_of(rollout.model)
+    return replace(rollout, start=State(joints, np.zeros(len(joints)))) if joints.any() else rollout
 
 
 POSITION, VELOCITY, TORQUE, ANGLE, TOUCH, OF_BASE = range(6)

@@ -120,17 +120,14 @@ def _of_file(kind: str, data: Mapping[str, Any], folder: Path, where: str) -> tu
     return robot_of_body(read_body(kind, folder / str(data[kind])), data, where)
 
 
-def robot_of(
-    name: str, urdf: str | None = None, drives: str | None = None, file: str | None = None
-) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of the settings: a name or file; or a ``file`` (for a URDF also ``urdf``) with the description ``drives``
-    that goes with it.
+def robot_of(name: str, source: str | None = None, drives: str | None = None) -> tuple[Robot, tuple[str, ...]]:
+    """The robot of three settings: a name or file; or ``urdf`` or ``mjcf`` with the file ``source`` and the description
+    ``drives`` that goes with it.
 
     Raises RobotError.
     """
     if name not in READERS:
         return load_robot(name)
-    source = file if file is not None else urdf if name == "urdf" else None
     if drives is None:
         if source is None:
             setting = "robot.urdf=FILE.urdf" if name == "urdf" else "robot.file=FILE.xml"
@@ -141,5 +138,6 @@ def robot_of(
     if source is not None:
         data[name] = str(Path(source).resolve())
     if name not in data:
-        raise RobotError(f"{path}: names no {name.upper()}; add '{name}: FILE' or give robot.file=FILE")
+        setting = "robot.urdf" if name == "urdf" else "robot.file"
+        raise RobotError(f"{path}: names no {name.upper()}; add '{name}: FILE' or give {setting}=FILE")
     return _described(data, path.parent, str(path))

@@ -78,6 +78,8 @@ class Joint:
     """Share of the range about position zero that a jam leaves; commands and sensors keep their scale."""
     top_speed: float = float("inf")
     """Highest speed that a data sheet states, rad/s (m/s for a slide): a scale for what is measured; it limits nothing."""
+    start: float = 0.0
+    """Where the joint stands when a rollout begins that does not say otherwise, rad (m)."""
 
     @property
     def stops(self) -> tuple[float, float]:

@@ -32,6 +32,7 @@ def one_of(what: str, value: str, allowed: tuple[str, ...]) -> str:
 class RobotConfig:
     name: str = "quadruped"
     urdf: str | None = None
+    file: str | None = None
     drives: str | None = None
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import command_span
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, start_of
 
 RISE_S = 0.5
 FIXTURES = ("floor", "stand")
@@ -81,7 +81,11 @@ class Excitation:
         middle, half = limits.mean(axis=1), (limits[:, 1] - limits[:, 0]) / 2
         shape = _SHAPES[self.kind](t, len(middle), np.random.default_rng([self.seed, len(self.kind)]))
         rise = np.minimum(t / RISE_S, 1.0)[:, None]
-        return middle + half * self.amplitude * np.clip(shape, -1.0, 1.0) * rise
+        planned = middle + half * self.amplitude * np.clip(shape, -1.0, 1.0) * rise
+        start = start_of(robot)
+        held = (start != 0.0) & np.array([d.command == "position" for d in robot.drives])
+        # From where it stands: a robot that starts elsewhere than in the middle of its range is not thrown there.
+        return np.where(held, planned + (1.0 - rise) * (start - middle), planned)
 
 
 def parse(text: str) -> Excitation:
