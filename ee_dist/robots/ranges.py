@@ -27,7 +27,7 @@ def drive_of(robot: Robot, joint: str) -> Drive:
 def span(joint: Joint) -> tuple[float, float]:
     """(lowest, highest) position that a command or a scale reckons with, rad (m)."""
     most = WIDEST if joint.kind == "hinge" else math.inf
-    if joint.upper - joint.lower <= most and math.isfinite(joint.upper - joint.lower):
+    if joint.upper - joint.lower <= most * (1 + 1e-9) and math.isfinite(joint.upper - joint.lower):
         return joint.lower, joint.upper
     half = WIDEST / 4 if joint.kind == "hinge" else FULL_M / 2
     middle = (joint.lower + joint.upper) / 2
