@@ -14,9 +14,9 @@ LEAST, MOST = 0.1, 0.9
 
 def draw(robot: Robot, rng: np.random.Generator) -> tuple[Candidate, Term]:
     """An effect, then a target, then its values; every effect of the catalogue is as likely as any other."""
-    entries = [e for e in CATALOGUE.values() if e.searchable and e.targets(robot)]
+    entries = [e for e in CATALOGUE.values() if e.proposed(robot)]
     entry = entries[int(rng.integers(len(entries)))]
-    targets = entry.targets(robot)
+    targets = entry.proposed(robot)
     chosen = candidate(robot, entry, targets[int(rng.integers(len(targets)))])
     u = []
     for low, high in zip(chosen.lower, chosen.upper, strict=True):

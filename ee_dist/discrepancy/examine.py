@@ -31,7 +31,7 @@ CALM = 0.8
 """Share of the most predictable trial's trust from which a trial counts as calm."""
 NEAR = 1.1
 """Error over the noise floor up to which windows of the same motions are evidence enough: no more than noise is left."""
-FAMILIES_TRIED = 2
+FAMILIES_TRIED = 3
 """Effects whose members at all joints, each with a value of its own, are tried together."""
 
 
@@ -212,7 +212,7 @@ def _families(screened: Sequence[Screened], quick: Sequence[Fit], least: float) 
         if promise > 1.3 * max(s.promise for s in visible):
             label = f"{name}@each of {len(visible)} joints"
             parts = Proposal(tuple(s.candidate for s in visible), label)
-            out.append((promise, parts, np.concatenate([s.starts[0] for s in visible])))
+            out.append((promise / parts.size, parts, np.concatenate([s.starts[0] for s in visible])))
     out = sorted(out, key=lambda f: -f[0])[:FAMILIES_TRIED]
     found = [(p, u) for _, p, u in out]
     by_name = {s.candidate.name: s for s in screened}

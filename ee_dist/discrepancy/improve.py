@@ -108,7 +108,7 @@ def improve(
             ladder.append(_rung(search, judged))
     else:
         stopped = f"{most} effects were added, which is as many as task.most allows"
-        while len(current.parts) - own < most:
+        while sum(bool(r.added) for r in ladder) < most:
             names = {c.name for c in current.parts}
             last = examine(search, current, [c for c in pool if c.name not in names], effort)
             best = last.best

@@ -13,7 +13,7 @@ from dataclasses import replace
 from ee_dist.effects import scales
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range
-from ee_dist.effects.targets import motors, motors_with_speed_limit
+from ee_dist.effects.targets import damped_drives, is_arm, motors, motors_with_speed_limit, position_drives, powered
 from ee_dist.robots.model import Drive, Quat, Robot
 
 STABLE = 1.8
@@ -23,7 +23,7 @@ STABLE = 1.8
 @effect(
     "motor_gain",
     family="drive",
-    targets=motors,
+    targets=powered,
     parameters=(Parameter("change", "1", -0.7, 2.0, 0.0, "change of torque per volt as a share of nominal", 0.01),),
     physics="The motor makes more or less torque of the same voltage than its data sheet says; its back-EMF stays.",
     signature="Residual torque in proportion to the voltage or duty cycle.",
@@ -71,14 +71,86 @@ def back_emf(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 @effect(
     "position_gain",
     family="drive",
-    targets=motors,
+    targets=position_drives,
     parameters=(Parameter("factor", "1", 0.01, 100.0, 1.0, "factor on the gain of the position controller", 0.01),),
-    physics="The position controller is set to another gain: a setting of the trial rather than a fault.",
+    physics="The position controller has another gain than the model says: a setting of a trial, or a data sheet that is wrong.",
     signature="Residual command in proportion to the position error.",
-    searchable=False,
+    ranges=scales.always(factor=(0.2, 5.0)),
+    worth_proposing=is_arm,
 )
 def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, kp=d.kp * values["factor"]))
+
+
+def _steepest(robot: Robot, drive: Drive) -> tuple[float, float]:
+    """Damping of the drive's motor alone, and the most that stays stable where it acts on the speed at the start of a step."""
+    own = drive.torque_limit / drive.speed_limit if math.isfinite(drive.speed_limit) else 0.0
+    return own, STABLE * scales.steady(robot, drive.joint) / robot.time_step_s
+
+
+def _damping(robot: Robot, target: str) -> dict[str, Range]:
+    drive = scales.drive_of(robot, target)
+    own, most = _steepest(robot, drive)
+    return {"factor": (0.0, min(5.0, max(1.02, (most - own) / drive.kd)))}
+
+
+@effect(
+    "speed_gain",
+    family="drive",
+    targets=damped_drives,
+    parameters=(Parameter("factor", "1", 0.0, 100.0, 1.0, "factor on the controller's gain on speed", 0.01),),
+    physics="The controller damps more or less than the model says: its gain on the joint's speed is another.",
+    signature="Residual command in proportion to speed while the drive is not at its limit; like viscous friction, but gone when "
+    "the drive is released.",
+    worth_proposing=is_arm,
+    ranges=_damping,
+)
+def speed_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    return robot.map_drive(target, lambda d: replace(d, kd=d.kd * values["factor"]))
+
+
+def _gears(robot: Robot, target: str) -> dict[str, Range]:
+    # Damping at the joint grows with the square of the ratio.
+    drive = scales.drive_of(robot, target)
+    own, most = _steepest(robot, drive)
+    damping = own + (drive.kp if drive.command == "speed" else drive.kd)
+    return {"change": (-0.4, min(0.6, max(0.02, math.sqrt(most / damping) - 1.0)) if damping > 0 else 0.6)}
+
+
+@effect(
+    "gear_ratio",
+    family="drive",
+    targets=powered,
+    parameters=(Parameter("change", "1", -0.5, 1.0, 0.0, "change of motor turns per joint turn, as a share", 0.005),),
+    physics="The gear is another than the model says. Encoder and controller are on the motor's side: the joint goes less far "
+    "for a command, and torque and reflected rotor inertia grow with the ratio and with its square.",
+    signature="The joint's position is a scaled copy of the prediction, as with a command gain, but its torque grows where its "
+    "motion shrinks.",
+    reference="Hughes and Drury 2013, Electric Motors and Drives, chapter 11",
+    searchable=False,
+    ranges=_gears,
+)
+def gear_ratio(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    if values["change"] == 0:
+        return robot
+    n = 1.0 + values["change"]
+
+    def geared(d: Drive) -> Drive:
+        # The motor turns n times as far, with torque over n: n^2 is in every gain, and a command counts for 1/n of the way.
+        return replace(
+            d,
+            kp=d.kp * n * n,
+            ki=d.ki * n * n,
+            kd=d.kd * n * n,
+            rotor_inertia=d.rotor_inertia * n * n,
+            torque_limit=d.torque_limit * n,
+            speed_limit=d.speed_limit / n,
+            command_gain=d.command_gain * n if d.command == "torque" else d.command_gain / n,
+            zero_offset=d.zero_offset / n,
+            deadband=d.deadband / n,
+        )
+
+    return robot.map_drive(target, geared)
 
 
 @effect(
@@ -88,7 +160,7 @@ def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
     parameters=(Parameter("offset", "rad", -0.1, 0.1, 0.0, "what the encoder reads where the model has zero", 0.001),),
     physics="The encoder was mounted a little turned: where it reads zero the joint is not where the model has its zero.",
     signature="Gravity load shifted along the position axis; nothing where gravity does no work on the joint.",
-    searchable=False,
+    worth_proposing=is_arm,
 )
 def encoder_zero(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     offset = values["offset"]

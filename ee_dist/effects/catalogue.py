@@ -88,9 +88,17 @@ class Effect:
     contains: tuple[str, ...] = ()
     """Simpler laws that this one becomes for some of its values: it must beat them to be named."""
 
+    worth_proposing: Callable[[Robot], bool] | None = None
+    """On which robots ``explain`` proposes it, where that is not all of them."""
+
     def shared(self, robot: Robot) -> tuple[str, ...]:
         """Groups of joints or sensors that it can act on with one set of values (see groups.py)."""
         return shared_targets(robot, self.targets(robot))
+
+    def proposed(self, robot: Robot) -> tuple[str, ...]:
+        """The targets at which ``explain`` proposes it by itself: all or none."""
+        sought = self.searchable and (self.worth_proposing is None or self.worth_proposing(robot))
+        return self.targets(robot) if sought else ()
 
     @property
     def main(self) -> Parameter:
@@ -181,6 +189,7 @@ def effect(
     searchable: bool = True,
     ranges: Ranges | None = None,
     contains: tuple[str, ...] = (),
+    worth_proposing: Callable[[Robot], bool] | None = None,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
@@ -197,7 +206,18 @@ def effect(
             if ranges is None and not (math.isfinite(p.lower) and math.isfinite(p.upper)):
                 raise EffectError(f"{name}: {p.name} has no finite bounds, so the effect must give ranges")
         _registry[name] = Effect(
-            name, family, transform, targets, parameters, physics, signature, reference, searchable, ranges, contains
+            name,
+            family,
+            transform,
+            targets,
+            parameters,
+            physics,
+            signature,
+            reference,
+            searchable,
+            ranges,
+            contains,
+            worth_proposing,
         )
         return transform
 

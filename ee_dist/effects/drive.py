@@ -10,7 +10,14 @@ from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range
-from ee_dist.effects.targets import motors, motors_with_speed_limit, motors_with_torque_limit, supply
+from ee_dist.effects.targets import (
+    motors,
+    motors_with_speed_limit,
+    motors_with_torque_limit,
+    position_drives,
+    powered,
+    supply,
+)
 from ee_dist.robots.model import Drive, Robot, RobotError
 
 MOTORS = "Hughes and Drury 2013, Electric Motors and Drives, chapter 3"
@@ -19,7 +26,7 @@ MOTORS = "Hughes and Drury 2013, Electric Motors and Drives, chapter 3"
 @effect(
     "motor_weak",
     family="drive",
-    targets=motors,
+    targets=powered,
     parameters=(Parameter("loss", "1", 0.0, 1.0, 0.0, "share of the torque that is lost", 0.02),),
     physics="A motor gives only part of its torque, as when its magnets have aged or a winding is shorted.",
     signature="The joint lags in proportion to the torque asked of it, most under load; at rest without load nothing shows.",
@@ -90,7 +97,7 @@ def supply_sag(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 @effect(
     "command_gain",
     family="drive",
-    targets=motors,
+    targets=powered,
     parameters=(Parameter("change", "1", -0.5, 0.5, 0.0, "change of the commanded position, as a share of it", 0.01),),
     physics="The drive reads a larger or smaller position than was sent: a wrong scale between command and angle.",
     signature="The joint's position is a scaled copy of the prediction, at any speed and load; nothing shows at zero.",
@@ -109,7 +116,7 @@ def _delays(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "command_delay",
     family="drive",
-    targets=motors,
+    targets=powered,
     parameters=(Parameter("delay_s", "s", 0.0, 2.0, 0.0, "time from command to reaction", 0.002),),
     physics="A command takes effect late: bus, filter and firmware hold it back.",
     signature="The joint's motion is the prediction shifted in time: the residual is speed times delay, and zero at rest.",
@@ -130,7 +137,7 @@ def _zeros(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "zero_offset",
     family="drive",
-    targets=motors,
+    targets=position_drives,
     parameters=(
         Parameter("offset_rad", "rad", -math.inf, math.inf, 0.0, "how far below its command the joint settles", 0.005),
     ),
@@ -152,7 +159,7 @@ def _widths(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "deadband",
     family="drive",
-    targets=motors,
+    targets=position_drives,
     parameters=(
         Parameter("half_width_rad", "rad", 0.0, math.inf, 0.0, "error on either side that the drive ignores", 0.002),
     ),

@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from ee_dist.robots import ranges
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
-from ee_dist.robots.model import Drive, Robot
+from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import drive_of
+
+__all__ = [
+    "Range",
+    "Ranges",
+    "always",
+    "drive_of",
+    "inertia",
+    "speed",
+    "steady",
+    "stiffest",
+    "torque",
+    "travel",
+    "weight",
+]
 
 Range = tuple[float, float]
 Ranges = Callable[[Robot, str], Mapping[str, Range]]
@@ -28,15 +43,9 @@ def always(**ranges: Range) -> Ranges:
     return Always(tuple(ranges.items()))
 
 
-def drive_of(robot: Robot, joint: str) -> Drive:
-    return next(d for d in robot.drives if d.joint == joint)
-
-
 def travel(robot: Robot, joint: str) -> float:
     """Half the range of a joint, at most 1 rad of a hinge; rad (m)."""
-    j = robot.joint(joint)
-    half = (j.upper - j.lower) / 2
-    return min(half, 1.0) if j.kind == "hinge" or not math.isfinite(half) else half
+    return ranges.travel(robot.joint(joint))
 
 
 def inertia(robot: Robot, joint: str) -> float:
@@ -46,17 +55,12 @@ def inertia(robot: Robot, joint: str) -> float:
 
 def torque(robot: Robot, joint: str) -> float:
     """The torque limit of a drive, or what its controller asks at half the range of the joint; N.m (N)."""
-    drive = drive_of(robot, joint)
-    for known in (drive.torque_limit, drive.kp * travel(robot, joint)):
-        if 0 < known < math.inf:
-            return known
-    return 10.0 * inertia(robot, joint)
+    return ranges.top_torque(robot, drive_of(robot, joint))
 
 
 def speed(robot: Robot, joint: str) -> float:
     """The speed of a drive without load, or half the range of the joint in a quarter of a second; rad/s (m/s)."""
-    limit = drive_of(robot, joint).speed_limit
-    return limit if 0 < limit < math.inf else 4.0 * travel(robot, joint)
+    return ranges.top_speed(robot.joint(joint), drive_of(robot, joint))
 
 
 def steady(robot: Robot, joint: str) -> float:

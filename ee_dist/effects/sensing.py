@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range, always
-from ee_dist.effects.targets import continuous_sensors, sensors, touch_sensors
+from ee_dist.effects.targets import continuous_sensors, sensor_groups, sensors, touch_sensors
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.noise import channel_range
 
@@ -107,6 +107,24 @@ def _delays(robot: Robot, target: str) -> dict[str, Range]:
 )
 def sensor_delay(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.with_sensor(target, delay_s=_sensor(robot, target).delay_s + values["delay_s"])
+
+
+@effect(
+    "sensor_group_delay",
+    family="sensing",
+    targets=sensor_groups,
+    parameters=(Parameter("delay_s", "s", 0.0, 2.0, 0.0, "age of the readings when they are reported", 0.002),),
+    physics="All sensors of one kind come by one bus, through one filter: their readings are old by the same time.",
+    signature="All channels of a kind are the prediction shifted by one time, while the robot moves as predicted.",
+    reference=FAULTS,
+    ranges=_delays,
+    searchable=False,
+)
+def sensor_group_delay(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    for sensor in robot.sensors:
+        if sensor.kind == target:
+            robot = robot.with_sensor(sensor.name, delay_s=sensor.delay_s + values["delay_s"])
+    return robot
 
 
 def _quanta(robot: Robot, target: str) -> dict[str, Range]:

@@ -18,15 +18,32 @@ def carried_parts(robot: Robot) -> tuple[str, ...]:
 
 
 def motors(robot: Robot) -> tuple[str, ...]:
+    """All joints that have a drive, be it a passive one."""
     return robot.motor_names
 
 
+def powered(robot: Robot) -> tuple[str, ...]:
+    """Joints that a motor moves."""
+    return tuple(d.joint for d in robot.drives if d.command != "none")
+
+
+def position_drives(robot: Robot) -> tuple[str, ...]:
+    """Joints under a position controller."""
+    return tuple(d.joint for d in robot.drives if d.command == "position")
+
+
+def damped_drives(robot: Robot) -> tuple[str, ...]:
+    """Joints whose controller has a gain on their speed."""
+    return tuple(d.joint for d in robot.drives if d.command == "position" and d.kd > 0)
+
+
 def motors_with_speed_limit(robot: Robot) -> tuple[str, ...]:
-    return tuple(d.joint for d in robot.drives if math.isfinite(d.speed_limit))
+    """Motors driven by voltage; a current controller makes up for back-EMF."""
+    return tuple(d.joint for d in robot.drives if math.isfinite(d.speed_limit) and d.command in ("position", "speed"))
 
 
 def motors_with_torque_limit(robot: Robot) -> tuple[str, ...]:
-    return tuple(d.joint for d in robot.drives if math.isfinite(d.torque_limit))
+    return tuple(d.joint for d in robot.drives if math.isfinite(d.torque_limit) and d.command != "none")
 
 
 def supply(robot: Robot) -> tuple[str, ...]:
@@ -56,10 +73,27 @@ def hidden_neurons(robot: Robot) -> tuple[str, ...]:
 
 
 def motor_pairs(robot: Robot) -> tuple[str, ...]:
-    """``a+b``: two different motors, in the order of the robot."""
-    names = robot.motor_names
-    return tuple(f"{a}+{b}" for i, a in enumerate(names) for b in names[i + 1 :])
+    """``a+b``: two different motors that take commands of one kind, in the order of the robot."""
+    drives = [d for d in robot.drives if d.command != "none"]
+    pairs = ((a, b) for i, a in enumerate(drives) for b in drives[i + 1 :])
+    return tuple(f"{a.joint}+{b.joint}" for a, b in pairs if a.command == b.command)
 
 
 def floor(robot: Robot) -> tuple[str, ...]:
     return ("floor",) if robot.world.has_floor else ()
+
+
+def mounting(robot: Robot) -> tuple[str, ...]:
+    """The root part of a robot that is bolted down."""
+    return () if robot.free_base else (robot.root.name,)
+
+
+def sensor_groups(robot: Robot) -> tuple[str, ...]:
+    """Kinds of sensors of which there are several: they share a bus, a filter, a driver."""
+    kinds = [s.kind for s in robot.sensors]
+    return tuple(dict.fromkeys(k for k in kinds if kinds.count(k) > 1))
+
+
+def is_arm(robot: Robot) -> bool:
+    """Bolted down, with more than one driven joint."""
+    return not robot.free_base and len(robot.drives) > 1

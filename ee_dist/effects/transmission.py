@@ -10,7 +10,7 @@ from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range
-from ee_dist.effects.targets import motors
+from ee_dist.effects.targets import motors, powered
 from ee_dist.robots.model import Drive, Robot
 
 
@@ -34,7 +34,7 @@ def _gaps(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "backlash",
     family="drive",
-    targets=motors,
+    targets=powered,
     parameters=(
         Parameter("gap_rad", "rad", 0.0, math.inf, 0.0, "free play of the joint when the motor stands still", 0.002),
     ),
@@ -56,7 +56,7 @@ def _twists(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "elastic_transmission",
     family="drive",
-    targets=motors,
+    targets=powered,
     parameters=(
         Parameter(
             "compliance_rad_nm", "rad/(N.m)", 0.0, math.inf, 0.0, "twist between motor and joint for each N.m", 0.001

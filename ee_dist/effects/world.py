@@ -9,7 +9,7 @@ from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range, always
-from ee_dist.effects.targets import base, floor
+from ee_dist.effects.targets import base, floor, is_arm, mounting
 from ee_dist.robots.model import Robot
 
 
@@ -26,6 +26,29 @@ from ee_dist.robots.model import Robot
     reference=PAPER,
 )
 def floor_tilt(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    world = robot.world
+    return robot.with_world(
+        tilt_x_rad=world.tilt_x_rad + math.radians(values["sideways_deg"]),
+        tilt_y_rad=world.tilt_y_rad + math.radians(values["forward_deg"]),
+    )
+
+
+@effect(
+    "mounting_tilt",
+    family="world",
+    targets=mounting,
+    parameters=(
+        Parameter("sideways_deg", "deg", -180.0, 180.0, 0.0, "turn of the ground under the base about its x axis", 0.1),
+        Parameter("forward_deg", "deg", -180.0, 180.0, 0.0, "turn of the ground about the y axis, nose down", 0.1),
+    ),
+    ranges=always(sideways_deg=(-30.0, 30.0), forward_deg=(-30.0, 30.0)),
+    physics="The base is bolted to something that is not level: a cart, a wall, a bench with one leg too short. Gravity comes "
+    "from another direction than the model says.",
+    signature="Residual torque at rest that changes with the pose, at all joints that carry weight at once, and of one "
+    "direction in space.",
+    worth_proposing=is_arm,
+)
+def mounting_tilt(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     world = robot.world
     return robot.with_world(
         tilt_x_rad=world.tilt_x_rad + math.radians(values["sideways_deg"]),

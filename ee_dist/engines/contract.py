@@ -70,8 +70,12 @@ class Bodies(Protocol):
 
     def read(self, touch: bool, pose: bool, twist: bool) -> Truth: ...
 
-    def step(self, torques: Array, force: Array | None) -> None:
-        """Advance by one time step under joint torques (B, M) and a force (B, 3) on the root part, floor frame."""
+    def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
+        """Advance by one time step under joint torques (B, M) and a force (B, 3) on the root part, floor frame.
+
+        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step. Raises EngineError where an
+        engine cannot do that.
+        """
 
     def close(self) -> None:
         """The batch is over; what it held may be used again."""

@@ -1,6 +1,7 @@
-"""The drive path: from commanded position to joint torque, for a whole batch at once and the same for every engine.
+"""The drive path: from command to joint torque, for a whole batch at once and the same for every engine.
 
-    command -> delay -> gain -> controller (deadband, zero offset) -> motor (torque limit, back-EMF, strength, supply)
+    command -> delay -> gain -> controller (of position, with deadband and zero offset, of speed, or none)
+            -> motor (torque limit, back-EMF, strength, supply)
             -> transmission (backlash, compliance) -> joint (spring, offset, a user's own laws, friction, brake, stops)
 
 Each stage runs only if some row of the batch needs it, and a row at neutral values passes through it unchanged, bit
@@ -21,11 +22,14 @@ from ee_dist.engines.friction import Friction
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.transmission import Transmission
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
-from ee_dist.robots.model import Drive, Robot
+from ee_dist.robots.model import COMMANDS, DRIVE_NUMBERS, Drive, Robot
 from ee_dist.trials.log import Array
 
 __all__ = ["LAWS", "DrivePath", "LawContext", "LawFunction", "drive_law"]
 
+STIFF_SHARE, LOOK_SHARE = 0.9, 0.1
+"""A controller whose damping stops its joint in less than a step (this share of it) would shake it: from there on the engine
+takes the damping at the end of the step. Below the second share of the joint's own inertia nothing needs to be looked at."""
 STOP_SHARE = 0.5
 """How much of the needed change of speed a stop makes in one step: below 1, because felt inertia is an estimate."""
 
@@ -36,7 +40,7 @@ class DrivePath:
     def __init__(self, robots: Sequence[Robot], time_step_s: float) -> None:
         self.dt = time_step_s
         shape = (len(robots), len(robots[0].drives))
-        names = [f.name for f in fields(Drive) if f.name != "joint"]
+        names = list(DRIVE_NUMBERS)
         rows = per_robot(robots, lambda r: np.array([[getattr(d, n) for n in names] for d in r.drives], dtype=float))
         table = np.array(rows).reshape(*shape, len(names))
         self.p = {n: np.ascontiguousarray(table[:, :, i]) for i, n in enumerate(names)}
@@ -44,7 +48,11 @@ class DrivePath:
         p = self.p
         neutral = {f.name: f.default for f in fields(Drive)}
         self.uses = {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}
-        own_emf = np.where(np.isfinite(p["speed_limit"]), p["torque_limit"] / p["speed_limit"], 0.0)
+        kinds = per_robot(robots, lambda r: [COMMANDS.index(d.command) for d in r.drives])
+        self.kind = np.array(kinds, dtype=np.intp).reshape(shape)
+        # A current controller makes up for back-EMF.
+        by_voltage = np.isfinite(p["speed_limit"]) & (self.kind <= SPEED)
+        own_emf = np.divide(p["torque_limit"], p["speed_limit"], out=np.zeros(shape), where=by_voltage)
         integral_limit = np.divide(p["torque_limit"], p["ki"], out=np.zeros(shape), where=p["ki"] > 0) * 0.25
         derived = {"own_emf": own_emf, "integral_limit": integral_limit}
         self.motor = np.stack([derived[n] if n in derived else p[n] for n in MOTOR])
@@ -52,7 +60,8 @@ class DrivePath:
         self.integral = np.zeros(shape)
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
-        self.all_torque = np.maximum(p["torque_limit"].sum(axis=1, keepdims=True), 1e-300)
+        limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
+        self.all_torque = np.maximum(np.where(limited, p["torque_limit"], 0.0).sum(axis=1, keepdims=True), 1e-300)
         self.last_active = np.zeros(shape)
         self._prepare_delay(shape)
         self._prepare_joints(robots, shape)
@@ -74,6 +83,9 @@ class DrivePath:
         stops = np.array(per_robot(robots, lambda r: [r.joint(d.joint).stops for d in r.drives])).reshape(*shape, 2)
         self.lower, self.upper = np.ascontiguousarray(stops[:, :, 0]), np.ascontiguousarray(stops[:, :, 1])
         self.inertia = np.array(per_robot(robots, felt_inertia)).reshape(shape)
+        self.give: Array | None = None
+        """N.m.s/rad (B, M) by which the torque of the last step falls with speed, for the engine to take at the step's end."""
+        self.stiff = self._stiff(robots, shape)
         self.transmission: Transmission | None = None
         self.friction: Friction | None = None
         self.at_stop = self.inertia
@@ -92,6 +104,11 @@ class DrivePath:
             self.transmission = Transmission(self.p, steady, self.dt)
         if rubbing.any():
             self.friction = Friction(self.p, self.uses, steady, self.dt)
+
+    def _stiff(self, robots: Sequence[Robot], shape: tuple[int, int]) -> NDArray[np.bool_] | None:
+        """Joints (B, M) whose controller is too steep for an explicit step; None where there are none."""
+        stiff = np.array(per_robot(robots, stiff_joints), dtype=bool).reshape(shape)
+        return stiff if stiff.any() else None
 
     def _prepare_laws(self, robots: Sequence[Robot]) -> None:
         groups: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, tuple[float, ...]]]] = {}
@@ -118,7 +135,7 @@ class DrivePath:
         supply_v: Array | None = None,
         enabled: Array | None = None,
     ) -> Array:
-        """Joint torques (B, M) from commanded positions, joint positions and speeds, all (B, M).
+        """Joint torques (B, M) from commands (of position, speed or torque), joint positions and speeds, all (B, M).
 
         ``supply_v`` (B, 1) is the measured supply. ``enabled``, (B, 1) or (B, M), is 0 where the motor's circuit is
         open: no torque and no back-EMF; what sits on the joint (friction, spring, stops) stays.
@@ -128,6 +145,10 @@ class DrivePath:
         active, stiffness, damping = self._motor(wanted, position, speed, supply_v, enabled)
         if self.transmission is not None:
             active = self.transmission(active, stiffness, damping, q, qd)
+        self.give = None
+        if self.stiff is not None:
+            rigid = self.stiff if self.transmission is None else self.stiff & ~self.transmission.elastic
+            self.give = np.where(rigid, damping, 0.0)
         torque = active
         if self.uses["spring"]:
             pulled = torque - self.p["spring"] * (q - self.p["spring_rest"])
@@ -142,11 +163,11 @@ class DrivePath:
             torque = torque.copy()
             np.add.at(torque, (rows, columns), added)
         if self.friction is not None:
-            torque = self.friction(torque, active, qd, enabled)
+            torque = self.friction(torque, active, qd, enabled, self.give)
         # Every stage made a new array, so that this one may be written to.
         _stop(torque, q, qd, self.lower, self.upper, self.at_stop, self.present, self.dt)
         if self.friction is not None:
-            self.friction.record(torque, qd)
+            self.friction.record(torque, qd, self.give)
         return torque
 
     def _command(self, command: Array) -> Array:
@@ -167,7 +188,7 @@ class DrivePath:
         self, wanted: Array, position: Array, speed: Array, supply_v: Array | None, enabled: Array | None
     ) -> tuple[Array, Array, Array]:
         """Torque of the motor, and how it falls with its position and speed: (B, M) each, the last two for an elastic
-        transmission only."""
+        transmission or a stiff controller only."""
         shape = self.shape
         scale, closed = self.one, self.one
         if supply_v is not None:
@@ -180,9 +201,10 @@ class DrivePath:
             load = np.abs(self.last_active).sum(axis=1, keepdims=True) / self.all_torque
             left = np.ascontiguousarray(np.broadcast_to(1.0 - np.clip(self.sag * load, 0.0, 0.95), shape))
         active = np.empty(shape)
-        stiffness, damping = (active, active) if self.transmission is None else (np.empty(shape), np.empty(shape))
+        sloped = self.transmission is not None or self.stiff is not None
+        stiffness, damping = (np.empty(shape), np.empty(shape)) if sloped else (active, active)
         _drive(
-            self.motor, wanted, position, speed, scale, closed, left, self.dt, self.transmission is not None,
+            self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, sloped,
             self.integral, self.last_active, active, stiffness, damping,
         )  # fmt: skip
         return active, stiffness, damping
@@ -190,10 +212,12 @@ class DrivePath:
 
 MOTOR = ("kp", "ki", "kd", "zero_offset", "deadband", "torque_limit", "strength", "own_emf", "integral_limit")
 """Rows of the table that ``_drive`` reads, in this order."""
+POSITION, SPEED, TORQUE, NONE = range(len(COMMANDS))
 
 
 @compiled
 def _drive(
+    kind: NDArray[np.intp],
     motor: Array,
     wanted: Array,
     position: Array,
@@ -209,8 +233,8 @@ def _drive(
     stiffness: Array,
     damping: Array,
 ) -> None:
-    """Controller and motor of every joint. ``motor`` (len(MOTOR), B, M); the others (B, M), of which those from
-    ``integral`` on are written.
+    """Controller and motor of every joint. ``kind`` (B, M) is the place in COMMANDS, ``motor`` (len(MOTOR), B, M); the
+    others (B, M), of which those from ``integral`` on are written.
 
     ``scale`` is the supply over the nominal one, ``closed`` whether the circuit is, ``left`` what the sag leaves.
     """
@@ -218,11 +242,21 @@ def _drive(
     torque_limit, strength, own_emf, integral_limit = motor[5], motor[6], motor[7], motor[8]
     for i in range(active.shape[0]):
         for j in range(active.shape[1]):
-            error = wanted[i, j] - position[i, j] - zero_offset[i, j]
-            if deadband[i, j] > 0.0:
-                error = error - _within(error, deadband[i, j])
-            asked = kp[i, j] * error - kd[i, j] * speed[i, j]
-            if ki[i, j] != 0.0:
+            how = kind[i, j]
+            stiff, damped, error = kp[i, j], kd[i, j], 0.0
+            if how == POSITION:
+                error = wanted[i, j] - position[i, j] - zero_offset[i, j]
+                if deadband[i, j] > 0.0:
+                    error = error - _within(error, deadband[i, j])
+                asked = kp[i, j] * error - kd[i, j] * speed[i, j]
+            elif how == SPEED:
+                error = wanted[i, j] - speed[i, j]
+                asked = kp[i, j] * error
+                stiff, damped = 0.0, kp[i, j]
+            else:
+                asked = wanted[i, j] if how == TORQUE else 0.0
+                stiff, damped = 0.0, 0.0
+            if ki[i, j] != 0.0 and how <= SPEED:
                 integral[i, j] = _within(integral[i, j] + error * dt, integral_limit[i, j]) * closed[i, j]
                 asked = asked + ki[i, j] * integral[i, j]
             torque = _within(asked, torque_limit[i, j]) * scale[i, j] * closed[i, j]
@@ -232,8 +266,8 @@ def _drive(
             if elastic:
                 free = 1.0 if abs(asked) < torque_limit[i, j] else 0.0
                 free = free * (scale[i, j] * left[i, j]) * closed[i, j]
-                stiffness[i, j] = kp[i, j] * free * strength[i, j]
-                damping[i, j] = (kd[i, j] * free + back_emf) * strength[i, j]
+                stiffness[i, j] = stiff * free * strength[i, j]
+                damping[i, j] = (damped * free + back_emf) * strength[i, j]
 
 
 @compiled
@@ -262,6 +296,15 @@ def _within(value: float, limit: float) -> float:
     if value > limit:
         return limit
     return -limit if value < -limit else value
+
+
+def stiff_joints(robot: Robot) -> NDArray[np.bool_]:
+    """(M,) whether the controller of a joint is too steep for an explicit step."""
+    slopes = np.array([{"position": d.kd, "speed": d.kp}.get(d.command, 0.0) for d in robot.drives]) * robot.time_step_s
+    if not np.any(slopes > LOOK_SHARE * felt_inertia(robot)):
+        return np.zeros(len(slopes), dtype=bool)
+    found: NDArray[np.bool_] = slopes > STIFF_SHARE * steady_inertia(robot)
+    return found
 
 
 def _present(robot: Robot) -> list[bool]:

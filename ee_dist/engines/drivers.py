@@ -16,6 +16,7 @@ import numpy as np
 
 from ee_dist.engines.compiled import compiled
 from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import command_span, span
 from ee_dist.trials.log import Array
 
 HIDDEN = 3
@@ -42,7 +43,7 @@ class Network:
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """Commanded positions (T, M), whatever the sensors say; the last row is held when the rollout is longer."""
+    """Commands (T, M) in the units of the drives, whatever the sensors say; the last row is held when the rollout is longer."""
 
     values: Array
 
@@ -71,8 +72,17 @@ class _Runner(Protocol):
 
 
 def scaling(robot: Robot) -> tuple[Array, Array]:
-    """(middle, half range) of each motor's joint, both (M,): controller outputs of -1 and 1 mean the joint's limits."""
-    limits = np.array([(robot.joint(d.joint).lower, robot.joint(d.joint).upper) for d in robot.drives]).reshape(-1, 2)
+    """(middle, half range) of each motor's joint, both (M,): what readings of -1 and 1 of an angle mean."""
+    return _middle_and_half([span(robot.joint(d.joint)) for d in robot.drives])
+
+
+def command_scaling(robot: Robot) -> tuple[Array, Array]:
+    """(middle, half range) of each motor's commands, both (M,): what outputs of -1 and 1 of a network mean."""
+    return _middle_and_half([command_span(robot, d) for d in robot.drives])
+
+
+def _middle_and_half(spans: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
+    limits = np.array(spans, dtype=float).reshape(-1, 2)
     return limits.mean(axis=1), (limits[:, 1] - limits[:, 0]) / 2
 
 
@@ -194,7 +204,7 @@ class _Loops:
 
 
 class Controllers:
-    """All controllers of a batch: ``step`` takes sensors (B, S) and returns commanded positions (B, M)."""
+    """All controllers of a batch: ``step`` takes sensors (B, S) and returns commands (B, M)."""
 
     def __init__(
         self, robots: Sequence[Robot], drivers: Sequence[Driver], scales: Sequence[tuple[Array, Array]], steps: int

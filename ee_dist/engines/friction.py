@@ -52,14 +52,19 @@ class Friction:
         self.backdriving = np.maximum(p["load_friction"] + p["backdrive_friction"], 0.0)
         self.last_speed: Array | None = None
         self.last_torque = np.zeros(inertia.shape)
+        self.last_give: Array | None = None
 
     @staticmethod
     def rows(p: Mapping[str, Array]) -> NDArray[np.bool_]:
         """Joints (B, M) that have any friction."""
         return np.logical_or.reduce([p[name] != 0 for name in (*DRY, *LOADED, *SIDED, *SLOPED)])
 
-    def __call__(self, torque: Array, motor: Array, speed: Array, enabled: Array | None = None) -> Array:
+    def __call__(
+        self, torque: Array, motor: Array, speed: Array, enabled: Array | None = None, give: Array | None = None
+    ) -> Array:
         """Torque at the joint less friction, from torque at the joint, torque of the motor, speed: all (B, M).
+
+        ``give`` (B, M) is by how much the torque falls with the speed at the end of the step, where the engine takes it so.
 
         A back-EMF beyond the model's own is viscous friction that is gone when the drive is not ``enabled``: as part of
         the motor's explicit torque it could be too steep for the time step.
@@ -67,7 +72,10 @@ class Friction:
         p, uses = self.p, self.uses
         load: Array = np.zeros_like(torque)
         if self.last_speed is not None:
-            load = self.per_step * (speed - self.last_speed) - self.last_torque
+            heavier = self.per_step if self.last_give is None else self.per_step + self.last_give
+            load = heavier * (speed - self.last_speed) - self.last_torque
+        if give is not None:
+            torque = torque + give * speed
         limit = self._limit(motor, torque - motor + load, speed)
         up = down = limit
         if uses["friction_asymmetry"]:
@@ -82,8 +90,10 @@ class Friction:
             left = rate - dry
             if uses["viscous_asymmetry"]:
                 viscous = np.maximum(viscous + p["viscous_asymmetry"] * np.sign(left), 0.0)
-            taken = dry + left * viscous / (self.per_step + viscous)
-        return np.where(self.rubbing, torque - taken, torque)
+            per_step = self.per_step if give is None else self.per_step + give
+            taken = dry + left * viscous / (per_step + viscous)
+        found = np.where(self.rubbing, torque - taken, torque)
+        return found if give is None else found - give * speed
 
     def _limit(self, motor: Array, external: Array, speed: Array) -> Array:
         p, uses = self.p, self.uses
@@ -101,6 +111,6 @@ class Friction:
                 limit = limit + p["stribeck_load"] * fading * through
         return limit
 
-    def record(self, torque: Array, speed: Array) -> None:
+    def record(self, torque: Array, speed: Array, give: Array | None = None) -> None:
         """Remember the torque that the step is made with."""
-        self.last_speed, self.last_torque = speed, torque
+        self.last_speed, self.last_torque, self.last_give = speed, torque, give

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,11 @@ from numpy.typing import NDArray
 from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import Bodies, Rollout, Truth
 from ee_dist.engines.drive import DrivePath
-from ee_dist.engines.drivers import Controllers, scaling
+from ee_dist.engines.drivers import Controllers, command_scaling, scaling
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.sensing import LIFTED, TOUCHING, SensingPath
 from ee_dist.robots.model import Robot, RobotError
-from ee_dist.trials.log import Array, SensorLog
+from ee_dist.trials.log import Array, SensorLog, State, start_of
 
 POSE_KINDS = frozenset({"height", "roll", "pitch", "x", "y"})
 TWIST_KINDS = frozenset({"speed_x", "turn_rate"})
@@ -49,7 +50,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     drive = DrivePath(robots, dt)
     sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
     scales = per_robot(robots, scaling)
-    control = Controllers(robots, [r.driver for r in rollouts], scales, steps)
+    control = Controllers(robots, [r.driver for r in rollouts], per_robot(robots, command_scaling), steps)
     truth_to_channels = _Channels(robots, scales)
     force = _Force(robots)
     supply = None if rollouts[0].supply_v is None else np.stack([_held(r.supply_v, steps) for r in rollouts])
@@ -84,7 +85,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
         if poses is not None and joints is not None and torques is not None and truth.base_pose is not None:
             poses[step], joints[step], torques[step] = truth.base_pose, truth.joints, torque
         if not last:
-            bodies.step(torque, force(step, truth))
+            bodies.step(torque, force(step, truth), drive.give)
     assert begin is not None and truth.base_pose is not None
     travel = truth.base_pose[:, 0] - begin[:, 0]
     times: Array = np.arange(steps, dtype=np.float64) * dt
@@ -119,6 +120,7 @@ def up_to(largest: int) -> Cut:
 def in_batches(rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]], Bodies], cut: Cut) -> list[SensorLog]:
     """Sort rollouts into batches of one shape, run each, and return the logs in the order asked."""
     groups: dict[tuple[object, ...], list[int]] = {}
+    rollouts = [_started(r) for r in rollouts]
     for i, r in enumerate(rollouts):
         groups.setdefault(shape_of(r), []).append(i)
     logs: dict[int, SensorLog] = {}
@@ -133,6 +135,14 @@ def in_batches(rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]],
                 bodies.close()
             logs.update(zip(part, found, strict=True))
     return [logs[i] for i in range(len(rollouts))]
+
+
+def _started(rollout: Rollout) -> Rollout:
+    """The rollout with its robot's own start, where that is not zero and no other was asked for."""
+    if rollout.start is not None:
+        return rollout
+    joints = start_of(rollout.model)
+    return replace(rollout, start=State(joints, np.zeros(len(joints)))) if joints.any() else rollout
 
 
 POSITION, VELOCITY, TORQUE, ANGLE, TOUCH, OF_BASE = range(6)

@@ -79,11 +79,12 @@ class OneJointBodies:
             truth.base_twist = np.zeros((len(self.q), 6))
         return truth
 
-    def step(self, torques: Array, force: Array | None) -> None:
+    def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
         load = self.constant
         if self.swings:
             load = load + self.cosine * np.cos(self.q) + self.sine * np.sin(self.q)
-        self.qd = self.qd + self.dt * (torques - load) / self.inertia
+        inertia = self.inertia if give is None else self.inertia + self.dt * give
+        self.qd = self.qd + self.dt * (torques - load) / inertia
         self.q = self.q + self.dt * self.qd
 
     def close(self) -> None:

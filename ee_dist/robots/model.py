@@ -76,6 +76,10 @@ class Joint:
     rotation: Quat = NO_TURN
     freedom: float = 1.0
     """Share of the range about position zero that a jam leaves; commands and sensors keep their scale."""
+    top_speed: float = float("inf")
+    """Highest speed that a data sheet states, rad/s (m/s for a slide): a scale for what is measured; it limits nothing."""
+    start: float = 0.0
+    """Where the joint stands when a rollout begins that does not say otherwise, rad (m)."""
 
     @property
     def stops(self) -> tuple[float, float]:
@@ -83,12 +87,18 @@ class Joint:
         return self.lower * self.freedom, self.upper * self.freedom
 
 
+COMMANDS = ("position", "speed", "torque", "none")
+"""What a drive may be commanded by; ``none``: a passive joint with friction, a spring or stops of its own."""
+
+
 @dataclass(frozen=True)
 class Drive:
-    """Motor, gear and position controller of one joint; the fields below the line say what may be wrong with it.
+    """Motor, gear and controller of one joint; the fields below the line say what may be wrong with it.
 
     Active torque = clip(kp*error + ki*integral(error) - kd*speed, +-torque_limit); a brushed motor driven by voltage
     then loses ``torque_limit/speed_limit`` times its speed to back-EMF, so ``speed_limit`` is the speed at no load.
+    The error is that of the position; of the speed where ``command`` is speed (``kp`` in N.m.s/rad, ``kd`` without use). Where
+    it is torque, the command itself takes the place of the sum, and a current controller makes up for back-EMF.
     All neutral values leave the arithmetic bit for bit as if the field did not exist.
     """
 
@@ -102,6 +112,8 @@ class Drive:
     """Reflected to the joint, kg.m^2 (kg for a slide)."""
     supply_nominal_v: float = 0.0
     """If positive, active torque scales with (measured supply) / (this)."""
+    command: str = "position"
+    """One of COMMANDS."""
     # -- what may be wrong or missing (neutral values); for a slide read m for rad and N for N.m --
     strength: float = 1.0
     command_gain: float = 1.0
@@ -125,6 +137,10 @@ class Drive:
     spring: float = 0.0  # N.m/rad towards spring_rest (rad)
     spring_rest: float = 0.0
     brake: float = 0.0  # N.m of dry friction of a brake
+
+
+DRIVE_NUMBERS = tuple(f.name for f in fields(Drive) if f.name not in ("joint", "command"))
+"""Fields of a drive that are numbers."""
 
 
 @dataclass(frozen=True)

@@ -1,48 +1,43 @@
 """A user's URDF as parts and joints: masses, inertia, limits and collision primitives come from the file.
 
 Units are URDF's own: m, kg, rad. What the file cannot say (drives, sensors, whether the base is bolted down) is said in
-a robot description; see ``describe.py``. Meshes are skipped, with a note: contact with the floor needs a primitive.
-
-Links without mass that are rigidly attached (tool frames, sensor mounts) are merged into what carries them.
+a robot description; see ``describe.py``. Meshes are left out, with a note: contact with the floor needs a primitive.
+Links without mass are folded into their neighbours; see ``fold.py``.
 """
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ee_dist.robots.body import Body
+from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, folded
 from ee_dist.robots.inertia import rotation_matrix
-from ee_dist.robots.kinematics import compose
 from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
+from ee_dist.robots.xml import XmlError, read_xml
 
 CONTINUOUS_RAD = 200 * math.pi
 """Stops of a joint that has none: a hundred turns either way."""
-KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "fixed": "fixed"}
+CONTINUOUS_M = 100.0
+KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "fixed": "fixed", "floating": "floating"}
+WORLD = "world"
+LARGEST = 1e9
+"""Of any number in SI units: what is beyond is a mistake, and would leave the finite numbers when squared."""
+POINT_M = 0.01
+SHOWN = 4
+PIVOT_SHARE, PIVOT_M = (1.0, 1.8), 0.05
+"""An inertia that is 1 to 1.8 times mass x (distance of the centre from the joint)^2 looks like one about the joint: of a rod it
+would be 4/3, of its own centre 1/3. Nearer than 5 cm nothing can be said."""
 
 
 class UrdfError(RobotError):
     """A URDF that cannot be used; one line: the file, the element, what is wrong and what would be right."""
 
 
-@dataclass
-class UrdfBody:
-    """What a URDF describes. ``effort``, ``damping`` and ``friction`` are by joint, where the file gives them."""
-
-    name: str
-    parts: tuple[Part, ...]
-    joints: tuple[Joint, ...]
-    effort: dict[str, float] = field(default_factory=dict)
-    damping: dict[str, float] = field(default_factory=dict)
-    friction: dict[str, float] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-
-
-def read_urdf(path: str | Path) -> UrdfBody:
+def read_urdf(path: str | Path) -> Body:
     """The body that a URDF file describes, parts in an order in which each follows the part that carries it.
 
     Raises UrdfError: no file, not XML, no inertia on a moving link, a joint without its links, a loop, a joint kind that
@@ -50,15 +45,13 @@ def read_urdf(path: str | Path) -> UrdfBody:
     """
     file = Path(path)
     try:
-        root = ET.parse(file).getroot()
-    except FileNotFoundError:
-        raise UrdfError(f"{file}: no such file; expected a URDF") from None
-    except ET.ParseError as error:
-        raise UrdfError(f"{file}: not well-formed XML: {error}") from None
-    except OSError as error:
-        raise UrdfError(f"{file}: cannot be read ({error.strerror})") from None
+        root, _ = read_xml(file, "a URDF")
+    except XmlError as error:
+        raise UrdfError(str(error)) from None
     if root.tag != "robot":
         raise UrdfError(f"{file}: the outermost element is <{root.tag}>; a URDF begins with <robot>")
+    if "xacro" in root.tag or any("xacro" in str(e.tag) for e in root):
+        raise UrdfError(f"{file}: is a xacro, which makes a URDF: run 'xacro {file.name} > robot.urdf' and name that")
     return _Reader(file, root).body()
 
 
@@ -66,15 +59,19 @@ class _Reader:
     def __init__(self, file: Path, root: ET.Element) -> None:
         self.file, self.root = file, root
         self.notes: list[str] = []
+        self.assumed: list[str] = []
+        self.meshes: dict[str, None] = {}
 
     def fail(self, where: str, what: str) -> UrdfError:
         return UrdfError(f"{self.file}: {where}: {what}")
 
-    def body(self) -> UrdfBody:
+    def body(self) -> Body:
         links = {self.named(e, "link"): e for e in self.root.findall("link")}
         if not links:
             raise self.fail("robot", "no <link> in it")
-        joints = [self.joint(e, links) for e in self.root.findall("joint")]
+        elements = {self.named(e, "joint"): e for e in self.root.findall("joint")}
+        self.implicit_world(links)
+        joints = [self.joint(name, e, links) for name, e in elements.items()]
         carried: dict[str, Joint] = {}
         for j in joints:
             if j.child in carried:
@@ -88,33 +85,101 @@ class _Reader:
         if len(order) != len(links):
             lost = next(name for name in links if name not in order)
             raise self.fail(f"link {lost!r}", f"is not connected to {roots[0]!r}: the joints form a loop")
-        parts = {name: self.part(name, links[name], carried.get(name), name == roots[0]) for name in order}
-        kept_parts, kept_joints = _merged(parts, {name: carried[name] for name in order[1:]}, roots[0])
-        limits = {self.named(e, "joint"): e for e in self.root.findall("joint")}
+        free = self.unmoored(carried, order)
+        parts = {name: self.part(name, links[name], carried.get(name)) for name in order}
+        kept_parts, kept_joints, start, given, idle = folded(parts, {n: carried[n] for n in order[1:]}, order[0])
+        for name in idle:
+            if carried[name].kind != "fixed":
+                raise self.fail(f"link {name!r}", self.without_mass(name, links[name], carried[name]))
+        assumed = list(self.assumed)
+        root_given = kept_parts[0].name in given
+        given = [n for n in given if n != kept_parts[0].name]
+        if given:
+            assumed.append(
+                f"helper links without mass get {HELPER_KG:g} kg and {HELPER_KG_M2:g} kg.m^2: {_list(given)}"
+            )
+        if self.meshes:
+            self.notes.insert(0, f"collision meshes of {len(self.meshes)} links left out: only boxes, spheres, cylinders "
+                                 f"and capsules touch the floor ({_list(list(self.meshes))})")  # fmt: skip
+        self.hint_at_pivots(kept_parts, kept_joints)
         moving = [j.name for j in kept_joints if j.kind != "fixed"]
-        return UrdfBody(
-            self.root.get("name") or self.file.stem,
-            tuple(kept_parts),
-            tuple(kept_joints),
-            self.table(limits, moving, "limit", "effort"),
-            self.table(limits, moving, "dynamics", "damping"),
-            self.table(limits, moving, "dynamics", "friction"),
-            tuple(self.notes),
+        return Body(
+            name=self.root.get("name") or self.file.stem,
+            parts=tuple(kept_parts),
+            joints=tuple(kept_joints),
+            drives={name: self.known(elements[name], f"joint {name!r}") for name in moving},
+            root_without_mass=root_given,
+            free_base=True if free else None,
+            start_position_m=start[0],
+            start_rotation=start[1],
+            notes=(*self.notes, *assumed),
+            assumed=tuple(assumed),
         )
+
+    def implicit_world(self, links: dict[str, ET.Element]) -> None:
+        """A ``world`` that joints hang on without declaring it."""
+        for e in self.root.findall("joint"):
+            parent = e.find("parent")
+            if parent is not None and parent.get("link") == WORLD and WORLD not in links:
+                links[WORLD] = ET.Element("link", name=WORLD)
+
+    def unmoored(self, carried: dict[str, Joint], order: list[str]) -> bool:
+        """Take away a world that the robot only floats in."""
+        floating = [j for j in carried.values() if j.kind == "floating"]
+        if not floating:
+            return False
+        first = floating[0]
+        if len(floating) > 1 or first.parent != order[0] or sum(j.parent == order[0] for j in carried.values()) > 1:
+            raise self.fail(f"joint {first.name!r}", "is floating, which only the joint of the whole robot can be")
+        del carried[first.child]
+        order.remove(first.parent)
+        return True
+
+    def known(self, e: ET.Element, where: str) -> dict[str, float | str]:
+        """What the file says of a joint's drive. An effort of 0 is how tools write that they do not know."""
+        found: dict[str, float | str] = {}
+        for tag, key, name in (("limit", "effort", "torque_limit"), ("dynamics", "damping", "viscous"),
+                               ("dynamics", "friction", "coulomb")):  # fmt: skip
+            element = e.find(tag)
+            if element is None or element.get(key) is None:
+                continue
+            value = self.number(element, key, where)
+            if value < 0:
+                raise self.fail(where, f"<{tag} {key}={value:g}>; expected 0 or more")
+            if value > 0 or name != "torque_limit":
+                found[name] = value
+        return found
+
+    def without_mass(self, name: str, e: ET.Element, joint: Joint) -> str:
+        inertial = e.find("inertial")
+        if inertial is None:
+            return f"no <inertial>, but joint {joint.name!r} moves it: give it a mass and an inertia"
+        mass = inertial.find("mass")
+        value = 0.0 if mass is None else self.number(mass, "value", f"link {name!r}")
+        return f"mass {value:g} kg; expected a positive number, as joint {joint.name!r} moves it"
+
+    def hint_at_pivots(self, parts: list[Part], joints: list[Joint]) -> None:
+        """Say where an inertia looks as if it were about the joint: a hint, for nothing proves it."""
+        kinds, found = {j.child: j.kind for j in joints}, []
+        for part in parts:
+            away = float(np.linalg.norm(part.com_m))
+            if kinds.get(part.name) != "hinge" or away < PIVOT_M:
+                continue
+            xx, yy, zz = part.inertia_kg_m2[:3]
+            about = (xx + yy + zz) / 2  # of a thin part, the moment across it
+            low, high = (share * part.mass_kg * away**2 for share in PIVOT_SHARE)
+            if low <= min(max(xx, yy, zz), about) <= high:
+                found.append(part.name)
+        if found:
+            self.notes.append(
+                f"hint: the inertia of {_list(found)} looks as if it were about the joint; URDF means the centre of mass"
+            )
 
     def order(self, root: str, joints: list[Joint]) -> list[str]:
         order = [root]
         for name in order:
             order.extend(j.child for j in joints if j.parent == name)
         return order
-
-    def table(self, elements: dict[str, ET.Element], names: list[str], tag: str, key: str) -> dict[str, float]:
-        out = {}
-        for name in names:
-            found = elements[name].find(tag)
-            if found is not None and found.get(key) is not None:
-                out[name] = self.number(found, key, f"joint {name!r}")
-        return out
 
     # -- elements ----------------------------------------------------------------------------------------------------
 
@@ -134,8 +199,14 @@ class _Reader:
             value = float(text)
         except ValueError:
             raise self.fail(where, f"<{element.tag} {key}={text!r}> is not a number") from None
-        if not math.isfinite(value):
-            raise self.fail(where, f"<{element.tag} {key}={text!r}> is not finite")
+        if not abs(value) <= LARGEST:
+            raise self.fail(where, f"<{element.tag} {key}={text!r}>: expected a number of at most {LARGEST:g}")
+        return value
+
+    def positive(self, element: ET.Element, key: str, where: str) -> float:
+        value = self.number(element, key, where)
+        if value <= 0:
+            raise self.fail(where, f"<{element.tag} {key}={value:g}>; expected a positive number")
         return value
 
     def vector(self, element: ET.Element, key: str, where: str, default: Vec3) -> Vec3:
@@ -146,7 +217,7 @@ class _Reader:
             values = tuple(float(v) for v in text.split())
         except ValueError:
             values = ()
-        if len(values) != 3 or not all(map(math.isfinite, values)):
+        if len(values) != 3 or not all(abs(v) <= LARGEST for v in values):
             raise self.fail(where, f"<{element.tag} {key}={text!r}>: expected three numbers")
         return values[0], values[1], values[2]
 
@@ -156,74 +227,91 @@ class _Reader:
             return ZERO3, NO_TURN
         return self.vector(found, "xyz", where, ZERO3), turn_of_rpy(self.vector(found, "rpy", where, ZERO3))
 
-    def joint(self, e: ET.Element, links: dict[str, ET.Element]) -> Joint:
-        name = self.named(e, "joint")
+    def joint(self, name: str, e: ET.Element, links: dict[str, ET.Element]) -> Joint:
         where = f"joint {name!r}"
         kind = e.get("type", "")
         if kind not in KINDS:
             raise self.fail(where, f"kind {kind!r} is not supported; there are: {', '.join(KINDS)}")
-        if e.find("mimic") is not None:
-            raise self.fail(where, "<mimic> is not supported: give the joint a drive of its own or fix it")
         ends = {}
         for tag in ("parent", "child"):
             found = e.find(tag)
             link = found.get("link", "") if found is not None else ""
             if link not in links:
-                raise self.fail(where, f"its {tag} link {link!r} is not in the file; there are: {', '.join(links)}")
+                raise self.fail(where, f"its {tag} link {link!r} is not in the file; there are: {_list(list(links))}")
             ends[tag] = link
         position, rotation = self.origin(e, where)
+        mimic = e.find("mimic")
+        if mimic is not None:
+            self.notes.append(f"{where} mimics {mimic.get('joint', '?')!r}, which is left out: it is held at zero")
+            kind = "fixed"
         axis_element = e.find("axis")
         axis = (1.0, 0.0, 0.0) if axis_element is None else self.vector(axis_element, "xyz", where, (1.0, 0.0, 0.0))
         length = math.sqrt(sum(v * v for v in axis))
-        if kind != "fixed" and length < 1e-9:
+        if kind not in ("fixed", "floating") and length < 1e-9:
             raise self.fail(where, "its axis has no direction (0 0 0)")
-        unit = (axis[0] / length, axis[1] / length, axis[2] / length) if length > 0 else (1.0, 0.0, 0.0)
-        lower, upper = 0.0, 0.0
-        if kind == "continuous":
-            lower, upper = -CONTINUOUS_RAD, CONTINUOUS_RAD
-        elif kind != "fixed":
-            limit = e.find("limit")
-            if limit is None:
-                raise self.fail(where, f"a {kind} joint needs <limit lower=... upper=...>")
-            lower, upper = self.number(limit, "lower", where, 0.0), self.number(limit, "upper", where, 0.0)
-            if not lower < upper:
-                raise self.fail(where, f"its limits leave no range: lower {lower:g}, upper {upper:g}")
-        return Joint(name, KINDS[kind], ends["parent"], ends["child"], position, unit, lower, upper, rotation)
+        unit = (axis[0] / length, axis[1] / length, axis[2] / length) if length > 1e-9 else (1.0, 0.0, 0.0)
+        lower, upper = self.limits(name, kind, e)
+        limit = e.find("limit")
+        speed = 0.0 if limit is None else self.number(limit, "velocity", where, 0.0)
+        if speed < 0:
+            raise self.fail(where, f"<limit velocity={speed:g}>; expected 0 or more")
+        top = speed if speed > 0 and kind != "fixed" else math.inf
+        return Joint(
+            name, KINDS[kind], ends["parent"], ends["child"], position, unit, lower, upper, rotation, top_speed=top
+        )
 
-    def part(self, name: str, e: ET.Element, joint: Joint | None, root: bool) -> Part:
+    def limits(self, name: str, kind: str, e: ET.Element) -> tuple[float, float]:
+        """(lower, upper) stops of a joint; far away where there are none, or where none are stated."""
+        if kind in ("fixed", "floating"):
+            return 0.0, 0.0
+        far = CONTINUOUS_M if kind == "prismatic" else CONTINUOUS_RAD
+        if kind == "continuous":
+            return -far, far
+        limit, where = e.find("limit"), f"joint {name!r}"
+        if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
+            self.assumed.append(f"{where} states no limits: taken as without stops")
+            return -far, far
+        lower, upper = self.number(limit, "lower", where, 0.0), self.number(limit, "upper", where, 0.0)
+        if not lower < upper:
+            raise self.fail(where, f"its limits leave no range: lower {lower:g}, upper {upper:g}")
+        return lower, upper
+
+    def part(self, name: str, e: ET.Element, joint: Joint | None) -> Part:
         where = f"link {name!r}"
-        shapes = tuple(s for c in e.findall("collision") if (s := self.shape(c, where)) is not None)
+        shapes = tuple(s for c in e.findall("collision") if (s := self.shape(name, c)) is not None)
         inertial = e.find("inertial")
         if inertial is None:
-            if joint is not None and joint.kind != "fixed":
-                raise self.fail(
-                    where, f"no <inertial>, but joint {joint.name!r} moves it: give it a mass and an inertia"
-                )
             return Part(name, 0.0, ZERO3, (0.0,) * 6, shapes)
         com, turn = self.origin(inertial, where)
         mass_element, tensor = inertial.find("mass"), inertial.find("inertia")
-        if mass_element is None or tensor is None:
-            missing = "mass" if mass_element is None else "inertia"
-            raise self.fail(where, f"<inertial> lacks <{missing}>")
+        if mass_element is None:
+            raise self.fail(where, "<inertial> lacks <mass>")
         mass = self.number(mass_element, "value", where)
+        if mass < 0:
+            raise self.fail(where, f"mass {mass:g} kg; expected a positive number")
+        if mass <= DUMMY_KG:
+            return Part(name, 0.0, ZERO3, (0.0,) * 6, shapes)
+        if tensor is None:
+            raise self.fail(where, "<inertial> lacks <inertia>")
         keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         xx, xy, xz, yy, yz, zz = (
             self.number(tensor, k, where, 0.0 if k in ("ixy", "ixz", "iyz") else None) for k in keys
         )
         own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         moments = np.linalg.eigvalsh(own)
-        if mass < 0 or (joint is not None and joint.kind != "fixed" and mass == 0):
-            raise self.fail(where, f"mass {mass:g} kg; expected a positive number")
-        if mass > 0 and (moments[0] <= 0 or moments[2] > (moments[0] + moments[1]) * 1.001):
+        if not own.any() and joint is not None and joint.kind == "fixed":
+            moments = np.full(3, mass * POINT_M**2)
+            own = np.diag(moments)
+            self.assumed.append(f"{where}: a mass without inertia: taken as a ball of 1 cm")
+        if moments[0] <= 0 or moments[2] > (moments[0] + moments[1]) * 1.001:
             raise self.fail(
                 where, "no rigid body has this inertia: principal moments " + ", ".join(f"{m:.3g}" for m in moments)
             )
         axes = rotation_matrix(turn)
-        turned = axes @ own @ axes.T
-        entries = tuple(float(turned[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-        return Part(name, mass, com, entries, shapes)  # type: ignore[arg-type]
+        return Part(name, mass, com, entries(axes @ own @ axes.T), shapes)
 
-    def shape(self, collision: ET.Element, where: str) -> Shape | None:
+    def shape(self, link: str, collision: ET.Element) -> Shape | None:
+        where = f"link {link!r}"
         position, rotation = self.origin(collision, where)
         geometry = collision.find("geometry")
         found = geometry[0] if geometry is not None and len(geometry) else None
@@ -231,15 +319,15 @@ class _Reader:
             raise self.fail(where, "<collision> without a geometry")
         if found.tag == "box":
             x, y, z = self.vector(found, "size", where, (0.0, 0.0, 0.0))
+            if min(x, y, z) <= 0:
+                raise self.fail(where, f"<box size='{x:g} {y:g} {z:g}'>: expected three positive numbers")
             return Shape("box", (x / 2, y / 2, z / 2), position, rotation)
         if found.tag == "sphere":
-            return Shape("sphere", (self.number(found, "radius", where),), position, rotation)
+            return Shape("sphere", (self.positive(found, "radius", where),), position, rotation)
         if found.tag in ("cylinder", "capsule"):
-            size = self.number(found, "radius", where), self.number(found, "length", where)
+            size = self.positive(found, "radius", where), self.positive(found, "length", where)
             return Shape(found.tag, size, position, rotation)
-        self.notes.append(
-            f"{where}: collision <{found.tag}> skipped; only box, sphere, cylinder and capsule touch the floor"
-        )
+        self.meshes[link] = None
         return None
 
 
@@ -254,37 +342,6 @@ def turn_of_rpy(rpy: Vec3) -> Quat:
     )
 
 
-def _merged(parts: dict[str, Part], carried: dict[str, Joint], root: str) -> tuple[list[Part], list[Joint]]:
-    """Parts and joints without rigidly attached links that have no mass: their shapes and joints go to the carrier."""
-    joints = dict(carried)
-    for name in list(joints)[::-1]:
-        joint, part = joints[name], parts[name]
-        if joint.kind != "fixed" or part.mass_kg > 0:
-            continue
-        at = _pose(joint.position_m, joint.rotation)
-        carrier = parts[joint.parent]
-        moved = tuple(_moved_shape(at, s) for s in part.shapes)
-        parts[joint.parent] = replace(carrier, shapes=(*carrier.shapes, *moved))
-        for child, other in joints.items():
-            if other.parent == name:
-                position, rotation = _split(compose(at, _pose(other.position_m, other.rotation)))
-                joints[child] = replace(other, parent=joint.parent, position_m=position, rotation=rotation)
-        del joints[name], parts[name]
-    if parts[root].mass_kg == 0:
-        # A bolted root needs no mass of its own; engines want a number.
-        parts[root] = replace(parts[root], mass_kg=1.0, inertia_kg_m2=(1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0))
-    return list(parts.values()), [joints[name] for name in parts if name != root]
-
-
-def _moved_shape(at: NDArray[np.float64], shape: Shape) -> Shape:
-    position, rotation = _split(compose(at, _pose(shape.position_m, shape.rotation)))
-    return replace(shape, position_m=position, rotation=rotation)
-
-
-def _pose(position: Vec3, rotation: Quat) -> NDArray[np.float64]:
-    return np.array([*position, *rotation])
-
-
-def _split(pose: NDArray[np.float64]) -> tuple[Vec3, Quat]:
-    x, y, z, a, b, c, d = (float(v) for v in pose)
-    return (x, y, z), (a, b, c, d)
+def _list(names: list[str]) -> str:
+    """A few names in one short line."""
+    return ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")

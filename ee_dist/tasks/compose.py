@@ -13,7 +13,20 @@ from omegaconf.errors import OmegaConfBaseException
 
 from ee_dist.tasks.config import Config, ConfigError, Handling, check_keys, groups_of, one_of
 
-TASKS = ("recover", "view", "online", "study", "trial", "compare", "explain", "improve", "reveal", "import")
+TASKS = (
+    "recover",
+    "view",
+    "online",
+    "study",
+    "trial",
+    "compare",
+    "explain",
+    "improve",
+    "reveal",
+    "import",
+    "robot",
+    "export",
+)
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([0-9, ]+)$")
 
 

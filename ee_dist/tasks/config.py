@@ -32,6 +32,7 @@ def one_of(what: str, value: str, allowed: tuple[str, ...]) -> str:
 class RobotConfig:
     name: str = "quadruped"
     urdf: str | None = None
+    file: str | None = None
     drives: str | None = None
 
 
@@ -144,6 +145,8 @@ class Config:
     effect: Any = None
     hidden: Any = None
     log: str | None = None
+    urdf: str | None = None
+    mjcf: str | None = None
     robot: RobotConfig = field(default_factory=RobotConfig)
     engine: EngineConfig = field(default_factory=EngineConfig)
     evaluator: EvaluatorConfig = field(default_factory=EvaluatorConfig)

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array
+from ee_dist.robots.ranges import command_span
+from ee_dist.trials.log import Array, start_of
 
 RISE_S = 0.5
 FIXTURES = ("floor", "stand")
@@ -74,13 +75,17 @@ class Excitation:
         return gait_weights(robot, self.amplitude, self.seed) if self.kind == "gait" else None
 
     def commands(self, robot: Robot) -> Array:
-        """Planned positions (T, M) in rad (m for a slide), within the joints' limits. Not for a gait."""
+        """Planned commands (T, M) in the units of the drives, positions within the joints' limits. Not for a gait."""
         t = np.arange(self.steps(robot)) * robot.time_step_s
-        limits = np.array([(robot.joint(d.joint).lower, robot.joint(d.joint).upper) for d in robot.drives])
+        limits = np.array([command_span(robot, d) for d in robot.drives])
         middle, half = limits.mean(axis=1), (limits[:, 1] - limits[:, 0]) / 2
         shape = _SHAPES[self.kind](t, len(middle), np.random.default_rng([self.seed, len(self.kind)]))
         rise = np.minimum(t / RISE_S, 1.0)[:, None]
-        return middle + half * self.amplitude * np.clip(shape, -1.0, 1.0) * rise
+        planned = middle + half * self.amplitude * np.clip(shape, -1.0, 1.0) * rise
+        start = start_of(robot)
+        held = (start != 0.0) & np.array([d.command == "position" for d in robot.drives])
+        # From where it stands: a robot that starts elsewhere than in the middle of its range is not thrown there.
+        return np.where(held, planned + (1.0 - rise) * (start - middle), planned)
 
 
 def parse(text: str) -> Excitation:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.robots.model import Robot
+
 Array = NDArray[Any]
 """Of float64 where nothing else is said."""
 
@@ -106,3 +108,8 @@ class State:
     speeds: Array
     base_pose: Array | None = None
     base_twist: Array | None = None
+
+
+def start_of(robot: Robot) -> Array:
+    """(M,) positions at which the robot's driven joints stand when a rollout begins, rad (m)."""
+    return np.array([robot.joint(d.joint).start for d in robot.drives])

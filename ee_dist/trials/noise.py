@@ -5,22 +5,27 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ee_dist.robots.model import Robot, Sensor
+from ee_dist.robots.ranges import drive_of, span, top_speed, top_torque
 
 BODY_RANGE = {"roll": 1.0, "pitch": 1.0, "height": 0.25, "x": 2.0, "y": 2.0, "speed_x": 1.0, "turn_rate": 4.0}
 """Full range of channels of the body: rad, rad, m, m, m, m/s, rad/s. Typical of small inertial units and range finders."""
 
 
 def channel_range(robot: Robot, sensor: Sensor) -> float:
-    """Full range of a channel in its own unit: of the joint, of its drive, or of the instrument."""
+    """Full range of a channel in its own unit, always finite: of the joint, of its drive, or of the instrument.
+
+    Where a description leaves it open it is an assumption; see ``robots/ranges.py``.
+    """
     if sensor.kind in ("touch", "angle"):
         return 2.0
     if sensor.kind in BODY_RANGE:
         return BODY_RANGE[sensor.kind]
     joint = robot.joint(sensor.target)
     if sensor.kind == "position":
-        return joint.upper - joint.lower
-    drive = next(d for d in robot.drives if d.joint == sensor.target)
-    return 2.0 * (drive.speed_limit if sensor.kind == "velocity" else drive.torque_limit)
+        low, high = span(joint)
+        return high - low
+    drive = drive_of(robot, sensor.target)
+    return 2.0 * (top_speed(joint, drive) if sensor.kind == "velocity" else top_torque(robot, drive))
 
 
 def with_noise(robot: Robot, share: float) -> Robot:

@@ -9,6 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ee_dist.recording.records import DIAGNOSIS, PREDICTION, REPAIR, RunRecord, TrialRecord
+from ee_dist.robots.ranges import command_units
 from ee_dist.viewing import blueprint, channels, search_curves, story, world
 from ee_dist.viewing.channels import Pair
 from ee_dist.viewing.robot3d import Appearance, Shown
@@ -90,7 +91,8 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
     if touch:
         tabs.append(blueprint.lanes("/touch", "Feet on the floor"))
         tabs.append(blueprint.sensor_plots(touch, "Touch values", axis))
-    tabs.append(blueprint.plot("/commands", "Commands (rad)", axis))
+    units = sorted({u for u in command_units(run.robot).values() if u is not None})
+    tabs.append(blueprint.plot("/commands", f"Commands ({', '.join(units)})", axis))
     beside = [blueprint.sensor_plots(others, "Other channels", axis)] if others else []
     below = rrb.Horizontal(rrb.Tabs(*tabs, active_tab=0), *beside)
     left = rrb.Vertical(scene, below, row_shares=[13, 10])

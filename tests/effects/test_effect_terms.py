@@ -26,7 +26,7 @@ def _unchanged(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 @st.composite
 def terms(draw: st.DrawFn) -> Term:
     """Any effect at any target of the quadruped, anywhere within its useful range."""
-    entry = CATALOGUE[draw(st.sampled_from(sorted(CATALOGUE)))]
+    entry = CATALOGUE[draw(st.sampled_from(sorted(n for n, e in CATALOGUE.items() if e.targets(QUADRUPED))))]
     target = draw(st.sampled_from(entry.targets(QUADRUPED)))
     bounds = entry.bounds(QUADRUPED, target)
     return term(entry.name, target, **{name: draw(st.floats(*pair)) for name, pair in bounds.items()})

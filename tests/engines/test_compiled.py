@@ -17,7 +17,7 @@ from ee_dist.engines import compiled as module
 from ee_dist.engines import drive, drivers, loop
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
-from ee_dist.robots.model import RobotError, Sensor
+from ee_dist.robots.model import COMMANDS, RobotError, Sensor
 from ee_dist.robots.quadruped import quadruped
 
 
@@ -62,7 +62,8 @@ def test_a_drive_and_its_stops(robots: int, motors: int, elastic: bool, seed: in
     state = [rng.normal(0, 2, shape) for _ in range(3)]
     switched = [rng.uniform(0, 1, shape) for _ in range(3)]
     written = [rng.normal(0, 1, shape) for _ in range(5)]
-    assert_same_bits(drive._drive, [table, *state, *switched, 0.01, elastic, *written])
+    kinds = rng.integers(0, len(COMMANDS), shape)
+    assert_same_bits(drive._drive, [kinds, table, *state, *switched, 0.01, elastic, *written])
     lower = rng.uniform(-2, 0, shape)
     present = rng.random(shape) < 0.8
     upper, inertia = lower + rng.uniform(0, 2, shape), rng.uniform(0.001, 0.1, shape)

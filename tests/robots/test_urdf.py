@@ -17,6 +17,7 @@ from ee_dist.robots.describe import load_robot, robot_of
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.serial import robot_from_json, robot_to_json
 from ee_dist.robots.urdf import UrdfError, read_urdf, turn_of_rpy
+from ee_dist.trials.noise import channel_range
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 ARM = EXAMPLES / "arm.urdf"
@@ -38,7 +39,7 @@ def test_masses_limits_and_shapes_come_from_the_file() -> None:
     assert [j.name for j in body.joints] == ["turn", "shoulder", "elbow"]
     assert [p.mass_kg for p in body.parts[1:]] == [0.6, 0.4, 0.25]
     assert (body.joints[1].lower, body.joints[1].upper) == (-1.6, 1.6)
-    assert body.effort == {"turn": 4.0, "shoulder": 6.0, "elbow": 3.0}
+    assert {n: d["torque_limit"] for n, d in body.drives.items()} == {"turn": 4.0, "shoulder": 6.0, "elbow": 3.0}
     forearm = body.parts[3]
     assert forearm.shapes[0].size == (0.08, 0.015, 0.015)
     # The tool has no mass and is rigidly attached: its shape went to the forearm, at the tool's place.
@@ -99,9 +100,10 @@ def test_meshes_are_skipped_with_a_note(tmp_path: Path) -> None:
         geometry.clear()
         ET.SubElement(geometry, "mesh", filename="arm.stl")
 
-    body = read_urdf(changed(tmp_path, forearm=meshed))
-    assert "mesh" in body.notes[0]
-    assert "forearm" in body.notes[0]
+    body = read_urdf(changed(tmp_path, forearm=meshed, upper_arm=meshed))
+    (note,) = body.notes
+    assert "collision meshes of 2 links left out" in note
+    assert "forearm" in note
 
 
 def _drop(tag: str):  # type: ignore[no-untyped-def]
@@ -124,7 +126,10 @@ def _set(tag: str, key: str, value: str):  # type: ignore[no-untyped-def]
         ({"forearm": _set("inertial/inertia", "ixx", "0.1")}, r"no rigid body has this inertia"),
         ({"elbow": _set("child", "link", "hand")}, r"joint 'elbow': its child link 'hand' is not in the file"),
         ({"elbow": _set("parent", "link", "tool")}, r"form a loop"),
-        ({"elbow": _drop("limit")}, r"joint 'elbow': a revolute joint needs <limit"),
+        ({"elbow": _set("limit", "effort", "-3")}, r"joint 'elbow': <limit effort=-3>; expected 0 or more"),
+        ({"elbow": _set("limit", "upper", "1e308")}, r"expected a number of at most 1e\+09"),
+        ({"forearm": _set("inertial/mass", "value", "-1")}, r"link 'forearm': mass -1 kg; expected a positive number"),
+        ({"elbow": lambda e: e.set("type", "floating")}, r"is floating, which only the joint of the whole robot"),
         ({"elbow": _set("limit", "lower", "3")}, r"leave no range"),
         ({"elbow": _set("axis", "xyz", "0 0 0")}, r"no direction"),
         ({"elbow": lambda e: e.set("type", "planar")}, r"kind 'planar' is not supported"),
@@ -160,6 +165,24 @@ def test_broken_xml_names_the_line(tmp_path: Path) -> None:
         ("urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: smell}]", "no sensor kind 'smell'"),
         ("urdf: ARM\nfree_bas: true", "unknown key 'free_bas'; did you mean free_base"),
         ("urdf: ARM\ntime_step_s: 2", "seconds, not milliseconds"),
+        ("urdf: ARM\ndrives: {elbow: {kp: .nan}}", "drives: elbow: kp: nan; expected 0 to 1e"),
+        ("urdf: ARM\ndrives: {elbow: {kp: -1}}", "drives: elbow: kp: -1; expected 0 to 1e"),
+        ("urdf: ARM\ndrives: {elbow: {kp: 1e308}}", "drives: elbow: kp: 1e.308; expected 0 to 1e"),
+        ("urdf: ARM\ndrives: {elbow: {kp: 1, speed_limit: 0}}", "elbow: speed_limit: 0; expected more than 0"),
+        (
+            "urdf: ARM\ndrives: {elbow: {command: voltage}}",
+            "command: 'voltage'; expected one of position, speed, torque",
+        ),
+        ("urdf: ARM\ndrives: {elbow: {command: speed}}", r"expected at least 'kp' \(torque per speed error\)"),
+        ("urdf: ARM\ngravity_m_s2: 1e9", "gravity_m_s2: 1e.09; expected -1000 to 1000"),
+        (
+            "urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: roll, noise: -1}]",
+            "sensors: a: noise: -1; expected 0 to",
+        ),
+        (
+            "urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: roll}, {name: a, kind: pitch}]",
+            "sensors: two are named 'a'",
+        ),
         ("robot: servo_pendlum", "no robot named 'servo_pendlum'; did you mean servo_pendulum"),
         ("robot: servo_pendulum\nmass: 1", "servo_pendulum has no 'mass'; did you mean mass_kg"),
         ("robot: servo_pendulum\nmass_kg: heavy", "mass_kg: expected a number"),
@@ -173,3 +196,118 @@ def test_a_wrong_description_is_one_clear_line(tmp_path: Path, text: str, messag
     with pytest.raises(RobotError, match=message) as caught:
         load_robot(file)
     assert "\n" not in str(caught.value)
+
+
+def text_of(inside: str) -> str:
+    return f'<robot name="r">{inside}</robot>'
+
+
+def link(name: str, mass: float | None = 1.0, com: str = "0 0 0", inertia: float = 0.01) -> str:
+    if mass is None:
+        return f'<link name="{name}"/>'
+    moments = " ".join(
+        f'{k}="{inertia if k in ("ixx", "iyy", "izz") else 0}"' for k in ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
+    )
+    return f'<link name="{name}"><inertial><origin xyz="{com}"/><mass value="{mass}"/><inertia {moments}/></inertial></link>'
+
+
+def hinge(name: str, parent: str, child: str, kind: str = "revolute", inside: str = "", xyz: str = "0 0 0.1") -> str:
+    limit = "" if "limit" in inside else '<limit lower="-1" upper="1" effort="5" velocity="3"/>'
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}"/>'
+        f'<axis xyz="0 1 0"/>{limit}{inside}</joint>'
+    )
+
+
+def read(tmp_path: Path, *inside: str):  # type: ignore[no-untyped-def]
+    file = tmp_path / "robot.urdf"
+    file.write_text(text_of("".join(inside)))
+    return read_urdf(file)
+
+
+def test_an_implicit_world_gives_way_to_the_link_that_it_holds(tmp_path: Path) -> None:
+    body = read(
+        tmp_path,
+        hinge("weld", "world", "base", "fixed", xyz="0 0 0.7"),
+        link("base"),
+        hinge("a", "base", "arm"),
+        link("arm"),
+    )
+    assert [p.name for p in body.parts] == ["base", "arm"]
+    assert body.start_position_m == (0.0, 0.0, 0.7)
+    assert body.joints[0].top_speed == 3.0
+
+
+def test_a_world_that_a_joint_turns_on_stays_and_both_engines_take_it(tmp_path: Path) -> None:
+    (tmp_path / "r.yaml").write_text("urdf: robot.urdf\ndrives: {a: {kp: 1}}\n")
+    read(tmp_path, link("world", None), hinge("a", "world", "arm"), link("arm", com="0 0 0.2"))
+    robot, notes = load_robot(tmp_path / "r.yaml")
+    assert robot.root.name == "world"
+    assert notes == ()
+    job = [Rollout(robot, Commands(np.full((1, 1), 0.3)), 50, pose=True)]
+    for engine in (PyBulletEngine(), MuJoCoEngine(threads=1)):
+        assert engine.rollout(job)[0].finite
+
+
+def test_frames_of_a_nanogram_are_frames(tmp_path: Path) -> None:
+    body = read(
+        tmp_path, link("base"), hinge("a", "base", "arm"), link("arm"),
+        hinge("t", "arm", "tool", "fixed"), link("tool", 1e-9, inertia=0.0),
+    )  # fmt: skip
+    assert [p.name for p in body.parts] == ["base", "arm"]
+    assert body.notes == ()
+
+
+def test_a_helper_link_between_two_joints_gets_a_small_mass_and_says_so(tmp_path: Path) -> None:
+    body = read(
+        tmp_path, link("base"), hinge("a", "base", "cross", "continuous"), link("cross", 0.0, inertia=0.0),
+        hinge("b", "cross", "arm"), link("arm"),
+    )  # fmt: skip
+    assert 0 < body.parts[1].mass_kg < 0.01
+    assert any("cross" in a for a in body.assumed)
+
+
+def test_a_massless_link_takes_over_what_is_bolted_to_it(tmp_path: Path) -> None:
+    body = read(
+        tmp_path, link("base"), hinge("a", "base", "frame"), link("frame", None),
+        hinge("t", "frame", "load", "fixed", xyz="0.2 0 0"), link("load", 2.0, com="0.1 0 0"),
+    )  # fmt: skip
+    assert [(p.name, p.mass_kg) for p in body.parts] == [("base", 1.0), ("frame", 2.0)]
+    assert body.parts[1].com_m == pytest.approx((0.3, 0.0, 0.0))
+
+
+def test_a_floating_joint_makes_the_base_free_and_a_mimic_is_held(tmp_path: Path) -> None:
+    body = read(
+        tmp_path, link("world", None), hinge("float", "world", "base", "floating"), link("base"),
+        hinge("a", "base", "one", "prismatic"), link("one"),
+        hinge("b", "base", "two", "prismatic", '<mimic joint="a"/>'), link("two"),
+    )  # fmt: skip
+    assert body.free_base
+    assert [j.kind for j in body.joints] == ["slide", "fixed"]
+    assert any("mimics 'a'" in n for n in body.notes)
+
+
+def test_a_joint_without_limits_has_no_stops_and_a_finite_scale(tmp_path: Path) -> None:
+    (tmp_path / "r.yaml").write_text("urdf: robot.urdf\ndrives: {a: {kp: 1, torque_limit: 2}}\n")
+    body = read(
+        tmp_path, link("base"), hinge("a", "base", "arm", inside='<limit effort="0" velocity="0"/>'), link("arm")
+    )
+    assert "states no limits" in body.assumed[0]
+    robot, _ = load_robot(tmp_path / "r.yaml")
+    for sensor in robot.sensors:
+        assert 0 < channel_range(robot, sensor) <= 4 * math.pi
+
+
+def test_an_inertia_about_the_joint_is_hinted_at(tmp_path: Path) -> None:
+    thin = 4 / 3 * 1.0 * 0.25**2
+    about_joint, about_centre = link("arm", com="0 0 0.25", inertia=thin), link("arm", com="0 0 0.25", inertia=thin / 4)
+    assert "hint" in read(tmp_path, link("base"), hinge("a", "base", "arm"), about_joint).notes[0]
+    assert not read(tmp_path, link("base"), hinge("a", "base", "arm"), about_centre).notes
+
+
+def test_a_drive_without_a_speed_limit_has_the_speed_of_its_joint_as_scale() -> None:
+    robot, _ = load_robot({"urdf": str(ARM), "drives": {"shoulder": {"kp": 1}}})
+    velocity = next(s for s in robot.sensors if s.kind == "velocity")
+    assert math.isinf(robot.drives[0].speed_limit)
+    assert channel_range(robot, velocity) == 2 * robot.joint("shoulder").top_speed
+    assert math.isfinite(channel_range(robot.with_joint("shoulder", top_speed=math.inf), velocity))

@@ -33,6 +33,10 @@ import pytest
         (["+scenario=8", "plugins=[nowhere.py]"], "no such file of effects: "),
         (["task=view"], "log=: which log?"),
         (["task=view", "log=nowhere.mcap"], "nowhere.mcap"),
+        (["task=robot"], "task=robot looks at one file: urdf=FILE.urdf or mjcf=FILE.xml"),
+        (["task=robot", "urdf=nowhere.urdf"], "nowhere.urdf: no such file"),
+        (["task=robot", "mjcf=nowhere.xml"], "nowhere.xml: no such file"),
+        (["task=robot", "urdf=a.urdf", "task.output=../x.yaml"], "expected the name of a file that ends in .yaml"),
     ],
 )  # fmt: skip
 def test_one_line_and_a_status(cli, arguments, said):

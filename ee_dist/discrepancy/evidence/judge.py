@@ -152,8 +152,8 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
     """Best held-out energy first, those that earned their place before the others; ties are named, and of tied laws
     the one that another contains goes first: a richer law can always mimic a simpler one."""
     ordered = sorted(found, key=lambda j: (not j.earned, float(j.held.sum())))
-    for j in ordered:
-        j.tied_with = []
+    for k, j in enumerate(ordered):
+        j.tied_with, j.rank = [], k
     for a, one in enumerate(ordered):
         for other in ordered[a + 1 :]:
             if one.earned and other.earned and tied(one, other):
@@ -163,23 +163,22 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
         best = ordered[0]
         simpler = [j for j in ordered[1:] if j.name in best.tied_with and contains(best.proposal, j.proposal)]
         if simpler:
-            ordered.remove(simpler[0])
-            ordered.insert(0, simpler[0])
+            first = min(simpler, key=lambda j: (j.proposal.size, j.rank))
+            ordered.remove(first)
+            ordered.insert(0, first)
     for k, j in enumerate(ordered):
         j.rank = k + 1
     return ordered
 
 
 def contains(richer: Proposal, simpler: Proposal) -> bool:
-    """Whether the richer law is the simpler one for some value of its parameters: a law with one more term, or one value
-    for each joint instead of one for all."""
+    """Whether the richer proposal is to give way to the simpler one where data do not tell them apart: a law with one more
+    term, or a family of values, one for each joint, against anything that does with fewer."""
+    if len(richer.parts) > 1:
+        return simpler.size < richer.size
     if len(simpler.parts) > 1:
         return False
-    s = simpler.parts[0]
-    if len(richer.parts) > 1:
-        alone = {c.effect.name for c in richer.parts} == {s.effect.name}
-        return (alone and richer.size > simpler.size) or any(c.name == s.name for c in richer.parts)
-    r = richer.parts[0]
+    r, s = richer.parts[0], simpler.parts[0]
     return r.target == s.target and s.effect.name in r.effect.contains
 
 

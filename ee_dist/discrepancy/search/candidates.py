@@ -134,10 +134,10 @@ def candidates(
             find(effect)
     found = []
     for entry in CATALOGUE.values():
-        if not entry.searchable or entry.name in banned or entry.family not in seen:
+        if entry.name in banned or entry.family not in seen:
             continue
-        places = entry.targets(robot)
-        if sharing and entry.parameters and entry.family in SHAREABLE:
+        places = entry.proposed(robot)
+        if sharing and places and entry.parameters and entry.family in SHAREABLE:
             places = (*places, *entry.shared(robot))
         for target in places:
             name = f"{entry.name}@{target}" if target else entry.name

@@ -34,6 +34,7 @@ class Group:
         self.torques: Array = bind("qfrc_applied")
         self.force: Array = bind("xfrc_applied")[:, model.root, :3]
         self.pressed: Array = bind("sensordata")
+        self.damping: Array | None = self.batch.expand("dof_damping") if model.damped else None
         self.motors, self.dof = _index(model.motors), _index(model.dof)
         drives = len(members[0].model.drives)
         self.qpos_of, self.dof_of = _places(model.motors, model.qpos, drives), _places(model.motors, model.dof, drives)
@@ -153,9 +154,13 @@ class MuJoCoBodies:
                 truth.base_twist[rows] = group.base_twist()
         return truth
 
-    def step(self, torques: Array, force: Array | None) -> None:
+    def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
         for rows, group in self.groups:
             _scatter(rows, torques, group.dof_of, group.torques)
+            if group.damping is not None and give is not None:
+                # MuJoCo takes damping at the end of the step, and so counts what the torque has of it already once more.
+                _scatter(rows, give, group.dof_of, group.damping)
+                group.torques += group.damping * group.speeds
             if force is not None:
                 group.force[:] = force[rows]
             group.step()

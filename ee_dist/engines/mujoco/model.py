@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.engines.contract import EngineError
+from ee_dist.engines.drive import stiff_joints
 from ee_dist.engines.loop import gravity_vector
 from ee_dist.engines.mujoco.contact import MARGIN_M
 from ee_dist.robots.model import Part, Quat, Robot
@@ -37,7 +38,7 @@ UNUSED = (
     | _OFF.mjDSBL_FRICTIONLOSS
     | _OFF.mjDSBL_LIMIT
     | _OFF.mjDSBL_SPRING
-    | _OFF.mjDSBL_DAMPER
+    | _OFF.mjDSBL_DAMPER  # but for controllers that are too steep for an explicit step
     | _OFF.mjDSBL_ACTUATION
     | _OFF.mjDSBL_ISLAND
     | _OFF.mjDSBL_AUTORESET
@@ -64,7 +65,8 @@ def structure_key(robot: Robot) -> tuple[Any, ...]:
     )
     touch = tuple(s.target for s in robot.sensors if s.kind == "touch")
     fixed_at = None if robot.free_base else (robot.start_position_m, robot.start_rotation)
-    return parts, joints, touch, robot.motor_names, fixed_at, robot.time_step_s, robot.world.has_floor
+    floor = robot.world.has_floor
+    return parts, joints, touch, robot.motor_names, fixed_at, robot.time_step_s, floor, bool(stiff_joints(robot).any())
 
 
 class Model:
@@ -80,9 +82,10 @@ class Model:
         except ValueError as error:
             raise EngineError(f"mujoco cannot build {robot.name!r}: {' '.join(str(error).split())}") from error
         m = self.compiled
+        self.damped = bool(stiff_joints(robot).any())
         self._scratch = mujoco.MjData(m)
         parts = [p.name for p in robot.present_parts]
-        self.bodies = np.array([m.body(name).id for name in parts])
+        self.bodies = np.array([m.body(_body(name)).id for name in parts])
         self.root = int(self.bodies[0])
         moving = {j.name for j in robot.present_joints if j.kind != "fixed"}
         self.motors = [k for k, name in enumerate(robot.motor_names) if name in moving]
@@ -124,7 +127,7 @@ def _spec(robot: Robot) -> Any:
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE  # a contact moves one limb: a tenth faster than dense
     option.iterations, option.ls_iterations = ITERATIONS, LINE_SEARCH
-    option.disableflags = int(UNUSED)
+    option.disableflags = int(UNUSED) & ~(int(_OFF.mjDSBL_DAMPER) if stiff_joints(robot).any() else 0)
     if robot.world.has_floor:
         plane = mujoco.mjtGeom.mjGEOM_PLANE
         spec.worldbody.add_geom(name="floor", type=plane, size=[0, 0, 1], contype=0, conaffinity=0)
@@ -134,13 +137,13 @@ def _spec(robot: Robot) -> Any:
         joint = carried_by.get(part.name)
         if joint is None:
             body = spec.worldbody.add_body(
-                name=part.name, pos=_plain(robot.start_position_m), quat=_turn(robot.start_rotation)
+                name=_body(part.name), pos=_plain(robot.start_position_m), quat=_turn(robot.start_rotation)
             )
             if robot.free_base:
                 body.add_freejoint(name="free base")
         else:
             body = bodies[joint.parent].add_body(
-                name=part.name, pos=_plain(joint.position_m), quat=_turn(joint.rotation)
+                name=_body(part.name), pos=_plain(joint.position_m), quat=_turn(joint.rotation)
             )
             if joint.kind != "fixed":
                 body.add_joint(name=joint.name, type=_JOINTS[joint.kind], axis=_plain(joint.axis))
@@ -159,6 +162,11 @@ def _spec(robot: Robot) -> Any:
                 name=name, type=mujoco.mjtSensor.mjSENS_TOUCH, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name
             )
     return spec
+
+
+def _body(part: str) -> str:
+    """The name of a part's body: MuJoCo keeps "world" to itself."""
+    return "world " if part == "world" else part
 
 
 def _parents_first(robot: Robot) -> Sequence[Part]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pybullet as p
 
-from ee_dist.engines.contract import Rollout, Truth
+from ee_dist.engines.contract import EngineError, Rollout, Truth
 from ee_dist.engines.loop import gravity_vector, in_batches
 from ee_dist.engines.pybullet.native import interface
 from ee_dist.engines.pybullet.reading import NativeReading, PublicReading, Reading
@@ -108,6 +108,7 @@ class BulletBodies:
         self.engine = engine
         self.worlds = [world for world, _ in placed]
         motors = len(batch[0].model.drives)
+        self.names = batch[0].model.motor_names
         found = interface() if engine.native else None
         self.reading: Reading = PublicReading(placed, motors) if found is None else NativeReading(found, placed, motors)
         self.robots: list[tuple[int, int, int, list[int], list[int] | None]] = []
@@ -137,7 +138,13 @@ class BulletBodies:
             truth.base_twist = self.reading.twists()
         return truth
 
-    def step(self, torques: Array, force: Array | None) -> None:
+    def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
+        if give is not None and give.any():
+            joint = self.names[int(np.flatnonzero(give.any(axis=0))[0])]
+            raise EngineError(
+                f"pybullet cannot hold {joint!r}: the damping of its controller stops it in less than a time step; "
+                "use engine=mujoco, or a smaller time_step_s"
+            )
         send, simulate, mode = p.setJointMotorControlArray, p.stepSimulation, p.TORQUE_CONTROL
         values = torques.tolist()
         for row, client, body, links, motors in self.robots:

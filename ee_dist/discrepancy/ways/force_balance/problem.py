@@ -28,7 +28,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import LowPass, decimated
 from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.inverse_dynamics import parameters, regressor, rotors
-from ee_dist.robots.model import Drive, Robot
+from ee_dist.robots.model import DRIVE_NUMBERS, Drive, Robot
 from ee_dist.trials.log import Array, SensorLog
 
 INSTANT_S = 1e-9
@@ -262,7 +262,7 @@ def left_over(robot: Robot, motion: Motion) -> Array:
 
 def _fields(drives: Sequence[Drive]) -> tuple[dict[str, Array], dict[str, bool]]:
     """Numbers of the drives by field, (1, M) each, and whether any is not neutral."""
-    names = [f for f in Drive.__dataclass_fields__ if f != "joint"]
+    names = list(DRIVE_NUMBERS)
     p = {n: np.array([[getattr(d, n) for d in drives]], dtype=float) for n in names}
     neutral = {n: Drive.__dataclass_fields__[n].default for n in names}
     return p, {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}

@@ -1,0 +1,315 @@
+"""An MJCF as parts and joints, by MuJoCo's own reader and compiler, so that defaults, classes and units are what it says.
+
+What a robot here has no place for (tendons, equality constraints, meshes that touch, muscles) is left out and said. Geometry that
+only shows, textures and height fields are taken out before anything of them is read.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
+from ee_dist.robots.body import Body
+from ee_dist.robots.fold import DUMMY_KG, entries, folded
+from ee_dist.robots.inertia import rotation_matrix
+from ee_dist.robots.kinematics import quat_multiply, quat_rotate
+from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
+from ee_dist.robots.urdf import CONTINUOUS_M, CONTINUOUS_RAD
+from ee_dist.robots.xml import XmlError, read_xml
+from ee_dist.trials.log import Array
+
+MOST_COPIES = 10_000
+"""Elements that one of the elements that make copies may stand for, those around it multiplied."""
+COPIERS = ("replicate", "composite", "flexcomp")
+INCLUDES_DEEP = 20
+LINK_KG, LINK_KG_M2 = 1e-5, 1e-9
+"""Of the link between two joints that MJCF puts on one body: less than shows, more than rounding."""
+_KINDS = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
+_FREE, _BALL, _PLANE = (
+    int(k) for k in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtGeom.mjGEOM_PLANE)
+)
+_SHAPES = {
+    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
+}
+
+
+class MjcfError(RobotError):
+    """An MJCF that cannot be used; one line: the file, what is wrong and what would be right."""
+
+
+def read_mjcf(path: str | Path) -> Body:
+    """The body that an MJCF describes, with a drive for each actuator of a joint. Raises MjcfError."""
+    return _Reader(Path(path), compiled(path)).body()
+
+
+def compiled(path: str | Path) -> Any:
+    """MuJoCo's model of the file without what only shows. Raises MjcfError."""
+    file = Path(path)
+    try:
+        _scan(file, file.parent, (), 1)
+    except XmlError as error:
+        raise MjcfError(str(error)) from None
+    try:
+        return _bare(file, meshes=False).compile()
+    except (ValueError, RuntimeError, MemoryError) as first:
+        # Meshes are wanted where they alone say what a body weighs.
+        try:
+            return _bare(file, meshes=True).compile()
+        except (ValueError, RuntimeError, MemoryError) as error:
+            told = error if "mass" in str(first) or "inertia" in str(first) else first
+            raise MjcfError(f"{file}: MuJoCo cannot build it: {' '.join(str(told).split())}") from None
+
+
+def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> None:
+    """Look through a file and all that it names before MuJoCo reads it. Raises XmlError."""
+    here = file.resolve()
+    if here in above or len(above) > INCLUDES_DEEP:
+        raise XmlError(f"{above[0] if above else file}: {file.name} includes itself")
+    root, _ = read_xml(file, "an MJCF")
+    if not above and root.tag != "mujoco":
+        raise XmlError(f"{file}: the outermost element is <{root.tag}>; an MJCF begins with <mujoco>")
+    waiting = [(root, copies)]
+    while waiting:
+        element, many = waiting.pop()
+        if element.tag in COPIERS:
+            many *= _count(element)
+            if many > MOST_COPIES:
+                raise XmlError(f"{file}: <{element.tag}> stands for more than {MOST_COPIES} elements")
+        name = element.get("file")
+        if element.tag in ("include", "model") and name:
+            _scan(folder / name, folder, (*above, here), many)
+        waiting += [(child, many) for child in element]
+
+
+def _count(element: ET.Element) -> int:
+    total = 1.0
+    for text in (element.get("count") or "1").split():
+        try:
+            total *= max(1.0, float(text))
+        except ValueError:
+            return 1  # MuJoCo says what is wrong
+    return int(min(total, 1e9)) if total == total else 1
+
+
+def _bare(file: Path, meshes: bool) -> Any:
+    """The file's specification without what costs memory and says nothing of a motion."""
+    spec = mujoco.MjSpec.from_file(str(file))
+    spec.memory = spec.nstack = spec.njmax = spec.nconmax = -1
+    spec.nuserdata = 0
+    unwanted = (mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_SDF)
+    for geom in list(spec.geoms):
+        shown_only = not geom.contype and not geom.conaffinity and geom.parent.explicitinertial
+        mesh = geom.type == mujoco.mjtGeom.mjGEOM_MESH
+        if geom.type in unwanted or (mesh and (not meshes or shown_only)):
+            spec.delete(geom)
+        else:
+            geom.material = ""
+    if not meshes:
+        for pair in list(spec.pairs):
+            spec.delete(pair)
+        for skin in list(spec.skins):
+            spec.delete(skin)
+    groups = [spec.hfields, spec.numerics, spec.materials, spec.textures]
+    for group in groups if meshes else [*groups, spec.meshes]:
+        for item in list(group):
+            spec.delete(item)
+    for item in (*spec.sites, *spec.tendons):
+        item.material = ""
+    if meshes:
+        folder = file.parent / spec.meshdir
+        for mesh_asset in spec.meshes:
+            if mesh_asset.file and not (folder / mesh_asset.file).is_file():
+                raise ValueError(f"no mesh {folder / mesh_asset.file}, and no <inertial> for the body that it is of")
+    return spec
+
+
+@dataclass
+class _Reader:
+    """Reads a compiled model. ``at`` is by body where the part's frame lies in MuJoCo's frame of the body."""
+
+    file: Path
+    m: Any
+    notes: list[str] = field(default_factory=list)
+    assumed: list[str] = field(default_factory=list)
+    parts: dict[str, Part] = field(default_factory=dict)
+    carried: dict[str, Joint] = field(default_factory=dict)
+    at: dict[int, Array] = field(default_factory=dict)
+    joints: dict[int, str] = field(default_factory=dict)
+
+    def body(self) -> Body:
+        m = self.m
+        self.key = m.key_qpos[0] if m.nkey else None
+        free = [j for j in range(m.njnt) if m.jnt_type[j] == _FREE]
+        tops = [b for b in range(1, m.nbody) if m.body_parentid[b] == 0]
+        if not tops:
+            raise MjcfError(f"{self.file}: no <body> in it")
+        if (m.jnt_type == _BALL).any():
+            j = int(np.argmax(m.jnt_type == _BALL))
+            raise MjcfError(f"{self.file}: joint {self.name(j, 'joint')!r} is a ball; write it as three hinges")
+        if free and (len(free) > 1 or len(tops) > 1 or m.body_parentid[m.jnt_bodyid[free[0]]] != 0):
+            raise MjcfError(f"{self.file}: several bodies of which some move freely; name the file of the robot alone")
+        start: tuple[Vec3, Quat] = (ZERO3, NO_TURN)
+        if len(tops) == 1 and (free or m.body_jntnum[tops[0]] == 0):
+            root = self.name(tops[0], "body")
+            placed = (
+                self.key[:7]
+                if free and self.key is not None
+                else np.array([*m.body_pos[tops[0]], *m.body_quat[tops[0]]])
+            )
+            start = _vec(placed[:3]), _turn(placed[3:])
+        else:
+            root = "world"
+            self.parts[root] = Part(root, 0.0, ZERO3, (0.0,) * 6)
+            self.at[0] = np.zeros(3)
+        for b in range(1, m.nbody):
+            self.add(b, root)
+        parts, joints, own, given, idle = folded(self.parts, self.carried, root)
+        if own != (ZERO3, NO_TURN):
+            start = own
+        if idle:
+            raise MjcfError(f"{self.file}: body {idle[0]!r}: no mass, but a joint moves it")
+        present = {j.name for j in joints}
+        names = {j: n for j, n in self.joints.items() if n in present}
+        drives, driven, said = drives_of(m, names)
+        self.notes += said
+        sensors, said = sensors_of(m, names, {p.name for p in parts}, lambda b: self.name(b, "body"))
+        self.notes += said
+        self.say_what_is_left_out()
+        gravity = np.array(m.opt.gravity)
+        if gravity[:2].any():
+            self.notes.append("gravity is not straight down: only its vertical share is taken")
+        return Body(
+            name=m.names[: m.names.index(b"\0")].decode() or self.file.stem,
+            parts=tuple(parts),
+            joints=tuple(joints),
+            drives=drives,
+            driven=driven,
+            sensors=sensors,
+            root_without_mass=parts[0].name in given,
+            free_base=bool(free),
+            has_floor=bool(free) or bool((m.geom_type == _PLANE).any()),
+            gravity_m_s2=float(-gravity[2]),
+            time_step_s=float(m.opt.timestep),
+            start_position_m=start[0],
+            start_rotation=start[1],
+            notes=(*self.notes, *self.assumed),
+            assumed=tuple(self.assumed),
+        )
+
+    def name(self, k: int, what: str) -> str:
+        kind = mujoco.mjtObj.mjOBJ_BODY if what == "body" else mujoco.mjtObj.mjOBJ_JOINT
+        return mujoco.mj_id2name(self.m, kind, k) or f"{what}_{k}"
+
+    # -- bodies ------------------------------------------------------------------------------------------------------
+
+    def add(self, b: int, root: str) -> None:
+        """A body as a part, with its joint; of several joints each but the last carries a link of next to no mass."""
+        m, name = self.m, self.name(b, "body")
+        first = int(m.body_jntadr[b])
+        own = [j for j in range(first, first + int(m.body_jntnum[b])) if m.jnt_type[j] != _FREE]
+        origin = np.array(m.jnt_pos[own[-1]]) if own else np.zeros(3)
+        self.at[b] = origin
+        self.parts[name] = self.part(b, name, origin)
+        if name == root:
+            return
+        parent = int(m.body_parentid[b])
+        above, turn = self.name(parent, "body") if parent else root, _turn(m.body_quat[b])
+        place, back = np.array(m.body_pos[b]) - self.at[parent], np.zeros(3)
+        if not own:
+            self.carried[name] = Joint(
+                f"{name} bond", "fixed", above, name, _vec(place), (1.0, 0.0, 0.0), 0.0, 0.0, turn
+            )
+            return
+        for j in own:
+            child = name if j == own[-1] else f"{name} before {self.name(own[own.index(j) + 1], 'joint')}"
+            if child != name:
+                inertia = (LINK_KG_M2,) * 3 + (0.0,) * 3
+                self.parts[child] = Part(child, LINK_KG, ZERO3, inertia)
+            here = place + quat_rotate(np.array(turn), np.array(m.jnt_pos[j]) - back)
+            self.carried[child] = self.joint(j, above, child, here, turn)
+            above, place, turn, back = child, np.zeros(3), NO_TURN, np.array(m.jnt_pos[j])
+        if len(own) > 1:
+            # Parts come in the order in which they carry one another.
+            self.parts[name] = self.parts.pop(name)
+
+    def joint(self, j: int, parent: str, child: str, place: Array, turn: Quat) -> Joint:
+        m, kind = self.m, _KINDS[int(self.m.jnt_type[j])]
+        name = self.joints[j] = self.name(j, "joint")
+        axis, reference = np.array(m.jnt_axis[j]), float(m.qpos0[m.jnt_qposadr[j]])
+        if reference and kind == "slide":
+            place = place - reference * quat_rotate(np.array(turn), axis)
+        elif reference:
+            half = -reference / 2
+            turn = _quat(quat_multiply(np.array(turn), np.array([*(math.sin(half) * axis), math.cos(half)])))
+        far = CONTINUOUS_RAD if kind == "hinge" else CONTINUOUS_M
+        lower, upper = (float(v) for v in m.jnt_range[j]) if m.jnt_limited[j] else (-far, far)
+        if not lower < upper:
+            raise MjcfError(f"{self.file}: joint {name!r}: its range {lower:g} to {upper:g} leaves nothing")
+        start = float((m.qpos0 if self.key is None else self.key)[m.jnt_qposadr[j]])
+        return Joint(
+            name, kind, parent, child, _vec(place), _vec(axis), lower, upper, turn, start=min(max(start, lower), upper)
+        )
+
+    def part(self, b: int, name: str, origin: Array) -> Part:
+        m = self.m
+        axes = rotation_matrix(_turn(m.body_iquat[b]))
+        inertia = entries(axes @ np.diag(m.body_inertia[b]) @ axes.T)
+        if not np.abs(inertia[3:]).max() > 1e-9 * max(inertia):
+            inertia = (*inertia[:3], 0.0, 0.0, 0.0)
+        shapes, grip = [], 0.0
+        for g in range(m.body_geomadr[b], m.body_geomadr[b] + m.body_geomnum[b]):
+            if not (m.geom_contype[g] or m.geom_conaffinity[g]):
+                continue
+            kind = _SHAPES.get(int(m.geom_type[g]))
+            if kind is None:
+                continue
+            size = tuple(float(v) for v in m.geom_size[g])
+            size = size if kind == "box" else size[:1] if kind == "sphere" else (size[0], 2 * size[1])
+            shapes.append(Shape(kind, size, _vec(m.geom_pos[g] - origin), _turn(m.geom_quat[g])))
+            grip = max(grip, float(m.geom_friction[g, 0]))
+        mass = float(m.body_mass[b])
+        if mass <= DUMMY_KG:
+            return Part(name, 0.0, ZERO3, (0.0,) * 6, tuple(shapes))
+        part = Part(name, mass, _vec(m.body_ipos[b] - origin), inertia, tuple(shapes))
+        return replace(part, grip=grip) if shapes else part
+
+    def say_what_is_left_out(self) -> None:
+        m = self.m
+        for count, what in (
+            (int(m.neq), "equality constraints"),
+            (int(m.ntendon), "tendons"),
+            (int(m.nflex), "flexible bodies"),
+            (int((m.jnt_actgravcomp != 0).sum() + (m.body_gravcomp != 0).sum()), "gravity compensations"),
+        ):
+            if count:
+                self.notes.append(f"{count} {what} left out")
+        touching = sum(bool(p.shapes) for p in self.parts.values())
+        if not touching:
+            self.notes.append(
+                "nothing touches the floor: meshes are left out, only boxes, spheres, cylinders and capsules count"
+            )
+
+
+def _vec(values: Any) -> Vec3:
+    x, y, z = (float(v) for v in values)
+    return x, y, z
+
+
+def _quat(values: Any) -> Quat:
+    x, y, z, w = (float(v) for v in values)
+    return x, y, z, w
+
+
+def _turn(scalar_first: Any) -> Quat:
+    w, x, y, z = (float(v) for v in scalar_first)
+    return x, y, z, w

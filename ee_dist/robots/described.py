@@ -1,0 +1,174 @@
+"""A body from a file, and what a person says about it, made a robot: drives, sensors, base, floor, time step."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+from ee_dist.robots.body import Body
+from ee_dist.robots.model import COMMANDS, Drive, Joint, Robot, RobotError, Sensor, Wiring, World
+from ee_dist.robots.numbers import checked, number
+
+KEYS = (
+    "name",
+    "free_base",
+    "time_step_s",
+    "has_floor",
+    "start_position_m",
+    "gravity_m_s2",
+    "drives",
+    "sensors",
+)
+SENSOR_KINDS = (
+    "touch",
+    "angle",
+    "position",
+    "velocity",
+    "torque",
+    "height",
+    "roll",
+    "pitch",
+    "x",
+    "y",
+    "speed_x",
+    "turn_rate",
+)
+UNITS = {
+    ("position", "hinge"): "rad",
+    ("position", "slide"): "m",
+    ("velocity", "hinge"): "rad/s",
+    ("velocity", "slide"): "m/s",
+    ("torque", "hinge"): "N.m",
+    ("torque", "slide"): "N",
+}
+TIME_STEP_S = 0.002
+GRAVITY_M_S2 = 9.81
+
+
+def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robot, tuple[str, ...]]:
+    """The robot and notes for people. ``data`` are the keys of KEYS; what it leaves out is taken from the body.
+
+    Raises RobotError.
+    """
+    drives = _drives(data.get("drives"), body, where)
+    joints = {j.name: j for j in body.joints}
+    driven = [joints[d.joint] for d in drives]
+    given = data.get("sensors")
+    sensors = body.sensors if given is None and body.sensors else _sensors(given, driven, body, where)
+    free = data.get("free_base", bool(body.free_base))
+    if not isinstance(free, bool):
+        raise RobotError(f"{where}: free_base: expected true or false, not {free!r}")
+    floor = data.get("has_floor", free if body.has_floor is None else body.has_floor)
+    if not isinstance(floor, bool):
+        raise RobotError(f"{where}: has_floor: expected true or false, not {floor!r}")
+    start = data.get("start_position_m", body.start_position_m)
+    if not isinstance(start, (list, tuple)) or len(start) != 3:
+        raise RobotError(f"{where}: start_position_m: expected three numbers, not {start!r}")
+    gravity = GRAVITY_M_S2 if body.gravity_m_s2 is None else body.gravity_m_s2
+    step = TIME_STEP_S if body.time_step_s is None else body.time_step_s
+    notes = list(body.notes)
+    passive = [j.name for j in body.moving if j.name not in {d.joint for d in drives}]
+    if passive:
+        notes.append(f"joints without a drive swing freely: {', '.join(passive)}")
+    if free and body.root_without_mass:
+        notes.append(f"the base {body.parts[0].name!r} has no mass in the file: 1 kg is assumed")
+    robot = Robot(
+        name=str(data.get("name", body.name)),
+        parts=body.parts,
+        joints=body.joints,
+        drives=drives,
+        sensors=sensors,
+        wiring=Wiring(tuple(range(len(drives)))),
+        world=World(gravity_m_s2=number(data.get("gravity_m_s2", gravity), f"{where}: gravity_m_s2"), has_floor=floor),
+        free_base=free,
+        start_position_m=tuple(number(v, f"{where}: start_position_m") for v in start),  # type: ignore[arg-type]
+        start_rotation=body.start_rotation,
+        time_step_s=number(data.get("time_step_s", step), f"{where}: time_step_s"),
+    )
+    return checked(robot, where), tuple(notes)
+
+
+def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:
+    """Drives of the joints that the description or the file itself gives one, in the order of the joints."""
+    given = {} if data is None else data
+    if not isinstance(given, Mapping):
+        raise RobotError(f"{where}: drives: expected 'joint: {{kp: ...}}', not {data!r}")
+    moving = tuple(j.name for j in body.moving)
+    known = tuple(f.name for f in fields(Drive) if f.name != "joint")
+    for name, entry in given.items():
+        here = f"{where}: drives: {name}"
+        if name not in moving:
+            raise RobotError(f"{where}: drives: no moving joint named {name!r}; {near(str(name), moving)}")
+        if not isinstance(entry, Mapping):
+            raise RobotError(f"{here}: expected at least 'kp' (torque per position error) or 'command: torque'")
+        for key in entry:
+            if key not in known:
+                raise RobotError(f"{here}: unknown key {key!r}; {near(str(key), known)}")
+        if entry.get("command", "position") not in COMMANDS:
+            raise RobotError(f"{here}: command: {entry['command']!r}; expected one of {', '.join(COMMANDS)}")
+    return tuple(
+        _drive(name, given.get(name) or {}, body.drives.get(name, {}), where)
+        for name in moving
+        if name in given or name in body.driven
+    )
+
+
+def _drive(name: str, entry: Mapping[str, Any], found: Mapping[str, float | str], where: str) -> Drive:
+    here = f"{where}: drives: {name}"
+    numbers: dict[str, Any] = {k: v for k, v in found.items() if k != "command"}
+    numbers |= {str(k): number(v, f"{here}: {k}") for k, v in entry.items() if k != "command"}
+    command = str(entry.get("command", found.get("command", "position")))
+    if command in ("position", "speed") and "kp" not in numbers:
+        raise RobotError(f"{here}: expected at least 'kp' (torque per {command} error), or 'command: torque'")
+    if "torque_limit" not in numbers:
+        if command != "none":
+            raise RobotError(f"{here}: no torque_limit, and the file gives no effort limit")
+        numbers["torque_limit"] = float("inf")
+    return Drive(
+        joint=name, command=command, **({"kp": 0.0, "ki": 0.0, "kd": 0.0, "speed_limit": float("inf")} | numbers)
+    )
+
+
+def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Sensor, ...]:
+    if data is None:
+        return tuple(
+            Sensor(f"{kind}_{j.name}", kind, j.name, UNITS[kind, j.kind])
+            for kind in ("position", "velocity")
+            for j in driven
+        )
+    if not isinstance(data, list):
+        raise RobotError(f"{where}: sensors: expected a list of {{name, kind, target}}, not {data!r}")
+    known = tuple(f.name for f in fields(Sensor))
+    joints = {j.name: j for j in driven}
+    parts = tuple(p.name for p in body.parts)
+    sensors: list[Sensor] = []
+    for i, entry in enumerate(data):
+        here = f"{where}: sensors[{i}]"
+        if not isinstance(entry, Mapping) or not {"name", "kind"} <= set(entry):
+            raise RobotError(f"{here}: expected {{name, kind, target}}, not {entry!r}")
+        for key in entry:
+            if key not in known:
+                raise RobotError(f"{here}: unknown key {key!r}; {near(str(key), known)}")
+        kind, target = str(entry["kind"]), str(entry.get("target", ""))
+        if kind not in SENSOR_KINDS:
+            raise RobotError(f"{here}: no sensor kind {kind!r}; {near(kind, SENSOR_KINDS)}")
+        allowed = (
+            parts if kind == "touch" else tuple(joints) if kind in ("angle", "position", "velocity", "torque") else None
+        )
+        if allowed is not None and target not in allowed:
+            what = "part" if kind == "touch" else "driven joint"
+            raise RobotError(f"{here}: no {what} named {target!r}; {near(target, allowed)}")
+        unit = str(entry.get("unit", UNITS.get((kind, joints[target].kind if target in joints else ""), "1")))
+        numbers = {
+            str(k): number(v, f"{here}: {k}") for k, v in entry.items() if k not in ("name", "kind", "target", "unit")
+        }
+        sensors.append(replace(Sensor(str(entry["name"]), kind, target, unit), **numbers))  # type: ignore[arg-type]
+    return tuple(sensors)
+
+
+def near(name: str, allowed: tuple[str, ...]) -> str:
+    """The nearest names, or all, as the end of a message."""
+    found = difflib.get_close_matches(name, allowed, n=3, cutoff=0.4)
+    return f"did you mean {' or '.join(found)}?" if found else f"there are: {', '.join(allowed)}"

@@ -1,0 +1,180 @@
+"""What a robot's file says, what has to be assumed and what is missing; and a description to begin with, assumptions marked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ee_dist.robots.body import Body
+from ee_dist.robots.described import GRAVITY_M_S2, TIME_STEP_S, robot_of_body
+from ee_dist.robots.inertia import felt_inertia
+from ee_dist.robots.model import Joint, Robot
+from ee_dist.robots.ranges import span, travel
+
+SETTLING_RAD, SETTLING_M = 0.1, 0.01
+"""Error at which an assumed position controller asks for all the torque that there is."""
+DAMPING = 0.7
+"""Of an assumed controller against the inertia that its joint feels, as a share of critical."""
+TORQUE_PER_INERTIA = 50.0
+"""rad/s^2 that an assumed torque limit gives a joint beside holding a metre's weight of what it carries."""
+
+
+@dataclass(frozen=True)
+class Starter:
+    """``text`` is a description as YAML with every assumed value marked; ``robot`` what it describes. Lists are for people."""
+
+    text: str
+    robot: Robot
+    joints: tuple[tuple[str, ...], ...]
+    read: tuple[str, ...]
+    assumed: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+JOINT_COLUMNS = ("joint", "from", "to", "command", "kp", "kd", "limit", "viscous", "dry", "rotor")
+"""rad, N.m and kg.m^2 for a hinge; m, N and kg for a slide."""
+
+
+def starter(body: Body, kind: str, source: str, where: str) -> Starter:
+    """A description of a body that names its file ``source``. Raises RobotError where no robot can be made of it."""
+    assumed = list(body.assumed)
+    by_mark: dict[str, list[str]] = {}
+    lines = [f"{kind}: {_plain(source)}"]
+
+    def line(text: str, mark: str | None) -> None:
+        lines.append(text + (f"  # assumed: {mark}" if mark else ""))
+        if mark:
+            by_mark.setdefault(mark, []).append(text.strip().split(":")[0])
+
+    free = bool(body.free_base)
+    line(f"free_base: {str(free).lower()}", None if body.free_base is not None else "bolted down")
+    step = TIME_STEP_S if body.time_step_s is None else body.time_step_s
+    line(f"time_step_s: {step:g}", None if body.time_step_s is not None else "2 ms; take that of your log")
+    gravity = GRAVITY_M_S2 if body.gravity_m_s2 is None else body.gravity_m_s2
+    line(
+        f"gravity_m_s2: {gravity:g}",
+        None if body.gravity_m_s2 is not None else "straight down, in the frame of the root",
+    )
+    drives = {j.name: _drive(j, body, _inertia(body)) for j in body.moving}
+    lines.append("drives:" if drives else "drives: {}")
+    for name, (entry, guessed) in drives.items():
+        line(f"  {_plain(name)}: {_flow(entry)}", ", ".join(guessed) or None)
+    assumed += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if names[3:] else ''}: {mark}"
+                for mark, names in by_mark.items()]  # fmt: skip
+    if body.sensors:
+        lines.append(f"# sensors: the file's own {len(body.sensors)}; a list here takes their place")
+    else:
+        lines.append("# sensors: left out, so position and velocity of every joint; see docs/bring_your_robot.md")
+        assumed.append("sensors: position and velocity of every driven joint, without noise")
+    text = "\n".join(lines) + "\n"
+    data = {k: v for k, v in yaml.safe_load(text).items() if k != kind}
+    robot, notes = robot_of_body(body, data, where)
+    read = (
+        f"{len(robot.parts)} parts, {sum(p.mass_kg for p in robot.parts):.4g} kg",
+        f"{len(body.moving) + 6 * free} degrees of freedom: {len(body.moving)} joints"
+        + (", base free" if free else ", base bolted down"),
+        f"{len(body.driven)} joints with a drive or passive forces in the file",
+        f"{sum(len(p.shapes) for p in robot.parts)} shapes that can touch the floor",
+    )
+    said = tuple(n for n in notes if n not in body.assumed)
+    return Starter(
+        text, robot, tuple(_row(robot, j) for j in body.moving), (*read, *said), tuple(assumed), _missing(robot)
+    )
+
+
+def _inertia(body: Body) -> Mapping[str, float]:
+    """What a torque on each moving joint meets, with all rotors that the file states."""
+    entries: dict[str, dict[str, Any]] = {}
+    for joint in body.moving:
+        rotor = body.drives.get(joint.name, {}).get("rotor_inertia", 0.0)
+        entries[joint.name] = {"command": "none", "rotor_inertia": rotor}
+    robot, _ = robot_of_body(body, {"drives": entries, "free_base": bool(body.free_base)}, body.name)
+    return dict(zip(robot.motor_names, (float(v) for v in felt_inertia(robot)), strict=True))
+
+
+def _drive(joint: Joint, body: Body, inertia: Mapping[str, float]) -> tuple[dict[str, Any], list[str]]:
+    """Fields of a drive as they are written down, and those of them that are assumed."""
+    known = dict(body.drives.get(joint.name, {}))
+    guessed: list[str] = []
+    if "torque_limit" not in known:
+        carried = sum(p.mass_kg for p in body.parts) * GRAVITY_M_S2
+        scale = TORQUE_PER_INERTIA * inertia[joint.name] + 0.5 * carried * (1.0 if joint.kind == "slide" else 0.5)
+        known["torque_limit"] = _rounded(scale)
+        guessed.append("torque_limit")
+    if joint.name not in body.driven:
+        limit = float(known["torque_limit"])
+        error = min(SETTLING_RAD if joint.kind == "hinge" else SETTLING_M, 0.2 * travel(joint))
+        kp = limit / error
+        known |= {"command": "position", "kp": _rounded(kp)}
+        known["kd"] = _rounded(2 * DAMPING * math.sqrt(kp * inertia[joint.name]))
+        guessed += ["command", "kp", "kd"]
+    elif known.get("torque_limit") == math.inf and known.get("command") != "none":
+        guessed.append("no torque limit in the file")
+    order = ["command", "kp", "ki", "kd", "torque_limit"]
+    return {k: known[k] for k in [*(o for o in order if o in known), *(k for k in known if k not in order)]}, guessed
+
+
+def _rounded(value: float) -> float:
+    """Two digits: an assumption should not look like a measurement."""
+    return float(f"{value:.2g}")
+
+
+def _row(robot: Robot, joint: Joint) -> tuple[str, ...]:
+    drive = next(d for d in robot.drives if d.joint == joint.name)
+    stops = span(joint) == (joint.lower, joint.upper)
+    reach = (
+        (f"{joint.lower:.3g}", f"{joint.upper:.3g}")
+        if stops
+        else ("turns on", "")
+        if joint.kind == "hinge"
+        else ("-", "")
+    )
+    limit = "none" if math.isinf(drive.torque_limit) else f"{drive.torque_limit:.4g}"
+    name = f"{joint.name} (slide)" if joint.kind == "slide" else joint.name
+    rest = (f"{v:.3g}" if v else "" for v in (drive.viscous, drive.coulomb, drive.rotor_inertia))
+    return name, *reach, drive.command, *(f"{v:.4g}" if v else "" for v in (drive.kp, drive.kd)), limit, *rest
+
+
+def _missing(robot: Robot) -> tuple[str, ...]:
+    found = []
+    if robot.free_base and not any(p.shapes for p in robot.parts):
+        found.append(
+            "shapes that touch the floor: give the feet a sphere, box, capsule or cylinder, or the robot falls through"
+        )
+    if not any(s.noise for s in robot.sensors):
+        found.append("noise of the sensors: it is estimated from a log where none is stated")
+    if not any(d.rotor_inertia for d in robot.drives):
+        found.append(
+            "rotor inertia of the motors (rotor_inertia): it may be as large as the arm's own behind a high gear"
+        )
+    if not any(d.coulomb or d.viscous for d in robot.drives):
+        found.append("friction of the joints: explain and improve look for it")
+    if not robot.drives:
+        found.append("joints that move")
+    return tuple(found)
+
+
+def _flow(entry: Mapping[str, Any]) -> str:
+    return "{" + ", ".join(f"{k}: {_plain(v)}" for k, v in entry.items()) + "}"
+
+
+def _plain(value: Any) -> str:
+    """A value as YAML has it within a line."""
+    if isinstance(value, float) and math.isfinite(value):
+        text = repr(value)
+        return text if "e" not in text or "." in text else text.replace("e", ".0e")
+    dumped: str = yaml.safe_dump(value, default_flow_style=True, width=1_000_000).strip()
+    return dumped.removesuffix("...").strip()
+
+
+def source_from(file: Path, folder: Path) -> str:
+    """How a description in ``folder`` names a file: beside it or below by its relative path, else in full."""
+    try:
+        return str(file.resolve().relative_to(folder.resolve()))
+    except ValueError:
+        return str(file.resolve())

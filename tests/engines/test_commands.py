@@ -1,0 +1,94 @@
+"""Drives that are commanded by torque or by speed, and joints without a motor, on every engine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from engine_robots import MASS_KG, at, one_joint, run
+
+from ee_dist.engines.contract import Engine
+from ee_dist.engines.one_joint import OneJointEngine
+from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import command_span, command_unit
+from ee_dist.trials.excitation import Excitation
+
+STEP_S = 0.002
+
+
+def slide(**drive: Any) -> Robot:
+    """2 kg on a level slide."""
+    robot = one_joint("slide", (1.0, 0.0, 0.0), step_s=STEP_S)
+    return robot.map_drive("joint", lambda d: replace(d, torque_limit=50.0, **drive))
+
+
+@pytest.fixture(params=["pybullet", "mujoco", "one_joint"])
+def any_engine(request: pytest.FixtureRequest, engines: dict[str, Engine]) -> Engine:
+    return engines[request.param] if request.param in engines else OneJointEngine()
+
+
+def test_a_torque_command_is_the_force_on_the_slide(any_engine: Engine) -> None:
+    log = run(any_engine, slide(command="torque"), 501, commands=np.full((1, 1), 3.0))
+    assert log.channel("velocity")[-1] == pytest.approx(3.0 / MASS_KG, rel=1e-3)
+    assert log.torques is not None
+    assert np.array_equal(np.unique(log.torques), [3.0])
+
+
+def test_a_torque_command_beyond_the_limit_is_cut_and_knows_no_back_emf(any_engine: Engine) -> None:
+    robot = slide(command="torque", speed_limit=1.0)
+    log = run(any_engine, robot, 50, at([0.0], [5.0]), np.array([[80.0]]))
+    assert log.torques is not None
+    assert np.array_equal(np.unique(log.torques), [50.0])
+
+
+def test_a_speed_command_is_reached_and_held_against_friction(any_engine: Engine) -> None:
+    robot = slide(command="speed", kp=40.0, ki=200.0, coulomb=2.0)
+    log = run(any_engine, robot, 1500, commands=np.full((1, 1), 0.4))
+    assert log.channel("velocity")[-1] == pytest.approx(0.4, rel=2e-3)
+
+
+def test_a_passive_joint_takes_no_command_but_has_its_spring_and_friction(any_engine: Engine) -> None:
+    robot = slide(command="none", kp=100.0, spring=20.0, spring_rest=0.3, viscous=8.0)
+    log = run(any_engine, robot, 4000, commands=np.full((1, 1), np.nan))
+    assert log.channel("position")[-1] == pytest.approx(0.3, rel=1e-2)
+
+
+def test_strength_delay_and_gain_act_on_torques_too(any_engine: Engine) -> None:
+    robot = slide(command="torque", strength=0.5, command_gain=1.2, delay_s=5 * STEP_S)
+    log = run(any_engine, robot, 40, commands=np.concatenate([np.zeros((10, 1)), np.full((30, 1), 4.0)]))
+    assert log.torques is not None
+    assert np.array_equal(np.flatnonzero(log.torques[:, 0]), np.arange(15, 40))
+    assert log.torques[-1] == pytest.approx(0.5 * 1.2 * 4.0)
+
+
+def test_an_elastic_transmission_carries_a_torque_command(any_engine: Engine) -> None:
+    push = np.full((1, 1), 3.0)
+    plain, soft = (run(any_engine, slide(command="torque", compliance=c), 300, commands=push) for c in (0.0, 1e-3))
+    assert soft.channel("velocity")[-1] == pytest.approx(plain.channel("velocity")[-1], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("command", "kind", "unit", "span"),
+    [
+        ("position", "hinge", "rad", (-10.0, 10.0)),
+        ("speed", "hinge", "rad/s", (-7.0, 7.0)),
+        ("torque", "hinge", "N.m", (-50.0, 50.0)),
+        ("torque", "slide", "N", (-50.0, 50.0)),
+        ("none", "slide", None, (0.0, 0.0)),
+    ],
+)
+def test_the_unit_and_span_of_a_command_follow_from_the_drive(
+    command: str, kind: str, unit: str | None, span: tuple[float, float]
+) -> None:
+    robot = one_joint(kind, (0.0, 1.0, 0.0)).map_drive(
+        "joint", lambda d: replace(d, command=command, torque_limit=50.0, speed_limit=7.0)
+    )
+    if command == "position":
+        robot = robot.with_joint("joint", lower=-5.0, upper=5.0)
+        span = (-5.0, 5.0)
+    assert command_unit(robot, robot.drives[0]) == unit
+    assert command_span(robot, robot.drives[0]) == span
+    planned = Excitation("multisine", 1.0, 0.5).commands(robot)
+    assert np.abs(planned).max() <= 0.5 * span[1]

@@ -1,0 +1,56 @@
+"""task=robot on the real command line: the table, a description that loads again, a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from ee_dist.robots.describe import load_robot
+from ee_dist.tasks.robot import sweep
+
+ARM = Path(__file__).parents[2] / "docs" / "examples" / "arm.urdf"
+MJCF = """<mujoco model="swing"><worldbody><body name="arm"><joint name="h" axis="0 1 0" range="-60 60" damping="0.2"/>
+<geom type="capsule" size="0.02 0.1" pos="0 0 -0.1"/></body></worldbody>
+<actuator><position joint="h" kp="20" kv="1" forcerange="-4 4"/></actuator></mujoco>"""
+
+
+def test_a_urdf_becomes_a_description_with_its_assumptions_marked(cli):
+    outcome = cli("task=robot", f"urdf={ARM}")
+    assert outcome.status == 0, outcome.err
+    (run,) = outcome.runs()
+    assert (run / "robot.rrd").stat().st_size > 1000
+    text = (run / "robot.yaml").read_text()
+    marked = [line for line in text.splitlines() if "# assumed:" in line]
+    assert [line.strip().split(":")[0] for line in marked] == [
+        "free_base", "time_step_s", "gravity_m_s2", "turn", "shoulder", "elbow",
+    ]  # fmt: skip
+    assert "assumed: command, kp, kd" in marked[-1]
+    assert yaml.safe_load(text)["drives"]["shoulder"]["torque_limit"] == 6.0
+    robot, _ = load_robot(run / "robot.yaml")
+    assert robot.motor_names == ("turn", "shoulder", "elbow")
+    found = outcome.summary()
+    assert found["degrees_of_freedom"] == 3
+    assert found["mass_kg"] == pytest.approx(sum(p.mass_kg for p in robot.parts))
+    assert any("rotor inertia" in m for m in found["missing"])
+    assert "turn, shoulder, elbow: command, kp, kd" in outcome.out
+
+
+def test_an_mjcf_brings_its_own_drives_and_the_robot_is_usable_at_once(cli, tmp_path):
+    file = tmp_path / "swing.xml"
+    file.write_text(MJCF)
+    outcome = cli("task=robot", f"mjcf={file}")
+    assert outcome.status == 0, outcome.err
+    (run,) = outcome.runs()
+    robot, _ = load_robot(run / "robot.yaml")
+    assert robot == load_robot(file)[0]
+    assert "# assumed" not in (run / "robot.yaml").read_text().split("drives:")[1]
+    moved = sweep(robot)
+    assert moved.shape[1] == 1
+    assert 0.2 < moved.max() <= robot.joint("h").upper
+    trial = cli(
+        "task=trial", "robot=mjcf", f"robot.file={file}", "engine=mujoco", "evaluator=serial",
+        "task.excitations=['multisine:seconds=1']", "+hidden=[]",
+    )  # fmt: skip
+    assert trial.status == 0, trial.err
