@@ -20,7 +20,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.compose import config_folder, handling, plain, quoted, settings
+from ee_dist.tasks.compose import check_flags, config_folder, handling, plain, quoted, settings
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.errors import USER_ERRORS, RayLostError, abandon_evaluators, defect, hydra_message, unasked_end
 from ee_dist.tasks.folder import NO_NAME, Refused, claimed, free_name, kept, remove_made, settings_of
@@ -45,6 +45,9 @@ def run(composed: DictConfig) -> None:
     except USER_ERRORS as error:
         remove_made()
         sys.exit(_complain(str(error)))
+    except OmegaConfBaseException as error:
+        remove_made()
+        sys.exit(_complain(plain(error)))
     except OSError as error:
         remove_made()
         sys.exit(_complain(_unwritten(error)))
@@ -91,6 +94,7 @@ def main() -> int:
     leaving.arm()
     sys.argv[1:] = quoted(sys.argv[1:])
     try:
+        check_flags(sys.argv[1:])
         folder = config_folder()
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()
     except (*USER_ERRORS, Refused) as error:
@@ -99,6 +103,8 @@ def main() -> int:
         return _complain(hydra_message(error))
     except OmegaConfBaseException as error:
         return _complain(plain(error))
+    except RecursionError:
+        return _complain("the settings are nested too deep")
     except OSError as error:
         return _complain(_unwritten(error))
     except KeyboardInterrupt as stop:
@@ -109,7 +115,7 @@ def main() -> int:
 
 
 def _complain(text: str, status: int = MISTAKE) -> int:
-    print(f"ee_dist: {' '.join(text.split())}", file=sys.stderr)
+    print(leaving.line(text), file=sys.stderr)
     return status
 
 

@@ -15,6 +15,9 @@ from typing import NoReturn
 
 SIGNALS = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "asked to end", signal.SIGHUP: "terminal closed"}
 
+LONGEST = 700
+"""Characters of a complaint: names and values of a user's may be of any length."""
+
 
 class Left(KeyboardInterrupt):
     """A run that was told to leave; ``status`` as a shell knows it: 128 and the number of the signal."""
@@ -49,12 +52,18 @@ def disarm() -> None:
                 signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
 
 
+def line(text: str) -> str:
+    """A complaint as it is printed: one line, and not longer than anybody reads."""
+    flat = " ".join(text.split())
+    return f"ee_dist: {flat if len(flat) <= LONGEST else flat[: LONGEST - 80] + ' ... ' + flat[-55:]}"
+
+
 def leave(text: str, status: int) -> NoReturn:
     """Say it and end without what libraries do at the end of a process: it takes seconds, and Ray's may crash."""
     global _leaving
     _leaving = True
     try:
-        print(f"ee_dist: {' '.join(text.split())}", file=sys.stderr, flush=True)
+        print(line(text), file=sys.stderr, flush=True)
         sys.stdout.flush()
     except OSError:
         pass  # whoever read it is gone

@@ -19,6 +19,7 @@ from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.serial import robot_to_dict
+from ee_dist.robots.untrusted import UntrustedError, yaml_of
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,13 @@ def read_model(path: str | Path) -> ModelFile:
     """Raises RobotError or EffectError in one line: no such file, not YAML, an unknown robot, effect, target or value."""
     file = Path(path)
     try:
-        data = yaml.safe_load(file.read_text(encoding="utf-8"))
+        data = yaml_of(file)
     except FileNotFoundError:
         raise RobotError(f"{file}: no such model file") from None
-    except IsADirectoryError:
-        raise RobotError(f"{file}: a folder; expected a model file (YAML)") from None
-    except (yaml.YAMLError, UnicodeError) as error:
-        raise RobotError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
+    except UntrustedError as error:
+        raise RobotError(f"{file}: {error}") from None
+    except OSError as error:
+        raise RobotError(f"{file}: cannot be read ({error.strerror})") from None
     if not isinstance(data, Mapping) or "robot" not in data:
         raise RobotError(f"{file}: a model file is a mapping with 'robot' and 'effects'")
     for key in data:

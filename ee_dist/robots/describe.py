@@ -26,14 +26,14 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.model import Drive, Joint, Robot, RobotError, Sensor, Wiring, World
+from ee_dist.robots.plausible import checked
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.robots.serial import robot_from_dict
 from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.robots.untrusted import UntrustedError, yaml_of
 from ee_dist.robots.urdf import UrdfBody, read_urdf
 
 BUILT_IN: dict[str, Callable[..., Robot]] = {
@@ -97,11 +97,13 @@ def load_robot(source: str | Path | Mapping[str, Any], folder: str | Path = ".")
 
 def _yaml(path: Path) -> Mapping[str, Any]:
     try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
+        found = yaml_of(path)
     except FileNotFoundError:
         raise RobotError(f"{path}: no such file; expected the description of a robot") from None
-    except (yaml.YAMLError, UnicodeError) as error:
-        raise RobotError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    except UntrustedError as error:
+        raise RobotError(f"{path}: {error}") from None
+    except OSError as error:
+        raise RobotError(f"{path}: cannot be read ({error.strerror})") from None
     if not isinstance(found, Mapping):
         raise RobotError(f"{path}: expected a mapping with 'robot' or 'urdf'")
     return found
@@ -109,7 +111,7 @@ def _yaml(path: Path) -> Mapping[str, Any]:
 
 def _described(data: Mapping[str, Any], folder: Path, where: str) -> tuple[Robot, tuple[str, ...]]:
     if "version" in data:
-        return robot_from_dict(data), ()
+        return checked(robot_from_dict(data)), ()
     if "urdf" in data:
         return _of_urdf(data, folder, where)
     name = str(data.get("robot", ""))
@@ -123,7 +125,7 @@ def _described(data: Mapping[str, Any], folder: Path, where: str) -> tuple[Robot
             raise RobotError(f"{where}: {name} has no {key!r}; {_near(key, allowed)}")
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise RobotError(f"{where}: {key}: expected a number, not {value!r}")
-    return make(**numbers), ()
+    return checked(make(**numbers)), ()
 
 
 def _of_urdf(data: Mapping[str, Any], folder: Path, where: str) -> tuple[Robot, tuple[str, ...]]:
@@ -164,7 +166,7 @@ def _of_urdf(data: Mapping[str, Any], folder: Path, where: str) -> tuple[Robot, 
         start_position_m=tuple(_number(v, f"{where}: start_position_m") for v in start),  # type: ignore[arg-type]
         time_step_s=step,
     )
-    return robot, tuple(notes)
+    return checked(robot), tuple(notes)
 
 
 def _drives(data: Any, body: UrdfBody, where: str) -> tuple[Drive, ...]:

@@ -19,9 +19,12 @@ from numpy.typing import NDArray
 from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.kinematics import compose
 from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
+from ee_dist.robots.untrusted import UntrustedError, text_of
 
 CONTINUOUS_RAD = 200 * math.pi
 """Stops of a joint that has none: a hundred turns either way."""
+LARGEST = 16 * 2**20
+"""Bytes of a URDF: meshes are files of their own."""
 KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "fixed": "fixed"}
 
 
@@ -50,10 +53,17 @@ def read_urdf(path: str | Path) -> UrdfBody:
     """
     file = Path(path)
     try:
-        root = ET.parse(file).getroot()
+        text = text_of(file, LARGEST)
+        if "<!DOCTYPE" in text or "<!ENTITY" in text:
+            raise UrdfError(f"{file}: declares a document type or entities; a URDF needs neither, take them out")
+        root = ET.fromstring(text)
     except FileNotFoundError:
         raise UrdfError(f"{file}: no such file; expected a URDF") from None
-    except ET.ParseError as error:
+    except UrdfError:
+        raise
+    except UntrustedError as error:
+        raise UrdfError(f"{file}: {error}") from None
+    except (ET.ParseError, ValueError, RecursionError) as error:
         raise UrdfError(f"{file}: not well-formed XML: {error}") from None
     except OSError as error:
         raise UrdfError(f"{file}: cannot be read ({error.strerror})") from None

@@ -95,4 +95,7 @@ def _absent(name: str) -> str:
     """A setting without a plus that the configuration does not have."""
     if name == "scenario":
         return "scenario: there is none yet; add it with a plus sign: +scenario=8"
-    return str(unknown_key("", name, known_settings(), "'python -m ee_dist --help' lists them"))
+    known = known_settings()
+    if name in known:
+        return f"{name}: not among the settings of what was chosen; add it with a plus sign: +{name}=..."
+    return str(unknown_key("", name, known, "'python -m ee_dist --help' lists them"))
