@@ -10,10 +10,9 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.units import UNITS
+from ee_dist.robots.untrusted import UntrustedError, yaml_of
 
 
 @dataclass(frozen=True)
@@ -91,11 +90,11 @@ def read_mapping(path: str | Path) -> Mapping:
     """The mapping in a YAML file. Raises MeasurementError with the key that is wrong and what would be right."""
     file = Path(path)
     try:
-        data = yaml.safe_load(file.read_text(encoding="utf-8"))
+        data = yaml_of(file)
     except FileNotFoundError:
         raise MeasurementError(f"{file}: no such file; expected a mapping in YAML") from None
-    except (yaml.YAMLError, UnicodeError) as error:
-        raise MeasurementError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
+    except UntrustedError as error:
+        raise MeasurementError(f"{file}: {error}") from None
     except OSError as error:
         raise MeasurementError(f"{file}: cannot be read ({error.strerror})") from None
     return mapping_of(data, file)

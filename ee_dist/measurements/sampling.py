@@ -13,6 +13,8 @@ from ee_dist.trials.log import Array
 
 EVEN = 0.02
 """Steps that differ by less than this share of their median count as even."""
+LONGEST = 1e7
+"""Rows of one trial: a thousand a second for nearly three hours."""
 GAP = 5.0
 """Steps longer than this many medians are gaps."""
 
@@ -51,7 +53,12 @@ def check_times(times_s: Array, path: Path, column: str, first_row: int) -> Timi
 
 def grid(times_s: Array, step_s: float) -> Array:
     """Even times (T,) from 0 in steps of ``step_s`` that cover the record and do not go beyond it."""
-    count = int(np.floor((times_s[-1] - times_s[0]) / step_s + 1e-6)) + 1
+    span = float(times_s[-1] - times_s[0])
+    if not 0 < step_s < np.inf or not span / step_s < LONGEST:
+        raise MeasurementError(
+            f"{span:g} s in steps of {step_s:g} s are more than {LONGEST:.0e} rows; check the unit of the time column"
+        )
+    count = int(np.floor(span / step_s + 1e-6)) + 1
     return np.arange(count) * step_s
 
 

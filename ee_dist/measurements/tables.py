@@ -13,10 +13,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from pyarrow import ArrowException
+from pyarrow.parquet import ParquetFile
 
 from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.robots.untrusted import UntrustedError, check_file
 from ee_dist.trials.log import Array
 
+LARGEST = 2**30
+MOST_CELLS = 100_000_000
+"""Bytes and values that one file of measurements may have."""
 FORMATS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".parquet": "parquet", ".pq": "parquet", ".json": "json"}
 
 
@@ -44,7 +50,7 @@ class Table:
         for i, value in enumerate(raw):
             try:
                 out[i] = float(value) if value is not None and value != "" else np.nan
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 raise MeasurementError(
                     f"{self.path}: row {i + self.first_row}, column {column!r}: {str(value)[:40]!r} is not a number"
                 ) from None
@@ -66,13 +72,14 @@ def read_table(path: str | Path, kind: str | None = None, records: str = "entrie
     if chosen not in ("csv", "parquet", "json"):
         raise MeasurementError(f"{file}: unknown format {kind or file.suffix!r}; expected .csv, .parquet or .json")
     try:
+        check_file(file, LARGEST)
         if file.stat().st_size == 0:
             raise MeasurementError(f"{file}: the file is empty")
         table = {"csv": _csv, "parquet": _parquet, "json": _json}[chosen](file, records, separator)
     except FileNotFoundError:
         raise MeasurementError(f"{file}: no such file") from None
-    except IsADirectoryError:
-        raise MeasurementError(f"{file}: a folder; expected a file") from None
+    except UntrustedError as error:
+        raise MeasurementError(f"{file}: {error}") from None
     except UnicodeDecodeError:
         raise MeasurementError(f"{file}: not a text file; is it really {chosen}?") from None
     except OSError as error:
@@ -87,7 +94,9 @@ def _csv(file: Path, records: str, separator: str) -> Table:
         frame = pd.read_csv(file, sep=separator, dtype=str, keep_default_na=False, skip_blank_lines=False)
     except pd.errors.EmptyDataError:
         raise MeasurementError(f"{file}: the file is empty") from None
-    except pd.errors.ParserError as error:
+    except UnicodeDecodeError:
+        raise
+    except (pd.errors.ParserError, ValueError, MemoryError) as error:
         raise MeasurementError(f"{file}: not a table: {' '.join(str(error).split())}") from None
     while len(frame) and all(v == "" for v in frame.iloc[-1]):
         frame = frame.iloc[:-1]
@@ -96,8 +105,13 @@ def _csv(file: Path, records: str, separator: str) -> Table:
 
 def _parquet(file: Path, records: str, separator: str) -> Table:
     try:
+        found = ParquetFile(file).metadata
+        if found.num_rows * max(found.num_columns, 1) > MOST_CELLS:
+            raise ValueError(
+                f"{found.num_rows} rows of {found.num_columns} columns; at most {MOST_CELLS} values are read"
+            )
         frame = pd.read_parquet(file)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, TypeError, KeyError, ArrowException, MemoryError, RecursionError) as error:
         raise MeasurementError(f"{file}: not a Parquet file: {' '.join(str(error).split())[:120]}") from None
     return Table(file, {str(c): frame[c].tolist() for c in frame.columns})
 
@@ -105,8 +119,8 @@ def _parquet(file: Path, records: str, separator: str) -> Table:
 def _json(file: Path, records: str, separator: str) -> Table:
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
-    except json.JSONDecodeError as error:
-        raise MeasurementError(f"{file}: not JSON: {error}") from None
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise MeasurementError(f"{file}: not JSON: {' '.join(str(error).split())}") from None
     if not isinstance(data, Mapping) or not isinstance(data.get(records), list):
         keys = nearest(records, data) if isinstance(data, Mapping) else "the file is not a mapping"
         raise MeasurementError(f"{file}: no list named {records!r} in it; {keys}")

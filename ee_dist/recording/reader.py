@@ -11,7 +11,9 @@ from ee_dist.recording import codec, schemas, topics
 from ee_dist.recording.contents import Contents, damage, read_contents
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.records import HARDWARE, GenerationRecord, HypothesisRecord, RunRecord, TrialRecord
-from ee_dist.robots.serial import RobotFormatError, robot_from_json
+from ee_dist.robots.model import RobotError
+from ee_dist.robots.plausible import checked
+from ee_dist.robots.serial import robot_from_json
 
 Record = TrialRecord | HypothesisRecord | GenerationRecord
 
@@ -34,8 +36,8 @@ def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
     if robot is None:
         raise RecordingError(f"{path}: cut off before its robot was recorded; nothing can be recovered")
     try:
-        run = RunRecord(robot_from_json(robot), metadata, contents.attachments)
-    except (RobotFormatError, UnicodeError, RecursionError) as error:
+        run = RunRecord(checked(robot_from_json(robot)), metadata, contents.attachments)
+    except (RobotError, UnicodeError, RecursionError) as error:
         raise RecordingError(f"{path}: the attachment {topics.ROBOT_FILE} is not a robot of ours: {error}") from error
     records = list(_records(path, contents))
     for record in records:
