@@ -11,9 +11,10 @@ import numpy as np
 from rich.console import Console
 
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.importer import Report, describe, import_file
+from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping, read_mapping
-from ee_dist.measurements.tables import FORMATS
+from ee_dist.measurements.readers import FORMATS
+from ee_dist.measurements.report import Report, describe
 from ee_dist.recording.records import TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.describe import load_robot, robot_of
@@ -45,7 +46,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         )
     mapping = read_mapping(options.mapping)
     robot, notes = robot_of_mapping(mapping, config)
-    found = [import_file(f, mapping, robot, i) for i, f in enumerate(files_of(config.measured, mapping.kind))]
+    found = import_files(files_of(config.measured, mapping.reading.kind), mapping, robot)
     reports = [report for _, report in found]
     text = describe(reports)
     out.mkdir(parents=True, exist_ok=True)
