@@ -13,7 +13,7 @@ from rich.console import Console
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping, read_mapping
-from ee_dist.measurements.readers import FORMATS
+from ee_dist.measurements.readers import FORMATS, kind_of
 from ee_dist.measurements.report import Report, describe
 from ee_dist.recording.records import TrialRecord
 from ee_dist.recording.writer import RunWriter
@@ -82,13 +82,11 @@ def files_of(measured: Any, kind: str | None = None) -> list[Path]:
     files: list[Path] = []
     for name in names:
         path = Path(str(name))
-        if path.is_dir():
-            wanted = {s for s, k in FORMATS.items() if kind is None or k == kind}
-            inside = sorted(f for f in path.iterdir() if f.is_file() and f.suffix.lower() in wanted)
+        if path.is_dir() and kind_of(path) is None:
+            inside = sorted(f for f in path.iterdir() if kind_of(f) is not None and kind in (None, kind_of(f)))
             if not inside:
-                raise MeasurementError(
-                    f"{path}: no file to import in this folder; expected {', '.join(sorted(wanted))}"
-                )
+                wanted = [s for s, k in FORMATS.items() if kind in (None, k)]
+                raise MeasurementError(f"{path}: no file to import in this folder; expected {', '.join(wanted)}")
             files += inside
         else:
             files.append(path)
