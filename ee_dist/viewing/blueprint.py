@@ -77,6 +77,12 @@ def in_brackets(unit: str) -> str:
     return "" if unit in ("", "1") else f" ({unit})"
 
 
+def command_unit(robot: Robot) -> str:
+    """The unit of a robot's commands, in brackets; nothing where its drives are of both kinds."""
+    kinds = {robot.joint(name).kind for name in robot.motor_names}
+    return in_brackets({"hinge": "rad", "slide": "m"}.get(kinds.pop(), "")) if len(kinds) == 1 else ""
+
+
 def lanes(origin: str, name: str) -> rrb.StateTimelineView:
     """States over time, one lane for each entity below ``origin``."""
     return rrb.StateTimelineView(origin=origin, name=name, time_view=moving_axis())

@@ -13,8 +13,8 @@ import rerun.blueprint as rrb
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import SensorLog
 from ee_dist.viewing import blueprint, channels, world
-from ee_dist.viewing.channels import Pair
-from ee_dist.viewing.palette import GROUND, PREDICTED
+from ee_dist.viewing.channels import Model, Shot
+from ee_dist.viewing.palette import GROUND, PREDICTED, PREDICTED_NAME
 from ee_dist.viewing.robot3d import Appearance, Shown
 from ee_dist.viewing.stream import interval_s, log_digest, recording, starts_of
 
@@ -25,6 +25,7 @@ WHOLE_S = 60.0
 WINDOW_S = (-5.0, 25.0)
 ONE_PAGE = 4
 """Up to so many channels are shown together."""
+MODELS = (Model(PREDICTED_NAME, PREDICTED_NAME),)
 BAR, LADDER_SHIFT = 0.4, 0.2
 
 
@@ -50,7 +51,7 @@ def write_comparison_rrd(
     """
     kept = [(name, m, p) for name, m, p in pairs if len(m) and len(p)]
     starts = starts_of([(k, [m, p]) for k, (_, m, p) in enumerate(kept)])
-    shown = [Pair(name, s, m, p) for (name, m, p), s in zip(kept, starts, strict=True)]
+    shown = [Shot(name, s, m, {PREDICTED_NAME: p}) for (name, m, p), s in zip(kept, starts, strict=True)]
     aside = world.BESIDE_M if robot.free_base else 0.0
     real = [world.seen(Appearance(p.start_s, robot, p.measured, p.name)) for p in shown]
     ghost = [world.seen(Appearance(s, robot, p, "", aside)) for s, (_, _, p) in zip(starts, kept, strict=True)]
@@ -62,21 +63,23 @@ def write_comparison_rrd(
         stream.log("texts/result", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
         _send_ladder(stream, rungs)
         if shown:
-            world.send_world(stream, robot, real, ghost, starts)
-            channels.send_sensors(stream, shown, [s.name for s in robot.sensors if s.kind == "touch"])
-            channels.send_residuals(stream, shown)
+            world.send_world(stream, robot, real, [world.Ghost(PREDICTED_NAME, PREDICTED, ghost)], starts)
+            channels.send_sensors(stream, shown, MODELS, [s.name for s in robot.sensors if s.kind == "touch"])
+            channels.send_residuals(stream, shown, MODELS)
             channels.send_commands(stream, shown)
             channels.send_trial_lane(stream, shown, [p.name for p in shown])
 
 
-def comparison_text(title: str, pairs: Sequence[Pair], ladder: Sequence[Rung]) -> str:
+def comparison_text(title: str, pairs: Sequence[Shot], ladder: Sequence[Rung]) -> str:
     """The first thing to read: how far apart, channel by channel, and what each added effect brought. Markdown."""
     lines = [f"### {title}", "", "**Blue**: measured. **Orange**: predicted.", ""]
     if pairs:
         lines += ["| channel | RMS residual | unit | RMS measured |", "|---|---|---|---|"]
         for name, unit in channels.units_of(pairs).items():
             measured = np.concatenate([p.measured.channel(name) for p in pairs if name in p.measured.sensor_names])
-            lines.append(f"| {name} | {_rms(channels.residual(pairs, name)):.4g} | {unit} | {_rms(measured):.4g} |")
+            lines.append(
+                f"| {name} | {_rms(channels.residual(pairs, name, PREDICTED_NAME)):.4g} | {unit} | {_rms(measured):.4g} |"
+            )
     if ladder:
         lines += ["", "| # | model | error held out | error in the fit |", "|---|---|---|---|"]
         for k, rung in enumerate(ladder):
@@ -107,12 +110,12 @@ def _send_ladder(stream: rr.RecordingStream, ladder: Sequence[Rung]) -> None:
             stream.log(f"ladder/{name}", chart, static=True)
 
 
-def _blueprint(robot: Robot, pairs: Sequence[Pair], real: Shown, with_ladder: bool) -> rrb.Blueprint:
+def _blueprint(robot: Robot, pairs: Sequence[Shot], real: Shown, with_ladder: bool) -> rrb.Blueprint:
     text = rrb.TextDocumentView(origin="/texts/result", name="Result")
     ladder = [blueprint.bars("/ladder", "Error of each model, numbered as above", legend=True)] if with_ladder else []
     if not pairs:
         return blueprint.framed(rrb.Horizontal(text, *ladder))
-    end_s = max(p.start_s + interval_s(log) for p in pairs for log in (p.measured, p.predicted) if log is not None)
+    end_s = max(p.start_s + interval_s(log) for p in pairs for log in (p.measured, *p.said.values()))
     axis = blueprint.fixed_axis(0.0, end_s) if end_s <= WHOLE_S else blueprint.moving_axis(*WINDOW_S)
     scene = blueprint.scene_view(robot, "Robot (blue) and its model (orange)", world.eye(robot, real))
     left = rrb.Vertical(scene, text, *ladder, row_shares=[3, 4, 3][: 2 + len(ladder)])
@@ -132,7 +135,7 @@ def _channel_tabs(robot: Robot, units: dict[str, str], axis: rrb.TimeAxis) -> rr
         channels_above = blueprint.sensor_plots(sensors, "Measured and predicted", axis)
         residuals = []
         for unit in dict.fromkeys(s.unit for s in sensors):
-            paths = [f"/residuals/{s.name}" for s in sensors if s.unit == unit]
+            paths = [f"/residuals/{s.name}/**" for s in sensors if s.unit == unit]
             name = "Measured - predicted" + blueprint.in_brackets(unit)
             residuals.append(blueprint.plot("/residuals", name, axis, contents=paths))
         below = residuals[0] if len(residuals) == 1 else rrb.Horizontal(*residuals)

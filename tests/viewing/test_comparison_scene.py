@@ -52,7 +52,7 @@ def rrd(pairs: list[tuple[str, SensorLog, SensorLog]], tmp_path_factory: pytest.
 
 
 def test_residuals_are_measured_minus_predicted(pairs: list[tuple[str, SensorLog, SensorLog]], rrd: Path) -> None:
-    times, values = rows_of(rrd, "residuals/position", "Scalars:scalars")
+    times, values = rows_of(rrd, "residuals/position/predicted", "Scalars:scalars")
     flat = np.array([v[0] for v in values])
     (_, m0, p0), (_, m1, p1) = pairs
     assert np.abs(m0.channel("position") - p0.channel("position")).max() > 0.01
