@@ -15,6 +15,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from ee_dist.tasks.compose import config_folder, plain, quoted, settings
 from ee_dist.tasks.errors import USER_ERRORS, hydra_message
+from ee_dist.tasks.help import answer
 
 MISTAKE = 2
 
@@ -41,6 +42,10 @@ def main() -> int:
     os.environ["HYDRA_FULL_ERROR"] = "1"
     sys.argv[1:] = quoted(sys.argv[1:])
     try:
+        told = answer(sys.argv[1:])
+        if told is not None:
+            print(told)
+            return 0
         folder = config_folder()
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()
     except USER_ERRORS as error:

@@ -20,6 +20,11 @@ import pytest
         (["+scenario=8", "+metric.heder=3"], "metric.heder: no such setting; did you mean header?"),
         (["+scenario=8", "sed=1"], "sed: no such setting; did you mean seed"),
         (["+scenario=8", "evaluator.wrkers=2"], "evaluator.wrkers: no such setting; did you mean evaluator.workers"),
+        (["+scenario=8", "evaluator=serial", "evaluator.workers=2"],
+         "evaluator.workers: the chosen evaluator has no such setting; evaluator=ray has it"),
+        (["+scenario=8", "engine.threads=2"], "engine=mujoco has it"),
+        (["task=compare", "task.bye=free_run"], "task.bye: this verb has no such setting"),
+        (["task=explian", "--help"], "task=explian: no such choice; did you mean explain"),
         (["scenario=8"], "add it with a plus sign: +scenario=8"),
         (["+scenario=8", "+sed=1"], "sed: no such setting; did you mean seed?"),
         (["+scenario.sev=1"], "scenario.sev: no such setting"),
@@ -53,10 +58,3 @@ def test_a_foreign_file_is_not_a_run(cli, tmp_path):
     assert outcome.status == 2
     assert str(foreign) in outcome.err
     assert len(outcome.err.strip().splitlines()) == 1
-
-
-def test_help_explains_the_verbs_with_examples(cli):
-    outcome = cli("--help")
-    assert outcome.status == 0
-    for word in ("+scenario=8", "budget=quick", "task=view", "-m +scenario=1,5,9"):
-        assert word in outcome.out
