@@ -38,7 +38,6 @@ from ee_dist.tasks.summary import (
 from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
 from ee_dist.viewing.story import told
 
-
 QUICK = (
     "Budget quick shows that every part works. Its gaits hardly evolve: shares of intact, and so this verdict, "
     "say little. Without budget=quick it is the paper's."
