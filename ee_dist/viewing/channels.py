@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,15 +66,34 @@ def send_sensors(
         for name in units_of(shots):
             place = f"{path}/{name}/{source.key}"
             _send_scalars(stream, place, [(s, g, g.channel(name)) for s, g in present if name in g.sensor_names])
-            line = rr.SeriesLines(
-                colors=source.colour,
-                names=source.label,
-                widths=width,
-                # A switch knows no values between its two: neither slopes nor means.
-                interpolation_mode="StepAfter" if name in switches else None,
-                aggregation_policy="MinMax" if name in switches else None,
-            )
-            stream.log(place, line, static=True)
+            stream.log(place, _line(name in switches, source.colour, source.label, width), static=True)
+
+
+def send_measured(
+    stream: rr.RecordingStream,
+    shots: Sequence[Shot],
+    groups: Iterable[Sequence[str]],
+    switches: Sequence[str],
+    path: str = "sensors",
+) -> None:
+    """Scalars at ``<path>/<channel>/measured``; the channels of a group, which share a plot, in different colours."""
+    for names in groups:
+        for k, name in enumerate(names):
+            place = f"{path}/{name}/{MEASURED_NAME}"
+            logs = [(s.start_s, s.measured) for s in shots if name in s.measured.sensor_names]
+            _send_scalars(stream, place, [(start, log, log.channel(name)) for start, log in logs])
+            stream.log(place, _line(name in switches, series_colour(k), name.replace("_", " "), 1.5), static=True)
+
+
+def _line(switch: bool, colour: Rgb, name: str, width: float) -> rr.SeriesLines:
+    return rr.SeriesLines(
+        colors=colour,
+        names=name,
+        widths=width,
+        # A switch knows no values between its two: neither slopes nor means.
+        interpolation_mode="StepAfter" if switch else None,
+        aggregation_policy="MinMax" if switch else None,
+    )
 
 
 def residual(shots: Sequence[Shot], name: str, model: str) -> Array:

@@ -29,7 +29,8 @@ SERIES: tuple[Rgb, ...] = (
 )
 """For lists of things of one kind: passes, motors."""
 
-MEASURED_NAME, PREDICTED_NAME, HINDSIGHT_NAME = "measured", "predicted", "hindsight"
+MEASURED_NAME, PREDICTED_NAME, HINDSIGHT_NAME = "measured", "predicted", "predicted_after"
+"""Places among the entities; the viewer draws lines in their order, and thin ones must lie upon the thick measured one."""
 RESIDUALS: tuple[Rgb, ...] = ((236, 94, 94), *SERIES[2:])
 """For what is left when the prediction is taken off: neither blue nor orange."""
 

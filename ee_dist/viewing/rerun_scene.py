@@ -8,11 +8,13 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from ee_dist.recording.records import DIAGNOSIS, HINDSIGHT, PREDICTION, REPAIR, RunRecord, TrialRecord
+from ee_dist.recording.records import DIAGNOSIS, HARDWARE, HINDSIGHT, PREDICTION, REPAIR, RunRecord, TrialRecord
 from ee_dist.viewing import blueprint, channels, palette, search_curves, story, world
 from ee_dist.viewing.channels import Model, Shot
 from ee_dist.viewing.robot3d import Appearance, Shown
 from ee_dist.viewing.stream import interval_s, log_digest, recording, starts_of
+from ee_dist.viewing.text import document
+from ee_dist.viewing.trial_scene import write_trial_rrd
 from ee_dist.viewing.world import Ghost
 
 APPLICATION = "ee_dist"
@@ -25,7 +27,13 @@ SAID = {
 
 
 def write_rrd(run: RunRecord, path: str | Path) -> None:
-    """Write a run as an ``.rrd`` with its blueprint. Equal runs give equal recordings but for rerun's own row ids."""
+    """Write a run of the loop as an ``.rrd`` with its blueprint; a recording of trials alone as a scene of those.
+
+    Equal runs give equal recordings but for rerun's own row ids.
+    """
+    if not _is_loop(run):
+        write_trial_rrd(run, path)
+        return
     trials = [t for t in story.hardware_trials(run) if len(t.log)]
     said = {(t.source, t.index): t for t in run.trials if len(t.log)}
     beside = [[said[s, t.index] for s in SAID if (s, t.index) in said] for t in trials]
@@ -35,7 +43,7 @@ def write_rrd(run: RunRecord, path: str | Path) -> None:
     identity = [run.robot.digest, repr(sorted(run.metadata.items())), *(log_digest(t.log) for t in run.trials)]
     with recording(path, APPLICATION, identity, story.title_of(run), _blueprint(run, trials, starts, real)) as stream:
         for place, text in (("texts/result", story.result_text(run)), ("texts/details", story.details_text(run))):
-            stream.log(place, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+            stream.log(place, document(text), static=True)
         if trials:
             shots = [
                 Shot(t.name, s, t.log, {SAID[m.source].key: m.log for m in own})
@@ -50,12 +58,17 @@ def write_rrd(run: RunRecord, path: str | Path) -> None:
         _send_search(stream, run)
 
 
+def _is_loop(run: RunRecord) -> bool:
+    """Whether a search was recorded, or at least models beside the trials."""
+    return "scenario" in run.metadata or bool(run.generations) or any(t.source != HARDWARE for t in run.trials)
+
+
 def _send_search(stream: rr.RecordingStream, run: RunRecord) -> None:
     of = {phase: [g for g in run.generations if g.phase == phase] for phase in (REPAIR, DIAGNOSIS)}
     for phase, own in of.items():
         if own and not search_curves.anything(own):
             text = f"It was 0 in each of the {len(own)} generations of {phase}."
-            stream.log(f"{ZERO}/{phase}", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+            stream.log(f"{ZERO}/{phase}", document(text), static=True)
     search_curves.send_curve(stream, "search/distance", of[REPAIR], "repair")
     search_curves.send_curve(stream, "search/error", of[DIAGNOSIS], "diagnosis", story.beliefs(run))
 

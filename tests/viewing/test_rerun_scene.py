@@ -47,14 +47,18 @@ def test_sensor_values_and_times_are_those_of_the_logs(run: RunRecord, rrd: Path
 
 def test_hindsight_is_kept_apart_from_the_forecast(run: RunRecord, rrd: Path) -> None:
     """One trial has both: what was expected before it and what the diagnosis after it makes of it."""
-    _, values = rows_of(rrd, "sensors/angle_rear_left/hindsight", "Scalars:scalars")
+    _, values = rows_of(rrd, "sensors/angle_rear_left/predicted_after", "Scalars:scalars")
     log = trial(run, 1, HINDSIGHT).log
     np.testing.assert_array_equal([v[0] for v in values][:-1], log.channel("angle_rear_left"))
     assert not np.array_equal(log.channel("angle_rear_left"), trial(run, 1, PREDICTION).log.channel("angle_rear_left"))
-    _, labels = rows_of(rrd, "sensors/angle_rear_left/hindsight", "SeriesLines:names")
+    _, labels = rows_of(rrd, "sensors/angle_rear_left/predicted_after", "SeriesLines:names")
     assert labels == [["explained after"]]
     assert rows_of(rrd, "sensors/angle_rear_left/predicted", "SeriesLines:names")[1] == [["expected before"]]
-    assert drawn_in(rrd, "world/hindsight/upper_front_left/capsule_0", "Capsules3D:lengths") == [False, True, False]
+    assert drawn_in(rrd, "world/predicted_after/upper_front_left/capsule_0", "Capsules3D:lengths") == [
+        False,
+        True,
+        False,
+    ]
 
 
 def test_errors_that_are_all_zero_are_told_instead_of_drawn(run: RunRecord, tmp_path: Path) -> None:
