@@ -6,6 +6,7 @@ topic                          message                   one per
 ``/hardware/trial``            ee_dist.Trial             hardware trial: names, units, driver; ahead of its rows
 ``/hardware/rows``             ee_dist.Row               row of its sensor log
 ``/hardware/transforms``       foxglove.FrameTransforms  25 Hz picture of its parts, ``floor`` to ``hardware/<part>``
+``/hardware/scene``            foxglove.SceneUpdate      trial: the solids of its parts, in their frames
 ``/prediction/...``            the same                  what the model said before the trial, ``believed`` says which
 ``/hindsight/...``             the same                  the trial on the model of the diagnosis that followed it
 ``/repair/generation``         ee_dist.Generation        generation of a repair pass
@@ -52,6 +53,10 @@ def rows_topic(source: str) -> str:
 
 def transforms_topic(source: str) -> str:
     return f"/{source}/transforms"
+
+
+def scene_topic(source: str) -> str:
+    return f"/{source}/scene"
 
 
 def generation_topic(phase: str) -> str:

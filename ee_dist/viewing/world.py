@@ -12,8 +12,8 @@ import rerun.blueprint as rrb
 
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
 from ee_dist.robots.model import Robot
+from ee_dist.robots.pictured import reach
 from ee_dist.trials.log import Array
-from ee_dist.viewing.drawn import reach
 from ee_dist.viewing.palette import GROUND, Rgb
 from ee_dist.viewing.robot3d import Appearance, Shown, send_robot
 from ee_dist.viewing.stream import times
