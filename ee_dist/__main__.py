@@ -24,6 +24,7 @@ from ee_dist.tasks.compose import check_flags, config_folder, handling, plain, q
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.errors import USER_ERRORS, RayLostError, abandon_evaluators, defect, hydra_message, unasked_end
 from ee_dist.tasks.folder import NO_NAME, Refused, claimed, free_name, kept, remove_made, settings_of
+from ee_dist.tasks.help import answer
 
 MISTAKE, DEFECT = 2, 1
 STOPPED = 130
@@ -94,6 +95,10 @@ def main() -> int:
     leaving.arm()
     sys.argv[1:] = quoted(sys.argv[1:])
     try:
+        told = answer(sys.argv[1:])
+        if told is not None:
+            print(told)
+            return 0
         check_flags(sys.argv[1:])
         folder = config_folder()
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()

@@ -15,6 +15,7 @@ from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, abandon
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError, known_settings, unknown_key
+from ee_dist.tasks.help import options_with
 from ee_dist.trials.excitation import ExcitationError
 from ee_dist.trials.log import LogError
 
@@ -95,7 +96,14 @@ def _absent(name: str) -> str:
     """A setting without a plus that the configuration does not have."""
     if name == "scenario":
         return "scenario: there is none yet; add it with a plus sign: +scenario=8"
-    known = known_settings()
-    if name in known:
-        return f"{name}: not among the settings of what was chosen; add it with a plus sign: +{name}=..."
-    return str(unknown_key("", name, known, "'python -m ee_dist --help' lists them"))
+    if name.startswith("task."):
+        return f"{name}: this verb has no such setting; 'python -m ee_dist task=VERB --help' lists those of a verb"
+    if name in known_settings():
+        group, having = name.partition(".")[0], options_with(name)
+        there = (
+            f"{' and '.join(having)} {'has' if len(having) == 1 else 'have'} it"
+            if having
+            else "add it with a plus sign"
+        )
+        return f"{name}: the chosen {group} has no such setting; {there}"
+    return str(unknown_key("", name, known_settings(), "'python -m ee_dist task=VERB --help' lists them"))
