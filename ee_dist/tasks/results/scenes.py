@@ -92,7 +92,7 @@ def _finding(problem: Problem, where: Comparison, account: Account, model: Hypot
         for c in where.channels
     )
     mine = said(problem, "model", model)
-    cases = []
+    cases: list[drawn.Case] = []
     for name, trial, log in zip(names, problem.measured, mine.logs, strict=True):
         measured = trial.log
         if set(log.sensor_names) - set(measured.sensor_names):
