@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ee_dist.discrepancy.candidates import candidates
 from effect_robots import ARM_M, MASS_KG, POINT, Bench, G, lever, slider
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ee_dist.discrepancy.candidates import candidates
 from ee_dist.effects import CATALOGUE, apply, term
 from ee_dist.robots.inertia import mass_matrix
 from ee_dist.robots.inverse_dynamics import joint_torques, parameters
