@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from ee_dist import leaving
+
+if __name__ == "__main__":
+    leaving.arm(unwinds=False)  # what is imported below takes a second or two, and Ctrl-C may come in it
+
+import multiprocessing
 import os
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
@@ -14,28 +20,55 @@ from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.compose import config_folder, handling, plain, quoted, settings
+from ee_dist.tasks.compose import check_flags, config_folder, handling, plain, quoted, settings
 from ee_dist.tasks.config import ConfigError
-from ee_dist.tasks.errors import USER_ERRORS, hydra_message
-from ee_dist.tasks.folder import NO_NAME, Refused, claimed, free_name, remove_made, settings_of
+from ee_dist.tasks.errors import USER_ERRORS, RayLostError, abandon_evaluators, defect, hydra_message, unasked_end
+from ee_dist.tasks.folder import NO_NAME, Refused, claimed, free_name, kept, remove_made, settings_of
+from ee_dist.tasks.help import answer
 
-MISTAKE = 2
+MISTAKE, DEFECT = 2, 1
+STOPPED = 130
 
 
 def run(composed: DictConfig) -> None:
     """One job. A user's mistake ends it here: Hydra would add lines of its own."""
     hydra_settings: Any = HydraConfig.get()
+    out = Path(hydra_settings.runtime.output_dir)
     try:
         out = _folder(hydra_settings)
         config, module, options = settings(composed)
         with claimed(out, settings_of(composed, hydra_settings), handling(composed).overwrite):
             module.run(config, options, out)
+    except RayLostError as error:
+        remove_made()
+        abandon_evaluators()
+        leaving.leave(f"{error}; {kept(out)}", MISTAKE)
     except USER_ERRORS as error:
         remove_made()
         sys.exit(_complain(str(error)))
+    except OmegaConfBaseException as error:
+        remove_made()
+        sys.exit(_complain(plain(error)))
     except OSError as error:
         remove_made()
         sys.exit(_complain(_unwritten(error)))
+    except (SystemExit, MemoryError) as error:
+        remove_made()
+        sys.exit(_complain(unasked_end(error)))
+    except Exception as error:
+        sys.exit(_complain(defect(error, out), DEFECT))
+    except KeyboardInterrupt as stop:
+        remove_made()
+        if multiprocessing.parent_process() is not None:
+            os._exit(getattr(stop, "status", STOPPED))  # one job of several side by side: the sweep says the line
+        _leave(stop, out)
+
+
+def _leave(stop: KeyboardInterrupt, out: Path | None = None) -> NoReturn:
+    """One line, and the end: 130 after Ctrl-C, 143 where a run was asked to end."""
+    abandon_evaluators()
+    text = kept(out) if out else "nothing was begun"
+    leaving.leave(f"stopped ({getattr(stop, 'why', 'Ctrl-C')}); {text}", getattr(stop, "status", STOPPED))
 
 
 def _folder(hydra_settings: Any) -> Path:
@@ -59,8 +92,14 @@ def main() -> int:
     os.environ["HYDRA_FULL_ERROR"] = "1"
     # Rerun's own log would add lines to a complaint that is made in one.
     os.environ.setdefault("RUST_LOG", "off")
+    leaving.arm()
     sys.argv[1:] = quoted(sys.argv[1:])
     try:
+        told = answer(sys.argv[1:])
+        if told is not None:
+            print(told)
+            return 0
+        check_flags(sys.argv[1:])
         folder = config_folder()
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()
     except (*USER_ERRORS, Refused) as error:
@@ -69,16 +108,20 @@ def main() -> int:
         return _complain(hydra_message(error))
     except OmegaConfBaseException as error:
         return _complain(plain(error))
+    except RecursionError:
+        return _complain("the settings are nested too deep")
     except OSError as error:
         return _complain(_unwritten(error))
-    except KeyboardInterrupt:
-        return _complain("stopped; what was recorded so far is kept")
+    except KeyboardInterrupt as stop:
+        _leave(stop)
+    finally:
+        leaving.disarm()
     return 0
 
 
-def _complain(text: str) -> int:
-    print(f"ee_dist: {' '.join(text.split())}", file=sys.stderr)
-    return MISTAKE
+def _complain(text: str, status: int = MISTAKE) -> int:
+    print(leaving.line(text), file=sys.stderr)
+    return status
 
 
 if __name__ == "__main__":

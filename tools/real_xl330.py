@@ -24,8 +24,9 @@ from ee_dist.effects.model_file import ModelFile, read_model, write_model
 from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.importer import describe, import_file
+from ee_dist.measurements.importer import import_file
 from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.report import describe
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "examples"
 JOINT = "servo"

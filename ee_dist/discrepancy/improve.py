@@ -201,7 +201,7 @@ def _pruned(
     whole, *without = cross_fit(search, models, cut)
     energy = float((whole.residual**2).sum())
     floor = float(problem.floor.sum())
-    allowed = least_energy(tried) * max(1.0, energy / floor)
+    allowed = least_energy(tried) * max(1.0, energy / len(problem.floor))
     if cut.name != WINDOWS:
         allowed = max(allowed, 0.5 * WORTH * max(energy - floor, 0.0))
     costs = [float((h.residual**2).sum()) - energy for h in without]

@@ -274,6 +274,10 @@ def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
                 robot = entry.transform(robot, place, dict(t.values))
         except RobotError as error:
             raise EffectError(f"{t}: {error}") from error
+        except (Exception, SystemExit) as error:
+            raise EffectError(f"{t}: its transform failed: {type(error).__name__}: {error}") from error
+        if not isinstance(robot, Robot):
+            raise EffectError(f"{t}: its transform gave {type(robot).__name__}, not a Robot; does it return one?")
     return robot
 
 
@@ -306,7 +310,7 @@ def load_plugin(path: str | Path) -> None:
         spec.loader.exec_module(module)
         if not any(e.transform.__module__ == name for e in _registry.values()):
             raise EffectError("it registers no effect; decorate its transform with @effect(...)")
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         _registry.clear()
         _registry.update(before)
         LAWS.clear()
@@ -321,7 +325,7 @@ def loaded_plugins() -> tuple[str, ...]:
     return tuple(_plugins)
 
 
-def _line_of(error: Exception, file: Path) -> str:
+def _line_of(error: BaseException, file: Path) -> str:
     if isinstance(error, SyntaxError):
         return f", line {error.lineno}"
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(file)]

@@ -23,10 +23,13 @@ from zstandard import ZstdError, frame_content_size
 
 from ee_dist.recording import topics
 from ee_dist.recording.errors import RecordingError
+from ee_dist.robots.untrusted import UntrustedError, check_file
 
 _MAGIC = b"\x89MCAP0\r\n"
 _DATA_END = 1 + 8 + 4
 """Bytes of the record behind the data: opcode, length, checksum."""
+_LARGEST = 2**33
+"""Bytes of a file."""
 _CHUNK_LIMIT = 64 * 2**20
 _WHOLE_LIMIT = 4 * 2**30
 """Bytes that one chunk and all chunks of a file may unpack to; the writer's chunks are of one MiB and hold one message more."""
@@ -50,6 +53,7 @@ class Contents:
 def read_contents(path: Path) -> Contents:
     """Everything whole in the file. Raises RecordingError if it is not a recording of ours or has nothing whole."""
     try:
+        check_file(path, _LARGEST)
         size = path.stat().st_size
         with path.open("rb") as file:
             start = file.read(len(_MAGIC))
@@ -59,6 +63,8 @@ def read_contents(path: Path) -> Contents:
             if start != _MAGIC:
                 raise RecordingError(f"{path}: not an MCAP file; expected a recording written by ee_dist")
             return _read(path, file, size)
+    except UntrustedError as error:
+        raise RecordingError(f"{path}: {error}; expected a recording (.mcap)") from error
     except OSError as error:
         raise RecordingError(f"{path}: {_why(path, error)}") from error
 
@@ -206,6 +212,4 @@ def _why(path: Path, error: OSError) -> str:
     if isinstance(error, FileNotFoundError):
         part = path.with_name(path.name + ".part")
         return "no such file" + (f"; there is an unfinished recording {part.name}" if part.exists() else "")
-    if isinstance(error, IsADirectoryError):
-        return "a folder; expected a recording (.mcap) in it"
     return f"cannot be read ({error.strerror})"

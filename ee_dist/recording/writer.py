@@ -21,7 +21,8 @@ from ee_dist.recording.clock import RunClock, offsets_ns
 from ee_dist.recording.contents import with_checksum
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.records import GenerationRecord, HypothesisRecord, TrialRecord
-from ee_dist.recording.transforms import transform_messages
+from ee_dist.recording.scene import scene_message
+from ee_dist.recording.transforms import model_of, transform_messages
 from ee_dist.robots.model import Robot
 from ee_dist.robots.serial import robot_to_json
 
@@ -95,6 +96,10 @@ class RunWriter:
                 zip(offsets.tolist(), codec.row_messages(number, record.log), strict=True)
             ):
                 self._mcap.add_message(channel, start + offset, data, start + offset, row)
+            length = int(offsets.max(initial=0))
+            if len(record.log):
+                solids = scene_message(model_of(record, self._robot), record.source, start, length)
+                self._add(topics.scene_topic(record.source), solids, start)
             for log_time, message in transform_messages(record, self._robot, start):
                 self._add(topics.transforms_topic(record.source), message, log_time)
             self._save()

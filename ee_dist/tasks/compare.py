@@ -14,7 +14,7 @@ from ee_dist.discrepancy.words import compare_account
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.results.pages import compare_page
-from ee_dist.tasks.results.scenes import write_scene
+from ee_dist.tasks.results.scenes import compare_scene
 from ee_dist.tasks.results.summaries import of_comparison
 from ee_dist.tasks.results.tables import setting, show_account, show_comparison
 from ee_dist.tasks.summary import Stopwatch, write_summary
@@ -44,7 +44,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     write_summary(out, "compare", config, options, watch, digest, summary)
     write_page(compare_page(problem, measured, found, account, residual, remarks), out / "report.html")
     if options.rerun:
-        write_scene(problem, [("model", measured.model)], out / "compare.rrd", "compare", account)
+        compare_scene(problem, found, account, measured.model, out / "compare.rrd")
     show_comparison(console, problem, found)
     console.print(f"By {way.name}: {way.why}.", *remarks, sep="\n", highlight=False, markup=False)
     model = [setting("model", config.model)] if config.model else []

@@ -6,11 +6,13 @@ import importlib
 import re
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
+from hydra._internal.utils import get_args_parser
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from ee_dist.effects.catalogue import find, load_plugin
 from ee_dist.tasks.config import Config, ConfigError, Handling, check_keys, groups_of, one_of
 
 TASKS = (
@@ -27,7 +29,8 @@ TASKS = (
     "robot",
     "export",
 )
-_SCENARIO = re.compile(r"^(\+{0,2}scenario)=([0-9, ]+)$")
+_SWEEP = ("-m", "--multirun")
+_SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
 
 
 def quoted(arguments: list[str]) -> list[str]:
@@ -40,7 +43,20 @@ def quoted(arguments: list[str]) -> list[str]:
         numbers = ",".join(f"'{n.strip()}'" for n in match.group(2).split(",") if n.strip())
         return f"{match.group(1)}={numbers}"
 
-    return [quote(a) for a in arguments]
+    # The parser of the command line takes flags only where they stand together.
+    sweep = [a for a in arguments if a in _SWEEP]
+    return [*sweep, *(quote(a) for a in arguments if a not in _SWEEP)]
+
+
+def check_flags(arguments: list[str]) -> None:
+    """Raises ConfigError for a flag that there is not: the parser itself would print eight lines."""
+
+    def complain(message: str) -> NoReturn:
+        raise ConfigError(f"{message}; settings are written key=value, and --help lists them")
+
+    parser = get_args_parser()
+    parser.error = complain  # type: ignore[method-assign]
+    parser.parse_args(arguments)
 
 
 def folder_name(overrides: str) -> str:
@@ -86,7 +102,11 @@ def settings(composed: DictConfig) -> tuple[Config, ModuleType, Any]:
     module = task_module(str(task.name))
     check_keys("task", task, module.Options)
     config = _typed(Config, OmegaConf.create(tree), "")
+    for path in config.plugins:
+        load_plugin(path)
     options = _typed(module.Options, task, "task.")
+    for text in getattr(options, "without", None) or ():
+        find(str(text).partition("@")[0])
     return config, module, options
 
 

@@ -19,6 +19,12 @@ class ConfigError(ValueError):
     """A setting that cannot be: which one, why, and what would be right."""
 
 
+def within(what: str, value: float, low: float, high: float) -> None:
+    """Raises ConfigError outside of [low, high]: memory and time are taken only for what can come to an end."""
+    if not low <= value <= high:
+        raise ConfigError(f"{what}={value}: must be from {low:,} to {high:,}".replace(",", " "))
+
+
 def one_of(what: str, value: str, allowed: tuple[str, ...]) -> str:
     """The value, if it is allowed. Raises ConfigError with the nearest names."""
     if value not in allowed:
@@ -43,8 +49,7 @@ class EngineConfig:
 
     def __post_init__(self) -> None:
         one_of("engine", self.name, ENGINES)
-        if self.threads < 0:
-            raise ConfigError(f"engine.threads={self.threads}: must be 0 (automatic) or more")
+        within("engine.threads", self.threads, 0, 1024)
 
 
 @dataclass
@@ -56,9 +61,8 @@ class EvaluatorConfig:
 
     def __post_init__(self) -> None:
         one_of("evaluator", self.name, EVALUATORS)
-        for key in ("workers", "chunk"):
-            if getattr(self, key) < 0:
-                raise ConfigError(f"evaluator.{key}={getattr(self, key)}: must be 0 (automatic) or more")
+        within("evaluator.workers", self.workers, 0, 100_000)
+        within("evaluator.chunk", self.chunk, 0, 1_000_000)
 
 
 @dataclass
@@ -85,6 +89,13 @@ class MetricConfig:
             raise ConfigError(str(error)) from None
 
 
+_MOST = {
+    "population": 100_000, "generations": 100_000, "diagnosis_population": 100_000, "diagnosis_generations": 100_000,
+    "crossovers": 25_000, "compensating_trials": 1000, "steps": 1_000_000, "polish": 1000, "restarts": 1000,
+}  # fmt: skip
+"""Far beyond use, and still within the memory of a machine and the time of a cluster."""
+
+
 @dataclass
 class BudgetConfig:
     name: str = "paper"
@@ -103,6 +114,8 @@ class BudgetConfig:
     related: float = 1.0
 
     def __post_init__(self) -> None:
+        for name, most in _MOST.items():
+            within(f"budget.{name}", getattr(self, name), 0, most)
         self.plan()
 
     def plan(self) -> Plan:
@@ -129,7 +142,9 @@ class ScenarioConfig:
     changes: list[dict[str, Any]] = field(default_factory=list)
 
     def hidden(self) -> Hypothesis:
-        """What happens to the physical robot. Raises EffectError for an unknown effect or value."""
+        """What happens to the physical robot. Raises EffectError for an unknown effect or value, ConfigError without one."""
+        if self.number < 0 and not self.changes:
+            raise ConfigError("scenario: neither one of the scenarios, such as +scenario=8, nor scenario.changes=[...]")
         return tuple(from_dict(entry) for entry in self.changes)
 
 
@@ -158,6 +173,10 @@ class Config:
     def __post_init__(self) -> None:
         if not 0 <= self.seed < 2**63:
             raise ConfigError(f"seed={self.seed}: must be a whole number from 0 to 2^63 - 1")
+        if self.metric.name == "rolling_mean" and self.metric.header > self.budget.steps:
+            raise ConfigError(
+                f"metric.header={self.metric.header}: longer than a trial; must be at most budget.steps ({self.budget.steps})"
+            )
         if not 0.0 <= self.noise <= 1.0:
             raise ConfigError(f"noise={self.noise}: must be a share of the channels' range, from 0 to 1")
 

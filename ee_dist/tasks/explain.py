@@ -17,7 +17,7 @@ from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.pages import explain_page
-from ee_dist.tasks.results.scenes import write_scene
+from ee_dist.tasks.results.scenes import explain_scene
 from ee_dist.tasks.results.summaries import of_explanation
 from ee_dist.tasks.results.tables import setting, show_account, show_explanation
 from ee_dist.tasks.summary import Stopwatch, write_summary
@@ -62,9 +62,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead))
     write_page(explain_page(problem, measured, found, account), out / "report.html")
     if options.rerun:
-        models = [("model", found.before)]
-        models += [(c.name, (*found.fixed, *c.hypothesis)) for c in (found.tied or found.candidates[:3])]
-        write_scene(problem, models, out / "explain.rrd", "explain", account)
+        explain_scene(problem, found, account, out / "explain.rrd")
     show_explanation(console, problem, found)
     wall, _ = watch.read()
     console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)

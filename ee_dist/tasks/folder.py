@@ -123,6 +123,12 @@ def shown(folder: Path) -> str:
     return str(folder) if relative.startswith("..") else relative
 
 
+def kept(folder: Path) -> str:
+    """What a run that was stopped leaves behind, in words."""
+    names = [n for n in _holds(folder) if n != SETTINGS]
+    return f"kept in {shown(folder)}: {_listed(names)}" if names else "nothing was recorded yet, so nothing is kept"
+
+
 def settings_of(composed: DictConfig, hydra: DictConfig) -> dict[str, str]:
     """What was asked for, as files: the composed settings, Hydra's own, and the overrides of the command line."""
     return {

@@ -25,7 +25,7 @@ from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.measurements import Measurements, load
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.pages import improve_page
-from ee_dist.tasks.results.scenes import write_scene
+from ee_dist.tasks.results.scenes import improve_scene
 from ee_dist.tasks.results.summaries import of_improvement
 from ee_dist.tasks.results.tables import setting, show_account, show_candidates, show_ladder
 from ee_dist.tasks.summary import Stopwatch, write_summary
@@ -77,8 +77,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     write_summary(out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path)))
     write_page(improve_page(problem, measured, found, account), out / "report.html")
     if options.rerun:
-        models = [("model as it was", measured.model), ("improved model", found.terms)]
-        write_scene(problem, models, out / "improve.rrd", "improve", account, found.ladder)
+        improve_scene(problem, found, account, measured.model, out / "improve.rrd")
     show_ladder(console, problem, found)
     if found.last is not None:
         refused = [c for c in found.last.judged if not c.earned]

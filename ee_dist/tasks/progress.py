@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ee_dist.recording.records import HARDWARE, REPAIR, GenerationRecord, TrialRecord
+from ee_dist.recording.records import HARDWARE, REPAIR, GenerationRecord, HypothesisRecord, TrialRecord
 from ee_dist.recovery.observer import Observer
+from ee_dist.viewing.story import told
 
 
 class PassProgress(Observer):
@@ -41,6 +43,7 @@ class PassProgress(Observer):
         self.run_bar = self.bars.add_task("whole run (%)", total=100, best="")
         self.pass_bar = self.bars.add_task("starting", total=1, best="")
         self.phase, self.index, self.generations = "", 0, 1
+        self.evolved = float("nan")
 
     def __enter__(self) -> PassProgress:
         self.bars.start()
@@ -61,8 +64,22 @@ class PassProgress(Observer):
         good = f"best {record.best:.2f} m" if record.phase == REPAIR else f"error {record.best:.4f}"
         self.bars.update(self.pass_bar, advance=1, best=good)
         self.bars.update(self.run_bar, completed=round(100 * self.done / self.total))
-        if record.generation == self.generations - 1:
+        if record.generation < self.generations - 1:
+            return
+        if record.phase == REPAIR:
             self._say(f"{record.phase} pass {record.pass_index + 1}: {good}")
+        else:
+            # Not yet what the loop will believe: that is told when it is final.
+            self.evolved = record.best
+            self.bars.update(self.pass_bar, description=f"{record.phase} {record.pass_index + 1}: polishing")
+
+    def hypotheses(self, records: Sequence[HypothesisRecord]) -> None:
+        for r in records:
+            if r.final:
+                self._say(f"diagnosis pass {r.pass_index + 1}: error {r.error:.5f} (evolved: {self.evolved:.5f})")
+                self.bars.console.print(
+                    f"{'':10}believes: {told(r.terms)}", highlight=False, style="dim", soft_wrap=True
+                )
 
     def trial(self, record: TrialRecord) -> None:
         if record.source == HARDWARE:

@@ -7,11 +7,13 @@ import gc
 import os
 from dataclasses import dataclass
 
+from ee_dist import leaving
 from ee_dist.effects.catalogue import load_plugin
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
-from ee_dist.evaluation.ray_actors import RayEvaluator, stop_ray
+from ee_dist.evaluation.ray_actors import RayEvaluator
+from ee_dist.evaluation.ray_session import stop_ray
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.describe import robot_of
 from ee_dist.robots.model import Robot
@@ -87,6 +89,7 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
             inner = RayEvaluator(
                 engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address
             )
+            leaving.arm()  # Ray has put handlers of its own in place
         _kept[key] = CachedEvaluator(inner) if settings.cache else inner
     evaluator = _kept[key]
     evaluator.counts.reset()

@@ -303,7 +303,7 @@ def test_what_is_not_a_recording_is_refused_in_one_line(tmp_path: Path) -> None:
     refused(tmp_path / "noise.mcap")
     refused(tmp_path, "a folder")
     refused(foreign(tmp_path / "ros.mcap", "ros2"), "something else", "'ros2'", "expected profile 'ee_dist'")
-    refused(foreign(tmp_path / "newer.mcap", PROFILE, "99"), "format 99", "reads format 1")
+    refused(foreign(tmp_path / "newer.mcap", PROFILE, "99"), "format 99", "reads formats 1 and 2")
 
 
 def test_a_missing_file_points_to_its_unfinished_one(tmp_path: Path, run: RunRecord) -> None:

@@ -104,7 +104,7 @@ def judge(problem: Problem, base: Array, found: HeldOut, proposal: Proposal, mod
     low, high = bootstrap(gained, groups=cut.groups)
     total, gain = float(before.sum()), float(gained.sum())
     floor = float(problem.floor.sum())
-    dispersion = max(1.0, float(held.sum()) / floor) if floor > 0 else 1.0
+    dispersion = max(1.0, float(held.sum()) / len(base))
     # Where a model is wrong all over, useless effects take more off it by luck, in proportion.
     enough = least_energy(tried, max(1, proposal.size)) * dispersion + CAUTION * problem.gained
     above = max(total - floor, 1e-12)

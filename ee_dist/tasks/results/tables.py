@@ -17,6 +17,7 @@ from ee_dist.discrepancy.improve import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account, named, plain, told_all
 
+TIED_STANDING = "tied with the best"
 Column = tuple[str, bool]
 """Heading, and whether it holds numbers."""
 
@@ -61,7 +62,7 @@ def standing(c: Judged, best: Judged) -> str:
         return c.why_not
     if c is best:
         return "best"
-    return "tied with the best" if c.name in best.tied_with else "earned"
+    return TIED_STANDING if c.name in best.tied_with else "earned"
 
 
 def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
