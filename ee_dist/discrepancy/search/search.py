@@ -32,7 +32,9 @@ class Search:
     progress: Progress = quiet
 
     def residuals(self, hypotheses: Sequence[Hypothesis]) -> Array:
-        """(H, n) of the fixed terms followed by each hypothesis."""
+        """(H, n) of the fixed terms followed by each hypothesis; none are simulated where none are asked for."""
+        if not hypotheses:
+            return np.zeros((0, len(self.problem.segment_of)))
         return self.problem.residuals([(*self.fixed, *h) for h in hypotheses], self.trials)
 
     def base(self) -> Array:

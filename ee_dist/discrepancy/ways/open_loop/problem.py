@@ -175,7 +175,7 @@ class OpenLoop(Problem):
             size = sum(map(len, seg)) - at
             self.slices.append(slice(at, at + size))
             at += size
-        robot = self.robot
+        robot, computed = self.robot, self.robot.motor_names if self.looped else ()
         self.layout = Layout(
             segments=tuple(names),
             trial_of_segment=np.array(trial_of_segment),
@@ -185,9 +185,9 @@ class OpenLoop(Problem):
             reading=np.concatenate(reading).astype(bool),
             floor=np.concatenate(floor),
             known=np.concatenate(known),
-            channels=(*robot.sensor_names, *(f"command_{m}" for m in robot.motor_names)),
-            units=(*(x.unit for x in robot.sensors), *(joint_unit(robot, m) for m in robot.motor_names)),
-            joint_of_channel=joints_of(robot, [*(x.target for x in robot.sensors), *robot.motor_names]),
+            channels=(*robot.sensor_names, *(f"command_{m}" for m in computed)),
+            units=(*(x.unit for x in robot.sensors), *(joint_unit(robot, m) for m in computed)),
+            joint_of_channel=joints_of(robot, [*(x.target for x in robot.sensors), *computed]),
         )
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
