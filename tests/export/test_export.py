@@ -218,3 +218,10 @@ def test_the_controller_file_runs_alone_on_numpy(tmp_path: Path) -> None:
     for step in range(20):
         q = 0.1 * np.sin(step + np.arange(8))
         assert np.array_equal(made.torque(0.01 * step, q, q, q), own.torque(0.01 * step, q, q, q))
+
+
+def test_the_page_says_what_becomes_of_each_effect() -> None:
+    root = Path(__file__).parents[2]
+    tool = runpy.run_path(str(root / "tools" / "export_table.py"))
+    assert (root / "docs" / "export.md").read_text() == tool["page"](), "run: python tools/export_table.py"
+    assert all(f"| {name} |" in tool["table"]() for name in CATALOGUE)
