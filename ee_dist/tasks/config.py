@@ -162,6 +162,7 @@ class Config:
     log: str | None = None
     urdf: str | None = None
     mjcf: str | None = None
+    to: str | None = None
     robot: RobotConfig = field(default_factory=RobotConfig)
     engine: EngineConfig = field(default_factory=EngineConfig)
     evaluator: EvaluatorConfig = field(default_factory=EvaluatorConfig)
