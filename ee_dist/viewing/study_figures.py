@@ -17,7 +17,7 @@ STAGES = {"intact": "#8a94a6", "after the change": "#e08a1e", "last trial": "#3b
 """What the bars of a case are, and their colours."""
 METRICS = {"rolling_mean": "diagnosed by rolling means", "distance": "diagnosed by distance"}
 LINES = ("#3b7dd8", "#e08a1e", "#7a5bd0", "#2f9e6e")
-LABEL = 16
+LABEL = 13
 """Characters of a line of a case's name below its bars."""
 ROOM = 0.12
 """Free share of the axis beyond the farthest bar with its spread."""
@@ -90,7 +90,7 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
     _styled(figure, f"How far the robot went forward, {METRICS.get(metric, metric)}", "distance (m)")
     figure.update_layout(barmode="overlay")
     labels = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}") for c in cases]
-    figure.update_xaxes(tickmode="array", tickvals=list(range(len(cases))), ticktext=labels)
+    figure.update_xaxes(tickmode="array", tickvals=list(range(len(cases))), ticktext=labels, tickangle=0, tickfont_size=10)
     figure.update_yaxes(range=[low - (room if low < 0 else 0.0), high + room])
     return figure
 
@@ -106,7 +106,7 @@ def dominants(summaries: Sequence[dict[str, Any]]) -> go.Figure:
         line = {"color": LINES[k % len(LINES)]}
         figure.add_scatter(x=list(range(shortest)), y=[float(v) for v in mean], name=name, mode="lines", line=line)
     _styled(figure, "Dominants: new best hypotheses found so far in a diagnosis pass", "new bests so far")
-    figure.update_xaxes(title="generation", rangemode="tozero")
+    figure.update_xaxes(title="generation", rangemode="tozero", tickformat="d")
     figure.update_yaxes(rangemode="tozero")
     return figure
 
@@ -118,7 +118,7 @@ def _styled(figure: go.Figure, title: str, y_title: str) -> None:
         title={"text": title, "x": 0.0, "xref": "paper", "font": {"size": 17}},
         font={"family": "system-ui, sans-serif", "size": 13},
         legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0},
-        margin={"l": 60, "r": 20, "t": 90, "b": 90},
+        margin={"l": 60, "r": 20, "t": 90, "b": 110},
         height=470,
         showlegend=True,
     )
