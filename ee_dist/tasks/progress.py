@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 
 from rich.console import Console
@@ -12,6 +13,17 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from ee_dist.recording.records import HARDWARE, REPAIR, GenerationRecord, HypothesisRecord, TrialRecord
 from ee_dist.recovery.observer import Observer
 from ee_dist.viewing.story import told
+
+
+@contextmanager
+def starting(console: Console, what: str) -> Iterator[None]:
+    """Say what happens before there is anything to count: live on a terminal, elsewhere as a line."""
+    if console.is_terminal:
+        with console.status(what):
+            yield
+    else:
+        console.print(f"     0 s  {what}", style="dim", highlight=False)
+        yield
 
 
 class PassProgress(Observer):
@@ -41,7 +53,7 @@ class PassProgress(Observer):
             disable=not self.live,
         )
         self.run_bar = self.bars.add_task("whole run (%)", total=100, best="")
-        self.pass_bar = self.bars.add_task("starting", total=1, best="")
+        self.pass_bar = self.bars.add_task("first generation: compiling, loading", total=1, best="")
         self.phase, self.index, self.generations = "", 0, 1
         self.evolved = float("nan")
 
@@ -58,6 +70,9 @@ class PassProgress(Observer):
         self.phase, self.index, self.generations = phase, pass_index, generations + 1
         name = f"{phase} {pass_index + 1} of {self.passes[phase]}"
         self.bars.reset(self.pass_bar, total=self.generations, description=name, best="")
+        if not self.live and not self.done:
+            seconds = time.monotonic() - self.started
+            self.console.print(f"{seconds:6.0f} s  {name}, {generations} generations", style="dim", highlight=False)
 
     def generation(self, record: GenerationRecord) -> None:
         self.done += self.weights[self.phase] / self.generations

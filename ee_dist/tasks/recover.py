@@ -24,7 +24,7 @@ from ee_dist.tasks.compose import config_folder
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.observers import Beliefs, Recorder
 from ee_dist.tasks.outcome import Score, score
-from ee_dist.tasks.progress import PassProgress
+from ee_dist.tasks.progress import PassProgress, starting
 from ee_dist.tasks.run_digest import ResultDigest
 from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.summary import (
@@ -38,6 +38,7 @@ from ee_dist.tasks.summary import (
 from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
 from ee_dist.viewing.story import told
 
+WORKERS = {"ray": "starting Ray and its workers, about five seconds", "serial": "starting the engine"}
 QUICK = (
     "Budget quick shows that every part works. Its gaits hardly evolve: shares of intact, and so this verdict, "
     "say little. Without budget=quick it is the paper's."
@@ -86,7 +87,8 @@ def run(config: Config, options: Options, out: Path) -> None:
         REPAIR: plan.repair.population * plan.repair.generations * float(plan.steps) / 2,
         DIAGNOSIS: plan.diagnosis.population * plan.diagnosis.generations * share / 4,
     }
-    evaluator = evaluator_of(config)
+    with starting(console, WORKERS[config.evaluator.name]):
+        evaluator = evaluator_of(config)
     with (
         RunWriter(path, robot, metadata, {"config.yaml": config_yaml(config, options).encode()}) as writer,
         PassProgress(console, passes, weights) as progress,
@@ -143,7 +145,7 @@ def _load(*modules: str) -> None:
 
 
 def _print(console: Console, result: Recovery, truth: Hypothesis, final: Score) -> None:
-    table = Table(box=SIMPLE, pad_edge=False)
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("trial")
     table.add_column("distance\n(m)", justify="right")
     table.add_column("of\nintact", justify="right")
