@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ WINDOW_S = 0.06
 ENABLED = frozenset(["enable", "enabled", "active", "released", "powered", "on"])
 SUPPLY = frozenset(["supply", "volt", "volts", "voltage", "vin", "vbat", "battery", "bus"])
 ROUGHER = 1.15
+CLEARLY, WELL = 0.3, 0.3
+"""Another order of the joints is asked for if it leaves less than this share of what the robot's leaves, and of all."""
 TIED = 1.0
 """Scores closer than this are no decision."""
 
@@ -328,13 +331,15 @@ class _Proposer:
 
     # -- torques -----------------------------------------------------------------------------------------------------
 
-    def _needed(self) -> tuple[Array, Array] | None:
-        """Torques (T, J) that the motion needs by the model without friction, and its speeds; None where it cannot say."""
+    def _needed(self, places: list[int] | None = None) -> tuple[Array, Array] | None:
+        """Torques (T, J) that the motion needs by the model without friction, and its speeds; None where it cannot say.
+        ``places``: the column that each joint has instead of its own."""
         if not self.units.entries or self.robot.free_base:
             return None
         assert self.position is not None
         step = self._step(self.position.block)
         q = signals.smooth(self._metric(), max(3, round(WINDOW_S / step)))
+        q = q if places is None else q[:, places]
         v = signals.change(q, step, WINDOW_S)
         try:
             found = joint_torques(self.robot, q, v, signals.change(v, step, WINDOW_S))
@@ -342,15 +347,17 @@ class _Proposer:
             return None
         return (found, v) if np.isfinite(found).all() else None
 
-    def _beside_need(self, block: Block) -> list[signals.Relation] | None:
+    def _beside_need(self, block: Block, places: list[int] | None = None) -> list[signals.Relation] | None:
         """How a block goes with what the motion needs, joint by joint, friction left aside; None where that is not known."""
-        if self.needed is None:
+        needed = self.needed if places is None else self._needed(places)
+        if needed is None:
             return None
         assert self.position is not None
         values = self._on(self.position.block, block)
         if values is None:
             return None
-        need, speed = self.needed
+        need, speed = needed
+        values = values if places is None else values[:, places]
         width = max(3, round(WINDOW_S / self._step(self.position.block)))
         for _ in range(3):
             values = signals.smooth(values, width)
@@ -360,6 +367,25 @@ class _Proposer:
             friction = np.stack([v, np.tanh(v / (0.05 * np.abs(v).max() + 1e-12))], axis=1)
             found.append(signals.beside(values[:, k], need[:, k], friction))
         return found
+
+    def _check_order(self, block: Block) -> None:
+        """Asks for the order of the joints where torques go with the motion in another order than the robot's."""
+        count = len(self.joints)
+        if block.how not in (BY_NUMBER, BY_PLACE) or self.hints.joints is not None or count < 2:
+            return
+        own = list(range(count))
+        orders = [list(p) for p in permutations(own)] if count <= 3 else [own, own[::-1]]
+        left = []
+        for places in orders:
+            relations = self._beside_need(block, places)
+            left.append(sum(1 - r.correlation**2 for r in relations) / count if relations else 1.0)
+        best = int(np.argmin(left))
+        if left[best] < min(CLEARLY * left[0], WELL):
+            names = [self.joints[orders[best].index(k)].name for k in own]
+            self.out.ask(
+                f"joints: {block.name} leave {100 * left[best]:.0f} % of what the motion needs unexplained as those of "
+                f"{', '.join(names)}, {100 * left[0]:.0f} % in the robot's order; say task.joints=[...] as the columns are"
+            )
 
     def _torques(self) -> None:
         sensed = self._sensor_names("torque")
@@ -396,6 +422,7 @@ class _Proposer:
             return
         chosen.block.used = True
         units = self._torque_units(chosen.block)
+        self._check_order(chosen.block)
         level = LIKELY if chosen.block.how == BY_PLACE and chosen.block.reading.kind is None else SURE
         if any(sensed):
             self._add("sensors", sensed, chosen.block, units, chosen.why, level)
@@ -465,9 +492,14 @@ class _Proposer:
                 # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
                 r = relations[k]
                 size = abs(r.slope) * UNITS[entry["unit"]][1] * abs(float(entry.get("scale", 1.0)))
-                if r.correlation < -0.7 and 0.5 < size < 2:
+                if r.correlation < -0.9 and 0.5 < size < 2:
                     entry["sign"] = -1
                     turned.append(self.joints[k].name)
+                elif r.correlation < -0.7 and 0.5 < size < 2:
+                    self.out.ask(
+                        f"torques: {block.columns[k]} seems to run against what the motion of {self.joints[k].name} needs "
+                        f"(correlation {r.correlation:.2f}); if it does, add 'sign: -1' to it in the mapping"
+                    )
                 else:
                     unclear.append(self.joints[k].name)
             entries.append(entry)
@@ -534,12 +566,17 @@ class _Proposer:
         step, fit = self._step(self.position.block), abs(ahead.correlation)
         score = (3.0 if r.command else 0.0) + (r.kind == POSITION and not r.weak) - r.second
         score += 2 if fit > 0.9 else 1 if fit > 0.7 else -3 if fit < 0.5 else 0
-        score += 1 if ahead.lead_s > 0 else -3 if ahead.lead_s < -1.5 * step and fit > 0.7 else 0
+        late = ahead.lead_s < -1.5 * step and fit > 0.7
+        score += 1 if ahead.lead_s > 0 else 0
         if ahead.lead_s >= 0:
             why = f"the positions follow it by {1e3 * ahead.lead_s:.0f} ms (correlation {ahead.correlation:.3f})"
         else:
             why = f"it follows the positions by {-1e3 * ahead.lead_s:.0f} ms, as no command should"
-        return Scored(b, score, ["called a command", why] if r.command else [why])
+        if late and r.command:
+            self.out.ask(
+                f"commands ({b.name}): {why}; are they swapped with {self.position.block.name}? write the right columns"
+            )
+        return Scored(b, score - 3 * late, ["called a command", why] if r.command else [why])
 
     def _position_command_units(self, b: Block) -> UnitChoice:
         """As the positions, unless its name or its ratio to them says otherwise."""
