@@ -85,7 +85,8 @@ def check_grid(found: Clocked, step_s: float, rate_stated: bool, unit: str) -> N
     if length < step_s or (rows < KEPT * len(table) and median < FASTEST_S and not rate_stated):
         raise MeasurementError(
             f"{table}: the times of {len(table)} rows cover {length:.4g} s, {1e6 * median:.4g} us a row, so that steps of "
-            f"{step_s:g} s would keep {int(rows) + 1}; if the times are not in {unit!r}{_cure(median, unit)}; if they are, set rate_hz"
+            f"{step_s:g} s would keep {int(rows) + 1}; if the times are not in {unit!r}{_cure(median, unit)}; "
+            "if they are, set rate_hz"
         )
     if median >= SLOW_S:
         raise MeasurementError(
