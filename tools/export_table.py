@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ee_dist.discrepancy.candidates import candidate
+
 from ee_dist.effects import CATALOGUE
 from ee_dist.export.plan import fates
 from ee_dist.robots.model import Robot

@@ -187,6 +187,7 @@ class Handling:
     """How the folder of a run is treated. Decides nothing of the result, so it is not part of the recorded settings."""
 
     overwrite: bool = False
+    resume: str | None = None
 
 
 def unknown_key(owner: str, key: str, known: tuple[str, ...], otherwise: str = "") -> ConfigError:

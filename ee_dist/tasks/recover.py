@@ -35,6 +35,7 @@ from ee_dist.tasks.summary import (
     package_version,
     write_summary,
 )
+from ee_dist.tasks.unfinished import remembered
 from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
 from ee_dist.viewing.story import told
 
@@ -65,6 +66,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     search_seed, intact_seed, changed_seed = seeds.spawn(3)
     intact = PhysicalRobot(hardware, robot, (), intact_seed, config.noise)
     changed = PhysicalRobot(hardware, robot, hidden, changed_seed, config.noise)
+    first, later = remembered("intact", intact, robot), remembered("changed", changed, robot)
     metadata = {
         "task": "recover",
         "version": package_version(),
@@ -96,7 +98,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         # Slow to load, and needed only later: done while the first controllers run.
         Thread(target=_load, args=("scipy.stats", "ee_dist.viewing.rerun_scene"), daemon=True).start()
         observer = Observers(Recorder(writer), digest, beliefs, progress)
-        result = recover(robot, intact, changed, metric, plan, evaluator, search_seed, observer)
+        result = recover(robot, first, later, metric, plan, evaluator, search_seed, observer)
         truth = changed.reveal()
         writer.finish({"result_digest": digest.hex, "truth": json.dumps([t.as_dict() for t in truth])})
     counts = evaluator.counts

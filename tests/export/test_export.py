@@ -11,8 +11,8 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-
 from ee_dist.discrepancy.candidates import candidate
+
 from ee_dist.effects import CATALOGUE, Term, apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drive import DrivePath

@@ -12,7 +12,6 @@ from ee_dist.effects.model_file import read_model
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import read_mapping
 from ee_dist.measurements.sampling import grid
-from ee_dist.measurements.readers import read
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.quadruped import quadruped
