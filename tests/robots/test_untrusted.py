@@ -65,7 +65,7 @@ def test_devices_pipes_and_folders_are_no_files(tmp_path):
             read_model(tmp_path / name)
         assert name in one_line(caught.value)
         with pytest.raises(MeasurementError):
-            read_table(tmp_path / name, "csv")
+            read(tmp_path / name)
 
 
 def test_a_urdf_declares_no_entities(tmp_path):
@@ -111,7 +111,7 @@ def test_a_table_of_more_than_anybody_measured_is_refused(tmp_path: Path, monkey
 
     path = tmp_path / "t.parquet"
     pd.DataFrame({"a": range(100)}).to_parquet(path)
-    assert len(read_table(path)) == 100
-    monkeypatch.setattr("ee_dist.measurements.tables.MOST_CELLS", 50)
-    with pytest.raises(MeasurementError, match="100 rows of 1 columns; at most 50 values"):
-        read_table(path)
+    assert len(read(path)) == 1
+    monkeypatch.setattr("ee_dist.measurements.readers.options.MOST_BYTES", 50)
+    with pytest.raises(MeasurementError, match="cut it into parts"):
+        read(path)
