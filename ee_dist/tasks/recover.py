@@ -17,7 +17,7 @@ from rich.table import Table
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recording.reader import read_run
-from ee_dist.recording.records import DIAGNOSIS, REPAIR
+from ee_dist.recording.records import DIAGNOSIS, POLISHED, REPAIR
 from ee_dist.recording.writer import RunWriter
 from ee_dist.recovery.loop import Recovery, recover
 from ee_dist.recovery.observer import Observers
@@ -38,6 +38,8 @@ from ee_dist.tasks.summary import (
 from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
 from ee_dist.viewing.story import told
 
+NEIGHBOURS = 300
+"""Roughly how many neighbours a step of polish tries."""
 WORKERS = {"ray": "starting Ray and its workers, about five seconds", "serial": "starting the engine"}
 QUICK = (
     "Budget quick shows that every part works. Its gaits hardly evolve: shares of intact, and so this verdict, "
@@ -86,6 +88,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     weights = {
         REPAIR: plan.repair.population * plan.repair.generations * float(plan.steps) / 2,
         DIAGNOSIS: plan.diagnosis.population * plan.diagnosis.generations * share / 4,
+        POLISHED: plan.polish * NEIGHBOURS * share / 2,
     }
     with starting(console, WORKERS[config.evaluator.name]):
         evaluator = evaluator_of(config)

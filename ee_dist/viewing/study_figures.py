@@ -90,7 +90,9 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
     _styled(figure, f"How far the robot went forward, {METRICS.get(metric, metric)}", "distance (m)")
     figure.update_layout(barmode="overlay")
     labels = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}") for c in cases]
-    figure.update_xaxes(tickmode="array", tickvals=list(range(len(cases))), ticktext=labels, tickangle=0, tickfont_size=10)
+    figure.update_xaxes(
+        tickmode="array", tickvals=list(range(len(cases))), ticktext=labels, tickangle=0, tickfont_size=10
+    )
     figure.update_yaxes(range=[low - (room if low < 0 else 0.0), high + room])
     return figure
 
