@@ -6,9 +6,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from ee_dist.discrepancy.candidates import candidate
-
-from ee_dist.effects import CATALOGUE
+from ee_dist.effects import CATALOGUE, term
 from ee_dist.export.plan import fates
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped_lab import quadruped_lab
@@ -25,9 +23,10 @@ def table() -> str:
     lines = ["| effect | MJCF | URDF | Python alone |", "|---|---|---|---|"]
     for name, effect in CATALOGUE.items():
         robot: Robot = free if effect.targets(free) else bolted
-        chosen = candidate(robot, effect, effect.targets(robot)[0])
-        term = chosen.term([0.3 * (high or low) for low, high in zip(chosen.lower, chosen.upper, strict=True)])
-        found = [fates(robot, (term,), to)[0] for to in FORMATS]
+        target, values = effect.targets(robot)[0], effect.neutral_values()
+        for key, (low, high) in effect.bounds(robot, target).items():
+            values[key] += 0.3 * ((high if high > values[key] else low) - values[key])
+        found = [fates(robot, (term(name, target, **values),), to)[0] for to in FORMATS]
         lines.append(f"| {name} | " + " | ".join(f.how for f in found) + " |")
     return "\n".join(lines) + "\n"
 

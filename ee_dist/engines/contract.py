@@ -75,8 +75,7 @@ class Bodies(Protocol):
     def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
         """Advance by one time step under joint torques (B, M) and a force (B, 3) on the root part, floor frame.
 
-        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step. Raises EngineError where an
-        engine cannot do that.
+        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step, in an engine that can do that.
         """
 
     def close(self) -> None:

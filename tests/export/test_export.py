@@ -11,9 +11,8 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from ee_dist.discrepancy.candidates import candidate
 
-from ee_dist.effects import CATALOGUE, Term, apply
+from ee_dist.effects import CATALOGUE, Term, apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drive import DrivePath
 from ee_dist.engines.drivers import Commands
@@ -44,8 +43,14 @@ SHARE = 0.3
 def example(name: str, robot: Robot | None = None) -> Term:
     """The effect at its last target, a third of the way to the end of its range."""
     robot = robot or ROBOTS[name]
-    chosen = candidate(robot, name, CATALOGUE[name].targets(robot)[-1])
-    return chosen.term(SHARE * np.where(chosen.upper > 0, chosen.upper, chosen.lower))
+    effect = CATALOGUE[name]
+    target = effect.targets(robot)[-1]
+    far = {
+        n: high if high > effect.parameter(n).neutral else low
+        for n, (low, high) in effect.bounds(robot, target).items()
+    }
+    values = {p.name: p.neutral + SHARE * (far[p.name] - p.neutral) for p in effect.parameters}
+    return term(name, target, **values)
 
 
 def calm(robot: Robot) -> np.ndarray:
