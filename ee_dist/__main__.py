@@ -63,8 +63,7 @@ def run(composed: DictConfig) -> None:
         leaving.leave(f"{error}; {_what_is_kept(out)}", MISTAKE)
     except USER_ERRORS as error:
         remove_made()
-        how = "" if isinstance(error, ConfigError) else _how_to_go_on(out)
-        sys.exit(_complain(f"{error}{how}"))
+        sys.exit(_complain(str(error) if isinstance(error, ConfigError) else f"{error}{_how_to_go_on(out)}"))
     except OmegaConfBaseException as error:
         remove_made()
         sys.exit(_complain(plain(error)))

@@ -16,6 +16,7 @@ from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError, known_settings, unknown_key
 from ee_dist.trials.excitation import ExcitationError
+from ee_dist.trials.hardware import HardwareError
 from ee_dist.trials.log import LogError
 
 __all__ = ("USER_ERRORS", "RayLostError", "abandon_evaluators", "defect", "hydra_message", "unasked_end")
@@ -27,6 +28,7 @@ USER_ERRORS = (
     EffectError,
     EngineError,
     EvaluatorError,
+    HardwareError,
     LogError,
     RecordingError,
     RobotError,

@@ -124,10 +124,25 @@ class _Remembered:
             if skip is not None:
                 skip()
             return record.log
-        log = self.inner.trial(driver, steps)
+        try:
+            log = self.inner.trial(driver, steps)
+        except BaseException:
+            self._keep_aborted(driver)
+            raise
         with RunWriter(path, self.robot, {"task": "unfinished"}) as writer:
             writer.trial(TrialRecord(self.count - 1, self.name, HARDWARE, driver, log))
         return log
+
+    def _keep_aborted(self, driver: Any) -> None:
+        """What was measured in a trial that did not reach its end, beside the recording of the run: no resume removes it."""
+        log = getattr(self.inner, "aborted", None)
+        if log is None:
+            return
+        stem, number = f"aborted_{self.name}_{self.count - 1:04d}", 1
+        while (path := self.folder.parent / f"{stem}_{number}.mcap").exists():
+            number += 1
+        with RunWriter(path, self.robot, {"task": "aborted"}) as writer:
+            writer.trial(TrialRecord(self.count - 1, f"{self.name}, aborted", HARDWARE, driver, log))
 
 
 _current: Unfinished | None = None

@@ -16,6 +16,8 @@ from ee_dist.evaluation.journal import JournaledEvaluator
 from ee_dist.evaluation.ray_actors import RayEvaluator
 from ee_dist.evaluation.ray_session import stop_ray
 from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.evaluation.socket_body import SocketBody
+from ee_dist.evaluation.stepped import SteppedRobot
 from ee_dist.robots.describe import robot_of
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config
@@ -52,6 +54,14 @@ def engine_maker(config: Config, alone: bool) -> EngineMaker:
 def build_robot(config: Config) -> Robot:
     """The robot by name. Raises RobotError for an unknown one."""
     return robot_of(config.robot.name, config.robot.urdf, config.robot.drives)[0]
+
+
+def hardware_of(config: Config, robot: Robot) -> SteppedRobot | None:
+    """The user's own robot, where ``hardware.address`` names one. Raises HardwareError for an address that is none."""
+    own = config.hardware
+    if not own.address:
+        return None
+    return SteppedRobot(SocketBody(own.address, own.timeout_s, own.begin_s), robot, own.limits())
 
 
 _kept: dict[object, Evaluator] = {}
