@@ -95,8 +95,9 @@ def main() -> int:
             time.sleep(1.0)
             left = processes(folder)
             wrong, over = wrong + (not same), over + bool(left)
-            print(f"{k + 1:3} {victim if hit else 'nothing':10} status {status:4}, "
-                  f"{'the same' if same else 'DIFFERENT'}, left over: {list(left.values()) or 'nothing'}", flush=True)  # fmt: skip
+            what = "the same" if same else "DIFFERENT"
+            remains = ", ".join(left.values()) or "nothing"
+            print(f"{k + 1:3} {victim if hit else 'nothing':10} status {status:4}, {what}, left: {remains}", flush=True)
         print(f"{given.times - wrong} of {given.times} the same, {over} left processes behind")
         return 1 if wrong or over else 0
 
