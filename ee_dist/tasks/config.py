@@ -14,7 +14,9 @@ from ee_dist.recovery.metrics import Distance, Metric, RollingMean
 from ee_dist.trials.hardware import Limits
 
 ENGINES = ("pybullet", "mujoco")
-EVALUATORS = ("ray", "serial")
+EVALUATORS = ("auto", "ray", "serial")
+SMALL_STEPS = 1_000_000
+"""Robot-steps that the repair passes of a run ask for, below which Ray takes longer to start (5 s) than it saves."""
 
 
 class ConfigError(ValueError):
@@ -55,7 +57,7 @@ class EngineConfig:
 
 @dataclass
 class EvaluatorConfig:
-    name: str = "ray"
+    name: str = "auto"
     workers: int = 0
     chunk: int = 0
     cache: bool = True
@@ -143,6 +145,11 @@ class BudgetConfig:
         for name, most in _MOST.items():
             within(f"budget.{name}", getattr(self, name), 0, most)
         self.plan()
+
+    @property
+    def small(self) -> bool:
+        """Whether starting Ray takes longer than it saves."""
+        return self.population * self.generations * self.steps * (self.compensating_trials + 1) < SMALL_STEPS
 
     def plan(self) -> Plan:
         shared = (self.tournament, self.mutation, self.crossovers)

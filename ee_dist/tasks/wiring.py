@@ -74,8 +74,11 @@ def evaluator_of(config: Config) -> Evaluator:
     simulated already. A sweep over scenarios evolves the intact robot's controllers once.
     """
     settings = config.evaluator
+    name = settings.name
+    if name == "auto":
+        name = "serial" if config.budget.small and not settings.workers and not config.ray.address else "ray"
     key = (
-        settings.name,
+        name,
         settings.workers,
         settings.chunk,
         settings.cache,
@@ -85,7 +88,7 @@ def evaluator_of(config: Config) -> Evaluator:
     if key not in _kept:
         close_evaluators()
         inner: Evaluator
-        if settings.name == "serial":
+        if name == "serial":
             inner = SerialEvaluator(engine_maker(config, alone=True)(), settings.chunk or 256)
         else:
             inner = RayEvaluator(
