@@ -2,64 +2,175 @@
 
 from __future__ import annotations
 
+from ee_dist import leaving
+
+if __name__ == "__main__":
+    leaving.arm(unwinds=False)  # what is imported below takes a second or two, and Ctrl-C may come in it
+
+import multiprocessing
 import os
-import shutil
 import sys
 from pathlib import Path
+from typing import Any, NoReturn
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.compose import config_folder, plain, quoted, settings
-from ee_dist.tasks.errors import USER_ERRORS, hydra_message
+from ee_dist.tasks.compose import check_flags, config_folder, handling, plain, quoted, settings
+from ee_dist.tasks.config import ConfigError
+from ee_dist.tasks.errors import USER_ERRORS, RayLostError, abandon_evaluators, defect, hydra_message, unasked_end
+from ee_dist.tasks.folder import (
+    NO_NAME,
+    SETTINGS,
+    Refused,
+    claimed,
+    free_name,
+    held,
+    kept,
+    remove_made,
+    settings_of,
+    shown,
+)
+from ee_dist.tasks.help import answer
+from ee_dist.tasks.unfinished import can_go_on, finished, unfinished
 
-MISTAKE = 2
+MISTAKE, DEFECT = 2, 1
+STOPPED = 130
 
 
 def run(composed: DictConfig) -> None:
     """One job. A user's mistake ends it here: Hydra would add lines of its own."""
-    out = Path(HydraConfig.get().runtime.output_dir)
+    hydra_settings: Any = HydraConfig.get()
+    out = Path(hydra_settings.runtime.output_dir)
     try:
+        out = _folder(hydra_settings)
         config, module, options = settings(composed)
-        module.run(config, options, out)
+        how = handling(composed)
+        if how.resume is not None and resumed(out, config, options, how.overwrite):
+            return
+        free = how.overwrite or how.resume is not None
+        with (
+            claimed(out, settings_of(composed, hydra_settings), free),
+            unfinished(out, config, options, how.resume is not None),
+        ):
+            module.run(config, options, out)
+    except RayLostError as error:
+        remove_made()
+        abandon_evaluators()
+        leaving.leave(f"{error}; {_what_is_kept(out)}", MISTAKE)
     except USER_ERRORS as error:
-        _tidy(out)
-        sys.exit(_complain(str(error)))
+        remove_made()
+        how = "" if isinstance(error, ConfigError) else _how_to_go_on(out)
+        sys.exit(_complain(f"{error}{how}"))
+    except OmegaConfBaseException as error:
+        remove_made()
+        sys.exit(_complain(plain(error)))
+    except OSError as error:
+        remove_made()
+        sys.exit(_complain(_unwritten(error) + _how_to_go_on(out)))
+    except (SystemExit, MemoryError) as error:
+        remove_made()
+        sys.exit(_complain(unasked_end(error)))
+    except Exception as error:
+        sys.exit(_complain(defect(error, out), DEFECT))
+    except KeyboardInterrupt as stop:
+        remove_made()
+        if multiprocessing.parent_process() is not None:
+            os._exit(getattr(stop, "status", STOPPED))  # one job of several side by side: the sweep says the line
+        _leave(stop, out)
 
 
-def _tidy(out: Path) -> None:
-    """Remove a job's folder if nothing but the settings got into it."""
-    if out.is_dir() and {p.name for p in out.iterdir()} <= {"config"}:
-        shutil.rmtree(out)
+def _what_is_kept(out: Path) -> str:
+    return kept(out) + _how_to_go_on(out)
+
+
+def _how_to_go_on(out: Path) -> str:
+    return f"; go on with the same command and resume={shown(_whole(out))}" if can_go_on(out) else ""
+
+
+def _whole(out: Path) -> Path:
+    """What is to be resumed: the run, or the sweep that it is a job of."""
+    settings: Any = HydraConfig.get() if HydraConfig.initialized() else None
+    return Path(settings.sweep.dir) if settings is not None and settings.mode == RunMode.MULTIRUN else out
+
+
+def _leave(stop: KeyboardInterrupt, out: Path | None = None) -> NoReturn:
+    """One line, and the end: 130 after Ctrl-C, 143 where a run was asked to end."""
+    abandon_evaluators()
+    text = _what_is_kept(out) if out else "nothing was begun"
+    leaving.leave(f"stopped ({getattr(stop, 'why', 'Ctrl-C')}); {text}", getattr(stop, "status", STOPPED))
+
+
+def resumed(out: Path, config: Any, options: Any, overwrite: bool) -> bool:
+    """Whether there is nothing to do, since the run there is finished. Raises ConfigError where no run of ours was begun."""
+    if finished(out, config, options):
+        print(f"{shown(out)}: finished already", flush=True)
+        return True
+    inside = set(held(out)) - {SETTINGS}
+    if "summary.json" in inside and not can_go_on(out) and not overwrite:
+        raise ConfigError(f"resume={shown(out)}: the run there is finished, and had other settings")
+    if HydraConfig.get().mode != RunMode.MULTIRUN and not (out / SETTINGS).is_dir():
+        raise ConfigError(f"resume={shown(out)}: no run was begun there; name the folder of a run that was stopped")
+    if inside and not can_go_on(out) and not overwrite:
+        raise ConfigError(f"resume={shown(out)}: holds nothing to go on from; overwrite=true starts the run there anew")
+    return False
+
+
+def _folder(hydra_settings: Any) -> Path:
+    """Where this job writes. Raises ConfigError for a folder without a name."""
+    out = Path(hydra_settings.runtime.output_dir)
+    if hydra_settings.mode == RunMode.MULTIRUN:
+        return out
+    if not str(hydra_settings.run.dir).strip():
+        raise ConfigError(NO_NAME.format(key="hydra.run.dir"))
+    named = any(str(o).lstrip("+").startswith("hydra.run.dir=") for o in hydra_settings.overrides.hydra)
+    return out if named else free_name(out)
+
+
+def _unwritten(error: OSError) -> str:
+    where = error.filename or "the output folder"
+    return f"{where}: {error.strerror or error}; choose a folder with hydra.run.dir=FOLDER"
 
 
 def main() -> int:
     # Hydra's own report of an error is several lines and a hint for programmers; ours is one.
     os.environ["HYDRA_FULL_ERROR"] = "1"
+    # Rerun's own log would add lines to a complaint that is made in one.
+    os.environ.setdefault("RUST_LOG", "off")
+    leaving.arm()
     sys.argv[1:] = quoted(sys.argv[1:])
     try:
+        told = answer(sys.argv[1:])
+        if told is not None:
+            print(told)
+            return 0
+        check_flags(sys.argv[1:])
         folder = config_folder()
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()
-    except USER_ERRORS as error:
+    except (*USER_ERRORS, Refused) as error:
         return _complain(str(error))
     except HydraException as error:
         return _complain(hydra_message(error))
     except OmegaConfBaseException as error:
         return _complain(plain(error))
+    except RecursionError:
+        return _complain("the settings are nested too deep")
     except OSError as error:
-        where = error.filename or "the output folder"
-        return _complain(f"{where}: {error.strerror or error}; choose a folder with hydra.run.dir=FOLDER")
-    except KeyboardInterrupt:
-        return _complain("stopped; what was recorded so far is kept")
+        return _complain(_unwritten(error))
+    except KeyboardInterrupt as stop:
+        _leave(stop)
+    finally:
+        leaving.disarm()
     return 0
 
 
-def _complain(text: str) -> int:
-    print(f"ee_dist: {' '.join(text.split())}", file=sys.stderr)
-    return MISTAKE
+def _complain(text: str, status: int = MISTAKE) -> int:
+    print(leaving.line(text), file=sys.stderr)
+    return status
 
 
 if __name__ == "__main__":

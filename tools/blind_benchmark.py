@@ -5,6 +5,7 @@
 Every tenth robot is untouched (``--untouched``). An effect whose whole mark on the logs is below the noise is said to be
 too small and is left out of the scores. ``--withhold`` takes the drawn effect out of the catalogue: right is then
 ``unexplained``, or an effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``.
+``--robot`` and ``--by`` take another robot and another way of comparing.
 ``--cross-engine`` tries the robot in the other engine, after calibrating the model on an untouched robot there.
 ``--workers`` runs cases side by side; a case is the same whoever runs it.
 """
@@ -19,7 +20,7 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
@@ -30,23 +31,35 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 
-from ee_dist.discrepancy.candidates import Candidate, candidates, shared
 from ee_dist.discrepancy.draw import draw
-from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain, gained_untouched
+from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
-from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
-from ee_dist.discrepancy.open_loop import OpenLoop
-from ee_dist.discrepancy.unmodelled import Unmodelled, unmodelled_by
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import Candidate, candidates
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.ways.open_loop.unmodelled import from_entries
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.contract import Engine, EngineError
-from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.physical import PhysicalRobot
-from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot
-from ee_dist.robots.quadruped_lab import quadruped_lab
-from ee_dist.trials.excitation import STANDARD
+from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
+from ee_dist.tasks.improve import calibrated
+from ee_dist.tasks.measurements import Measurements
+from ee_dist.tasks.trial import one_trial
+from ee_dist.tasks.ways import AUTO, WAYS, problem_of
+from ee_dist.tasks.wiring import close_evaluators, engine_maker
+from ee_dist.trials.excitation import STANDARD, Excitation
 from ee_dist.trials.noise import with_noise
 
+FIXED_BASE = (
+    Excitation("multisine", 4.2, 0.2, 1),
+    Excitation("steps", 3.6, 0.15, 2),
+    Excitation("slow_sines", 4.2, 0.2, 3),
+    Excitation("fast_sines", 1.8, 0.05, 4),
+)
+"""Trials of a robot that is bolted to the world, well inside its range."""
 DETECTABLE = 30.0
 """Energy (sum of squares in standard deviations) of an effect's mark below which no search over 400 candidates can tell
 it from luck: about 2 ln(435) + 3 standard deviations."""
@@ -74,58 +87,53 @@ class Case:
     seconds: float = 0.0
 
 
-def engine_of(name: str) -> Engine:
-    if name == "mujoco":
-        from ee_dist.engines.mujoco.engine import MuJoCoEngine
-
-        return MuJoCoEngine(1)
-    from ee_dist.engines.pybullet.engine import PyBulletEngine
-
-    return PyBulletEngine()
-
-
-def measured(engine: Engine, robot: Robot, hidden: Hypothesis, seed: Sequence[int]) -> list[MeasuredTrial]:
-    """The standard trials of a robot with a hidden change, on the floor and on the stand."""
+def measured(engine: Engine, robot: Robot, hidden: Hypothesis, seed: Sequence[int]) -> tuple[MeasuredTrial, ...]:
+    """The standard trials of a robot with a hidden change: what the recording of each would hold."""
     out = []
-    for k, excitation in enumerate(STANDARD):
+    for k, excitation in enumerate(STANDARD if robot.free_base else FIXED_BASE):
         held = setup_of(excitation)
         hardware = PhysicalRobot(engine, robot, (*hidden, *held), np.random.SeedSequence([*seed, k]))
-        driver = driver_of(excitation, robot)
-        log = hardware.trial(driver, excitation.steps(robot))
-        out.append(MeasuredTrial(f"{k} {excitation.kind} {excitation.fixture}", log, driver, held))
-    return out
+        _, record = one_trial(hardware, excitation, robot, k)
+        out.append(MeasuredTrial(f"{k} {record.name}", record.log, record.driver, held))
+    return tuple(out)
 
 
 class Bench:
-    """One run of the benchmark."""
+    """One run of the benchmark: the robot in one engine, its model in the same or the other, and the verbs' own code."""
 
     def __init__(self, args: argparse.Namespace) -> None:
         self.args = args
-        self.robot = with_noise(quadruped_lab(), args.noise)
-        self.inner = engine_of(args.engine)
-        other = {"mujoco": "pybullet", "pybullet": "mujoco"}[args.engine]
-        self.outer = engine_of(other) if args.cross_engine else self.inner
-        self.pool = candidates(self.robot)
-        self.before: Hypothesis = ()
-        self.unmodelled: Unmodelled | None = None
-        self.gained = 0.0
+        robot, _ = load_robot(args.robot)
+        self.robot = with_noise(robot, args.noise)
+        self.config = Config(engine=EngineConfig(args.engine, 1), evaluator=EvaluatorConfig("serial"))
+        other = {"mujoco": "pybullet", "pybullet": "mujoco"}[args.engine] if args.cross_engine else args.engine
+        self.engine = engine_maker(Config(engine=EngineConfig(other, 1)), alone=True)()
+        # What the model has and is known to leave; no trials yet.
+        self.known = Measurements(self.robot, (), (), (), self.robot.name, Path())
 
-    def problem(self, trials: list[MeasuredTrial]) -> OpenLoop:
-        evaluator = CachedEvaluator(SerialEvaluator(self.inner))
-        return OpenLoop(
-            trials, self.robot, evaluator, before=self.before, unmodelled=self.unmodelled, gained=self.gained
-        )
+    @property
+    def before(self) -> Hypothesis:
+        return self.known.model
+
+    def problem(self, trials: Sequence[MeasuredTrial]) -> Problem:
+        # What was simulated for another case is of no use for this one.
+        close_evaluators()
+        return problem_of(replace(self.known, trials=tuple(trials)), self.config, self.args.by)
 
     def calibrate(self) -> None:
-        """Fit what all joints share to an untouched robot of the other engine, and note what is left by channel."""
-        trials = measured(self.outer, self.robot, (), [self.args.seed, 999_999])
-        problem = self.problem(trials)
-        found = improve(problem, shared(self.pool, self.robot), (), None, most=3)
-        self.before = found.terms
-        self.unmodelled = unmodelled_by(problem, found.residual)
-        self.gained = gained_untouched(explain(self.problem(trials), self.pool, self.before))
+        """As ``task=improve task.calibrate=true`` does it, on an untouched robot of the other engine."""
+        trials = measured(self.engine, self.robot, (), [self.args.seed, 999_999])
+        plain = replace(self.known, trials=trials)
+        found, content = calibrated(plain, self.config, candidates(self.robot))
+        self.known = replace(
+            self.known,
+            model=found.terms,
+            unmodelled=from_entries(content["unmodelled"], self.robot.sensor_names),
+            gained=content["gained"],
+            calibrated_by=content["way"],
+        )
         print(f"calibrated on an untouched robot: {'; '.join(map(str, self.before)) or 'nothing to add'}; an effect "
-              f"takes {self.gained:.0f} off it", flush=True)  # fmt: skip
+              f"takes {self.known.gained:.0f} off it", flush=True)  # fmt: skip
 
     def case(self, index: int) -> Case:
         rng = np.random.default_rng([self.args.seed, index])
@@ -137,7 +145,7 @@ class Bench:
                 drawn.append(chosen)
                 hidden = (*hidden, hidden_term)
         began = time.monotonic()
-        trials = measured(self.outer, self.robot, hidden, [self.args.seed, index])
+        trials = measured(self.engine, self.robot, hidden, [self.args.seed, index])
         problem = self.problem(trials)
         base, true = problem.residuals([self.before, (*self.before, *hidden)])
         mark = float(((base - true) ** 2).sum()) if np.isfinite(true).all() else float("inf")
@@ -157,10 +165,8 @@ class Bench:
         found.seconds = time.monotonic() - began
         return found
 
-    def _one(
-        self, found: Case, problem: OpenLoop, drawn: list[Candidate], hidden: Hypothesis, true: np.ndarray
-    ) -> None:
-        pool = self.pool
+    def _one(self, found: Case, problem: Problem, drawn: list[Candidate], hidden: Hypothesis, true: np.ndarray) -> None:
+        pool = pool_of(problem)
         if self.args.withhold:
             pool = [c for c in pool if c.effect.name != drawn[0].effect.name]
         x = explain(problem, pool, self.before)
@@ -174,11 +180,11 @@ class Bench:
         for judged in x.tied:
             if drawn and judged.name == drawn[0].name and drawn[0].size:
                 at = drawn[0].shares(dict(hidden[0].values))
-                found.value_error = float(abs(judged.u[0] - at[0]))
+                found.value_error = float(abs(judged.own[0] - at[0]))
 
-    def _two(self, found: Case, problem: OpenLoop, names: list[str]) -> None:
-        result = improve(problem, self.pool, self.before, None, most=4)
-        found.named = [f"{t.effect}@{t.target}" if t.target else t.effect for t in result.terms]
+    def _two(self, found: Case, problem: Problem, names: list[str]) -> None:
+        result = improve(problem, pool_of(problem), self.before, None, most=4)
+        found.named = [t.name for t in result.terms]
         errors = [r.error_heldout for r in result.ladder]
         found.within = set(names) <= set(found.named)
         found.first = found.within and len(found.named) == 2
@@ -252,7 +258,7 @@ def run(bench: Bench) -> Iterator[Case | str]:
     if bench.args.workers < 2:
         yield from (attempt(bench, k) for k in range(count))
         return
-    settings = (bench.args, bench.before, bench.unmodelled, bench.gained)
+    settings = (bench.args, bench.known)
     with ProcessPoolExecutor(bench.args.workers, get_context("spawn"), _start, settings) as pool:
         yield from pool.map(_attempt, range(count))
 
@@ -268,9 +274,9 @@ _here: list[Bench] = []
 """The bench of a worker process."""
 
 
-def _start(args: argparse.Namespace, before: Hypothesis, unmodelled: Unmodelled | None, gained: float) -> None:
+def _start(args: argparse.Namespace, known: Measurements) -> None:
     bench = Bench(args)
-    bench.before, bench.unmodelled, bench.gained = before, unmodelled, gained
+    bench.known = known
     _here.append(bench)
 
 
@@ -284,6 +290,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", type=float, default=0.02, help="share of each channel's range")
     parser.add_argument("--untouched", type=int, default=10, metavar="K", help="every K-th robot is untouched (1: all)")
+    parser.add_argument("--robot", default="quadruped_lab", help="by name, or a file that describes it (.yaml, .urdf)")
+    parser.add_argument("--by", choices=(AUTO, *WAYS), default=AUTO, help="the way of comparing")
     parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--json", type=Path)

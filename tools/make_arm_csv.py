@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 import pandas as pd
 
-from ee_dist.discrepancy.candidates import candidate
+from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.catalogue import Hypothesis, apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands

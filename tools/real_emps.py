@@ -7,20 +7,23 @@ from pathlib import Path
 
 from real_tables import Page
 
-from ee_dist.discrepancy.candidates import candidate, candidates
-from ee_dist.discrepancy.closed_loop import closed_loop
-from ee_dist.discrepancy.fit import Fit, Model
-from ee_dist.discrepancy.force_balance import ForceBalance
-from ee_dist.discrepancy.ladder import Rule, climb, cross_fit, fit_everything, folds_of
-from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.evidence.holdout import cross_fit, windows
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.remains import describe, remains
+from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.fit import fit_one
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.discrepancy.ways.free_run.closed_loop import closed_loop
 from ee_dist.effects.catalogue import apply
 from ee_dist.effects.model_file import ModelFile, read_model, write_model
 from ee_dist.engines.one_joint import OneJointEngine
-from ee_dist.measurements.importer import describe as report
 from ee_dist.measurements.importer import import_file
 from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.report import describe as report
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "examples"
 JOINT = "carriage"
@@ -45,48 +48,46 @@ def run(data: Path, out: Path, page: Page) -> None:
     trial = MeasuredTrial(record.name, record.log)
     problem = ForceBalance([trial], model.robot)
     page.text(f"error: {problem.error_definition}", f"one noise unit is {problem.natural(1.0):.2%} of the force")
-    pool = [(c,) for c in candidates(model.robot) if c.effect.family in ("body", "world", "drive") and c.size]
-    rungs = climb(problem, model.terms, pool, Rule())
+    pool = pool_of(problem)
+    found = improve(problem, pool, model.terms)
     page.table(
-        f"The ladder, found by held-out blocks of time ({len(pool)} effects proposed at each step)",
-        ("step", "fitted, %", "held out, %", "gain held out", "t"),
+        f"The ladder, found by held-out windows of time ({len(pool)} effects proposed at each step)",
+        ("step", "fitted, %", "held out, %", "held out is"),
         [
-            (
-                r.added,
-                f"{100 * r.error_fit:.3f}",
-                f"{100 * r.error_heldout:.3f}",
-                "" if not r.tried else f"{r.tried[0].gain:.1%}",
-                "" if not r.tried else f"{r.tried[0].t:.1f}",
-            )
-            for r in rungs[:-1]
+            (r.name, f"{_percent(problem, r.error_fit):.3f}", f"{_percent(problem, r.error_heldout):.3f}", r.held_out)
+            for r in found.ladder
         ],
     )
+    refused = [j for j in (found.last.judged if found.last else []) if not j.earned]
     page.table(
-        f"What did not earn a place on top of {rungs[-2].added}",
-        ("effect", "held out, %", "gain", "why not"),
-        [(v.name, f"{100 * v.error_heldout:.3f}", f"{v.gain:+.1%}", v.why_not) for v in rungs[-1].tried],
+        f"What did not earn a place on top of {found.ladder[-1].name}",
+        ("effect", "held out, %", "gain of the squared error", "why not"),
+        [(j.name, f"{_percent(problem, j.error_heldout):.3f}", f"{j.gain:+.1%}", j.why_not) for j in refused],
     )
-    write_model(
-        out / "model.yaml", model.source, model.folder, rungs[-1].hypothesis, ["found by tools/real_data.py emps"]
-    )
+    page.text(f"verdict: {found.verdict}, {found.explained:.1%} of what is above the noise; {found.stopped}")
+    write_model(out / "model.yaml", model.source, model.folder, found.terms, ["found by tools/real_data.py emps"])
     fits = _published(problem, model, page)
     _parameters(fits, model, page)
     _simulations(fits, model, trial, page)
-    page.text("**What is left**", "", *describe(remains(problem, rungs[-1].hypothesis), "N", "m"))
+    page.text("**What is left**", "", *problem.remarks(found.terms))
     page.text(f"{time.monotonic() - begin:.0f} s")
+
+
+def _percent(problem: ForceBalance, value: float) -> float:
+    return 100 * problem.natural(value)
 
 
 def _published(problem: ForceBalance, model: ModelFile, page: Page) -> dict[str, Fit]:
     """Each published structure fitted to the whole record, as published."""
-    folds, fits, rows = folds_of(problem, 4), {}, []
+    search, fits, rows = Search(problem), {}, []
     base = [candidate(model.robot, t.effect, t.target) for t in model.terms]
     for name, (added, published) in PUBLISHED.items():
         parts = Model((*base, *(candidate(model.robot, e, JOINT) for e in added)))
-        fit = fit_everything(problem, parts, [0.05 * parts.upper, 0.005 * parts.upper])
-        held = cross_fit(problem, [(parts, fit.u)], folds)[0][1]
+        fit = fit_one(search, parts, [0.05 * parts.upper, 0.005 * parts.upper])
+        held = cross_fit(search, [(parts, fit.u)], windows(problem))[0].residual
         fits[name] = fit
-        ours = problem.natural((fit.energy / len(problem.segment_of)) ** 0.5)
-        rows.append((name, f"{100 * ours:.3f}", published, f"{100 * problem.natural(error(held)):.3f}"))
+        ours = _percent(problem, (fit.energy / len(problem.segment_of)) ** 0.5)
+        rows.append((name, f"{ours:.3f}", published, f"{_percent(problem, error(held)):.3f}"))
     page.table("Relative force error, %", ("model", "ours", "published", "held out"), rows)
     return fits
 

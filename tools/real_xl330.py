@@ -10,19 +10,23 @@ from pathlib import Path
 import numpy as np
 from real_tables import Page
 
-from ee_dist.discrepancy.candidates import candidate, candidates
-from ee_dist.discrepancy.fit import Fit, Model
-from ee_dist.discrepancy.free_run import FreeRun
-from ee_dist.discrepancy.global_fit import search_all
-from ee_dist.discrepancy.ladder import Rule, Rung, climb, fit_everything
-from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.examine import STANDARD_EFFORT, Effort
+from ee_dist.discrepancy.improve import Improvement, improve
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.cloud import follow_cloud
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import ModelFile, read_model, write_model
 from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.importer import describe, import_file
+from ee_dist.measurements.importer import import_file
 from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.report import describe
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "examples"
 JOINT = "servo"
@@ -90,21 +94,18 @@ def _held_out(
     page.text(
         f"## kp {hold} held out", "", f"error: {problem.natural_name} over free runs, every recording counting the same"
     )
-    families = {c.name: c for c in candidates(model.robot) if c.effect.family in ("drive", "world", "body") and c.size}
-    proposals = [(c,) for c in families.values()]
-    proposals.append((families[f"load_friction@{JOINT}"], families[f"quadratic_friction@{JOINT}"]))
-    rungs = climb(problem, model.terms, proposals, Rule(judged=2 if quick else 8, steps=1 if quick else 4))
-    _ladder(hold, rungs, problem, held, page)
-    last = rungs[-1]
+    effort = Effort(first=6, second=3, final=2, starts=1) if quick else STANDARD_EFFORT
+    ladder = improve(problem, pool_of(problem), model.terms, effort=effort, most=1 if quick else 4)
+    _ladder(hold, ladder, problem, held, page)
     notes = [f"found by tools/real_data.py xl330 with kp {hold} held out"]
-    write_model(out / f"model_hold_{hold}.yaml", model.source, model.folder, last.hypothesis, notes)
+    write_model(out / f"model_hold_{hold}.yaml", model.source, model.folder, ladder.terms, notes)
     if not quick:
         _further(_structures(problem, held, model, page)[QUADRATIC], problem, held, model, page)
-    seen, unseen = (1e3 * p.mean_absolute(last.hypothesis) for p in (problem, held))
+    seen, unseen = (1e3 * p.mean_absolute(ladder.terms) for p in (problem, held))
     rows = [(n, f"{e:.1f}") for p, es in ((problem, seen), (held, unseen)) for n, e in zip(p.trials, es, strict=True)]
     page.table("Recording by recording, last model, mrad", ("recording", "error"), rows)
-    page.text("model: " + "; ".join(map(str, last.hypothesis)), f"{time.monotonic() - begin:.0f} s")
-    added = ", ".join(r.added for r in rungs[1:-1]) or "none"
+    page.text("model: " + "; ".join(map(str, ladder.terms)), f"{time.monotonic() - begin:.0f} s")
+    added = ", ".join(r.name for r in ladder.ladder if r.added) or "none"
     return f"kp {hold}", added, f"{seen.mean():.1f}", f"{unseen.mean():.1f}"
 
 
@@ -119,38 +120,32 @@ def _mrad(problem: FreeRun, hypothesis: Hypothesis) -> float:
     return float(1e3 * problem.mean_absolute(hypothesis).mean())
 
 
-def _ladder(hold: int, rungs: Sequence[Rung], problem: FreeRun, held: FreeRun, page: Page) -> None:
-    rows = []
-    for r in rungs[:-1]:
-        best = next((v for v in r.tried if v.name == r.added), None)
-        gain = ("", "") if best is None else (f"{best.gain:.0%}", f"{best.t:.1f}")
-        rows.append(
-            (
-                r.added,
-                f"{_mrad(problem, r.hypothesis):.1f}",
-                f"{1e3 * r.error_heldout:.1f}",
-                *gain,
-                f"{_mrad(held, r.hypothesis):.1f}",
-            )
+def _ladder(hold: int, found: Improvement, problem: FreeRun, held: FreeRun, page: Page) -> None:
+    """The steps, each fitted anew on all that may be seen, beside what the data do not tell from them."""
+    rows = [
+        (
+            r.name,
+            f"{_mrad(problem, r.terms):.1f}",
+            f"{1e3 * problem.natural(r.error_heldout):.1f}",
+            r.held_out,
+            f"{_mrad(held, r.terms):.1f}",
+            ", ".join(r.tied_with) or "-",
+            ", ".join(r.dropped) or "-",
         )
-        for v in r.tried:
-            if v.tied:
-                fit = fit_everything(problem, v.model, [v.u]).hypothesis
-                found = (f"{_mrad(problem, fit):.1f}", f"{1e3 * v.error_heldout:.1f}", f"{v.gain:.0%}", f"{v.t:.1f}")
-                rows.append((f"or {v.name}", *found, f"{_mrad(held, fit):.1f}"))
-    page.text("'or': not told from the step above by held-out data", "")
+        for r in found.ladder
+    ]
     page.table(
         f"The ladder, kp {hold} held out, mrad",
-        ("step", "fitted gains", "held out while fitting", "gain there", "t", f"kp {hold}"),
+        ("step", "fitted gains", "held out while fitting", "what that was", f"kp {hold}", "not told from", "dropped"),
         rows,
     )
-    for r in rungs[1:]:
-        what = "what else was proposed with it" if r.added != "stopped" else "what did not earn a place at the end"
-        page.table(
-            f"{r.added}: {what}, mrad held out while fitting",
-            ("effect", "held out", "gain", "t", "why not"),
-            [(v.name, f"{1e3 * v.error_heldout:.1f}", f"{v.gain:+.0%}", f"{v.t:.1f}", v.why_not) for v in r.tried],
-        )
+    refused = [j for j in (found.last.judged if found.last else []) if not j.earned]
+    page.table(
+        "What did not earn a place at the end, mrad held out while fitting",
+        ("effect", "held out", "gain of the error's square", "why not"),
+        [(j.name, f"{1e3 * problem.natural(j.error_heldout):.1f}", f"{j.gain:+.0%}", j.why_not) for j in refused],
+    )
+    page.text(f"verdict: {found.verdict}, {found.explained:.0%} of what is above the noise; {found.stopped}")
 
 
 def _structures(problem: FreeRun, held: FreeRun, model: ModelFile, page: Page) -> list[Fit]:
@@ -160,7 +155,7 @@ def _structures(problem: FreeRun, held: FreeRun, model: ModelFile, page: Page) -
     for added in STRUCTURES.values():
         parts = Model((*base, *(candidate(model.robot, e, JOINT) for e in added)))
         starts.append((parts, np.where(parts.upper > 0, 0.02, 0.0)))
-    fits = search_all(problem, starts, (), _all(problem), generations=45, seeds=(1, 2))
+    fits = follow_cloud(Search(problem), starts, Search(problem).everything, generations=45, seeds=(1, 2))
     rows = [
         (name, f"{_mrad(problem, f.hypothesis):.1f}", f"{_mrad(held, f.hypothesis):.1f}")
         for name, f in zip(STRUCTURES, fits, strict=True)
@@ -176,7 +171,7 @@ def _further(fit: Fit, problem: FreeRun, held: FreeRun, model: ModelFile, page: 
     extra = [candidate(model.robot, n, "supply" if n == "supply_sag" else JOINT) for n in names]
     starts = [(fit.model, fit.u)]
     starts += [(Model((*fit.model.parts, c)), np.concatenate([fit.u, np.where(c.upper > 0, 0.02, 0.0)])) for c in extra]
-    fits = search_all(problem, starts, (), _all(problem), generations=30, seeds=(1,), sigma=0.04)
+    fits = follow_cloud(Search(problem), starts, Search(problem).everything, generations=30, seeds=(1,), sigma=0.04)
     before = [_mrad(p, fits[0].hypothesis) for p in (problem, held)]
     rows = [("(the same refit, nothing added)", f"{before[0]:.1f}", "", f"{before[1]:.1f}", "", "")]
     for f in fits[1:]:
@@ -196,7 +191,3 @@ def _further(fit: Fit, problem: FreeRun, held: FreeRun, model: ModelFile, page: 
         ("effect", "fitted gains", "change", "held-out gain", "change", "its value"),
         rows,
     )
-
-
-def _all(problem: FreeRun) -> np.ndarray:
-    return np.ones(len(problem.segment_of), dtype=bool)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ee_dist.discrepancy.candidates import Candidate, candidate
+from ee_dist.discrepancy.search.candidates import Candidate, candidate
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.robots.model import Robot
 

@@ -1,81 +1,83 @@
-"""improve: add effects to a model, fit all of them together, and stop when none earns its place on held-out data."""
+"""improve: add effects to a model, fit all of them together, drop those that a later one makes useless, and stop when none
+earns its place on held-out data.
+
+Earlier effects are fitted anew with each new one, because they have stood in for what was missing: damping fitted without
+dry friction is twice what it should be.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import pairwise
 
 import numpy as np
 
-from ee_dist.discrepancy.candidates import Candidate, known
-from ee_dist.discrepancy.explain import STANDARD_EFFORT, Effort, Explanation, explain, fit_out
-from ee_dist.discrepancy.fit import WIDTHS, Fit, Model, fit_all
-from ee_dist.discrepancy.folds import bootstrap, halves
-from ee_dist.discrepancy.judge import LEAST_SHARE, LOST_SHARE, Judged, lost, needed
-from ee_dist.discrepancy.misfit import Leftover, leftovers
-from ee_dist.discrepancy.problem import Problem, error
-from ee_dist.discrepancy.scan import scan
-from ee_dist.discrepancy.screen import Progress, Screened, quiet, screen
-from ee_dist.effects.catalogue import Hypothesis, Term
+from ee_dist.discrepancy.evidence.holdout import WINDOWS, Cut, HeldOut, cross_fit, travelling, windows
+from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
+from ee_dist.discrepancy.evidence.judge import LUCK, WORTH, Judged, judge, least_energy
+from ee_dist.discrepancy.evidence.left import Leftover, leftovers
+from ee_dist.discrepancy.examine import NEAR, STANDARD_EFFORT, Current, Effort, Examined, examine
+from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, begin
+from ee_dist.discrepancy.problem import Problem, error, per_segment
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal
+from ee_dist.discrepancy.search.fit import fit_all, fit_one
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.scan import scan
+from ee_dist.discrepancy.search.screen import screen
+from ee_dist.discrepancy.search.search import Progress, Search, quiet
+from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
-AT_BOUND = 0.985
-"""Share of the way to a bound from which a value counts as being at it."""
-NO_MORE = "no effect takes more off held-out data than luck"
-TOO_LITTLE = "what is left is spread: no effect takes a tenth of it off held-out data"
-WORTH = 0.1
-"""Share of the squared error above the noise floor that an effect must take off to be added. Where a model is wrong in ways
-that no effect describes (another simulator, resampled records), some effect always takes a little of it, surely and
-wrongly."""
+MOST = 12
+"""Effects that are added at most unless told otherwise."""
+NO_MORE = "no further effect earns its place: {why}"
+NOTHING_LEFT = "nothing is left above the noise"
+ASKED = "the effects asked for were added"
+REFITTED = "only the model's own values were to be fitted"
+EXPLAINED, BETTER = "explained", "better_not_explained"
 
 
 @dataclass(eq=False)
 class Rung:
-    """A step of the ladder: the model with ``added``. ``held`` is the held-out energy by segment."""
+    """A step of the ladder: the model with ``added`` (and without ``dropped``). ``held`` (segments,) is the held-out energy,
+    ``held_out`` what was held out."""
 
+    name: str
     added: Hypothesis
     terms: Hypothesis
     error_fit: float
     error_heldout: float
     held: Array
+    held_out: str
     interval: tuple[float, float] = (0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class ParameterReport:
-    """A fitted value with its 95 % interval; ``flag`` says what is wrong with it, if anything."""
-
-    term: int
-    name: str
-    value: float
-    low: float
-    high: float
-    flag: str
+    tied_with: list[str] = field(default_factory=list)
+    dropped: tuple[str, ...] = ()
 
 
 @dataclass(eq=False)
 class Improvement:
-    """``terms``: the final model, fitted on all data. ``stopped``: why no further effect was added."""
+    """``terms``: the final model, fitted on all data. ``verdict``: ``explained`` (nothing is left above the noise),
+    ``better_not_explained``, ``unexplained`` (nothing could be added) or ``nothing_missing``; ``explained``: the share of the
+    squared error above the noise that the model takes off held-out data. ``last``: what was tried on top of it."""
 
+    verdict: str
+    explained: float
     ladder: list[Rung]
     terms: Hypothesis
     parameters: list[ParameterReport]
+    base: Array
     residual: Array
     noise_floor: float
     floor_source: str
     left: list[Leftover]
     stopped: str
-    explanations: list[Explanation] = field(default_factory=list)
+    last: Examined | None = None
 
     def ties(self, step: int) -> list[str]:
         """What the measurements do not tell from the effect that step ``step`` (from 1) of ``effect=auto`` added."""
-        if not 1 <= step <= min(len(self.explanations), len(self.ladder) - 1):
-            return []
-        tied = self.explanations[step - 1].tied
-        added = {(t.effect, t.target) for t in self.ladder[step].added}
-        others = [j.name for j in tied if (j.candidate.effect.name, j.candidate.target) not in added]
-        return others if len(others) < len(tied) else []
+        return self.ladder[step].tied_with if 1 <= step < len(self.ladder) else []
 
 
 def improve(
@@ -84,164 +86,166 @@ def improve(
     before: Hypothesis = (),
     wanted: Sequence[Candidate] | None = None,
     effort: Effort = STANDARD_EFFORT,
-    most: int = 6,
+    most: int = MOST,
     progress: Progress = quiet,
 ) -> Improvement:
-    """Add ``wanted``, or (None) whatever of ``pool`` earns its place, to the model ``before``; refit everything."""
-    half = halves(problem)
-    base = problem.residuals([before])[0]
-    if not np.isfinite(base).all():
+    """Add ``wanted`` (an empty list: fit only what the model has), or (None) whatever of ``pool`` earns its place, to the
+    model ``before``; fit everything anew."""
+    as_it_is = problem.residuals([before])[0]
+    if not np.isfinite(as_it_is).all():
         raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
-    parts = [known(problem.robot, t) for t in before]
-    u = np.concatenate([c.shares(dict(t.values)) for c, t in zip(parts, before, strict=True)] or [np.zeros(0)])
-    start = per_model(problem, base)
-    ladder = [Rung((), before, error(base), error(base), start)]
-    floor, _ = problem.noise_floor()
-    explanations: list[Explanation] = []
-    stopped = "the effects asked for were added"
+    search, current = begin(problem, before, progress)
+    ladder = [_start("the model as it was", before, as_it_is, problem)]
+    if current.parts:
+        ladder.append(_refitted(search, current))
+    last: Examined | None = None
+    own = len(current.parts)
     if wanted is not None:
+        stopped = ASKED if wanted else REFITTED
         for c in wanted:
-            model, at = _with_best_start(problem, parts, u, [c], ladder[-1].terms)
-            judged = fit_out(problem, [(model, at)], base, (), half, len(pool), progress)[0]
-            parts, u = [*parts, c], judged.u
-            ladder.append(_rung(problem, judged, 1, ladder[-1]))
+            judged = _asked(search, current, c)
+            current = Current(judged.model.parts, judged.u)
+            ladder.append(_rung(search, judged))
     else:
-        while True:
-            if len(parts) - len(before) >= most:
-                stopped = f"{most} effects were added, which is as many as are allowed"
+        stopped = f"{most} effects were added, which is as many as task.most allows"
+        while sum(bool(r.added) for r in ladder) < most:
+            names = {c.name for c in current.parts}
+            last = examine(search, current, [c for c in pool if c.name not in names], effort)
+            best = last.best
+            if best is None:
+                nearest = last.judged[0].why_not if last.judged else LUCK
+                stopped = NO_MORE.format(why=nearest) if leftovers(problem, last.base) else NOTHING_LEFT
                 break
-            now = ladder[-1].terms
-            found = explain(problem, [c for c in pool if c.name not in {p.name for p in parts}], now, effort, progress)
-            explanations.append(found)
-            options = _options(problem, found, pool)
-            rung, stopped = None, NO_MORE
-            for group in options:
-                model, at = _with_best_start(problem, parts, u, group, now, found)
-                judged = fit_out(problem, [(model, at)], base, (), half, len(pool), progress)[0]
-                step = _rung(problem, judged, len(group), ladder[-1])
-                if not _earns(step, ladder[-1], needed(problem, len(pool), sum(c.size for c in group))):
-                    continue
-                if worth(ladder[-1].error_heldout, step.error_heldout, floor) < WORTH:
-                    stopped = TOO_LITTLE
-                else:
-                    rung = step
-                    parts, u = [*parts, *group], judged.u
-                    break
-            if rung is None:
-                break
+            fit = fit_one(search, best.model, [best.u], None, WIDTHS[2:])
+            current = Current(best.model.parts, fit.u)
+            rung = _rung(search, best, [j.name for j in last.tied[1:]])
+            current, rung.dropped = _pruned(search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool))
             ladder.append(rung)
-    return _finish(problem, parts, u, ladder, base, stopped, explanations, progress)
+    return _finish(search, current, ladder, as_it_is, stopped, last)
 
 
-def worth(before: float, after: float, floor: float) -> float:
-    """Share of the squared error above the noise floor that a step takes off; 1 where nothing was above it."""
-    above = before**2 - floor**2
-    return (before**2 - after**2) / above if above > 0 else 1.0
+def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:
+    e = error(residual)
+    return Rung(name, (), terms, e, e, per_segment(problem, residual), "nothing was fitted")
 
 
-def per_model(problem: Problem, residual: Array) -> Array:
-    return np.bincount(problem.segment_of, weights=residual**2, minlength=len(problem.segments))
+def _cut(problem: Problem) -> Cut:
+    """The strictest way of holding out that there is."""
+    return next(iter(travelling(problem)), windows(problem))
 
 
-def _options(problem: Problem, found: Explanation, pool: Sequence[Candidate]) -> list[list[Candidate]]:
-    """What to try adding: the best candidate that earned its place and those tied with it; where none did but something
-    is left, pairs of effects at the place that promises most (friction by load, linear and quadratic, pays together)."""
-    singles = [[c.candidate] for c in found.candidates if c.earned][:3]
-    if singles or not found.left:
-        return singles
-    hopeful = sorted((s for s in found.screened if s.promise > 0), key=lambda s: -s.promise)
-    if not hopeful:
-        return []
-    place = hopeful[0].candidate.target
-    there = [s.candidate for s in hopeful if s.candidate.target == place and s.candidate.size][:4]
-    return [list(pair) for pair in combinations(there, 2)][:4]
-
-
-def _with_best_start(
-    problem: Problem,
-    parts: Sequence[Candidate],
-    u: Array,
-    group: Sequence[Candidate],
-    now: Hypothesis,
-    found: Explanation | None = None,
-) -> tuple[Model, Array]:
-    """All parts and the new ones, starting where each new one does best alone on top of the model so far."""
-    starts: list[Array] = [np.asarray(u, float)]
-    judged: dict[str, Judged] = {} if found is None else {j.name: j for j in found.candidates}
-    for c in group:
-        if c.name in judged and len(group) == 1:
-            starts.append(judged[c.name].u)
-            continue
-        hopeful: list[Screened] = screen(problem, [c], now)
-        scanned = scan(problem, hopeful, now)
-        share = 1.0 if len(group) == 1 else 0.5
-        starts.append(share * scanned[0].starts[0] if scanned else np.zeros(c.size))
-    return Model((*parts, *group)), np.concatenate(starts)
-
-
-def _rung(problem: Problem, judged: Judged, added: int, last: Rung) -> Rung:
-    gained = last.held - judged.held
-    whole = float(last.held.sum())
-    low, high = bootstrap(gained, groups=problem.trial_of_segment)
-    scale = whole if whole > 0 else 1.0
+def _refitted(search: Search, current: Current) -> Rung:
+    cut = _cut(search.problem)
+    held = cross_fit(search, [(Model(current.parts), current.u)], cut)[0]
+    terms = (*search.fixed, *current.hypothesis)
     return Rung(
-        judged.hypothesis[-added:],
-        judged.hypothesis,
+        "its own values fitted anew",
+        (),
+        terms,
+        float(np.sqrt(held.seen)),
+        error(held.residual),
+        per_segment(search.problem, held.residual),
+        cut.name,
+    )
+
+
+def _asked(search: Search, current: Current, c: Candidate) -> Judged:
+    """An effect that was asked for, from the best start that a scan finds, whatever it is worth."""
+    now = search.on(current.hypothesis)
+    scanned = scan(now, screen(now, [c]))
+    start = scanned[0].starts[0] if scanned else np.zeros(c.size)
+    model = Model((*current.parts, c))
+    fit = fit_one(search, model, [np.concatenate([current.u, start])])
+    cut = windows(search.problem)
+    held: list[HeldOut] = []
+    for each in (cut, *travelling(search.problem)):
+        held.append(cross_fit(search, [(model, fit.u)], each)[0])
+    problem = search.problem
+    near = float((held[0].residual ** 2).sum()) <= NEAR**2 * float(problem.floor.sum())
+    chosen = held[0] if near or len(held) == 1 else held[1]
+    without = search.on(current.hypothesis).base()
+    if current.parts:
+        without = cross_fit(search, [(Model(current.parts), current.u)], chosen.cut)[0].residual
+    judged = judge(problem, without, chosen, Proposal((c,)), model, 2)
+    judged.u = fit.u
+    return judged
+
+
+def _rung(search: Search, judged: Judged, ties: Sequence[str] = ()) -> Rung:
+    return Rung(
+        judged.name,
+        judged.terms,
+        (*search.fixed, *judged.hypothesis),
         judged.error_fit,
         judged.error_heldout,
         judged.held,
-        (low / scale, high / scale),
+        judged.held_out,
+        judged.interval,
+        list(ties),
     )
 
 
-def _earns(step: Rung, last: Rung, least: float) -> bool:
-    gained = float((last.held - step.held).sum())
-    whole = float(last.held.sum())
-    sound = step.interval[0] > 0 or lost(last.held - step.held) <= LOST_SHARE * gained
-    return bool(np.isfinite(gained) and gained > max(least, LEAST_SHARE * whole) and sound)
+def _pruned(
+    search: Search, current: Current, own: int, added: int, cut: Cut, tried: int
+) -> tuple[Current, tuple[str, ...]]:
+    """The model without the terms that the last ones have made useless: leaving them out costs no more held-out energy
+    than luck, and less than a term must be worth."""
+    old = range(own, len(current.parts) - added)
+    if not old:
+        return current, ()
+    problem, places = search.problem, _places(current.parts)
+    models = [(Model(current.parts), current.u)]
+    for k in old:
+        keep = np.delete(np.arange(len(current.u)), places[k])
+        models.append((Model((*current.parts[:k], *current.parts[k + 1 :])), current.u[keep]))
+    whole, *without = cross_fit(search, models, cut)
+    energy = float((whole.residual**2).sum())
+    floor = float(problem.floor.sum())
+    allowed = least_energy(tried) * max(1.0, energy / len(problem.floor))
+    if cut.name != WINDOWS:
+        allowed = max(allowed, 0.5 * WORTH * max(energy - floor, 0.0))
+    costs = [float((h.residual**2).sum()) - energy for h in without]
+    cheapest = int(np.argmin(costs))
+    if costs[cheapest] > allowed * 0.5:
+        return current, ()
+    model, start = models[1 + cheapest]
+    name = current.parts[own + cheapest].name
+    fit = fit_all(search, [(model, start)], None, WIDTHS[2:])[0]
+    return Current(model.parts, fit.u), (name,)
+
+
+def _places(parts: Sequence[Candidate]) -> list[slice]:
+    edges = np.concatenate([[0], np.cumsum([c.size for c in parts])]).astype(int)
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def _finish(
-    problem: Problem,
-    parts: Sequence[Candidate],
-    u: Array,
+    search: Search,
+    current: Current,
     ladder: list[Rung],
     base: Array,
     stopped: str,
-    explanations: list[Explanation],
-    progress: Progress,
+    last: Examined | None,
 ) -> Improvement:
+    problem = search.problem
     floor, source = problem.noise_floor()
-    if not parts:
-        return Improvement(ladder, (), [], base, floor, source, leftovers(problem, base), stopped, explanations)
-    everything = np.ones(len(problem.segment_of), dtype=bool)
-    model = Model(tuple(parts))
-    fit = fit_all(problem, [(model, u)], (), everything, widths=(*WIDTHS[2:], 0.006), progress=progress)[0]
-    left = leftovers(problem, fit.residual)
-    return Improvement(
-        ladder, fit.hypothesis, _parameters(fit), fit.residual, floor, source, left, stopped, explanations
-    )
+    residual, terms, told = base, search.fixed, []
+    if current.parts:
+        start = [(Model(current.parts), current.u)]
+        fit: Fit = fit_all(search, start, None, (*WIDTHS[2:], 0.006))[0]
+        residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
+        told = parameters(problem, fit)
+        if search.fixed:
+            told = [ParameterReport(p.term + len(search.fixed), p.name, p.value, p.low, p.high, p.flag) for p in told]
+    left = leftovers(problem, residual)
+    before, after = ladder[0].error_heldout, ladder[-1].error_heldout
+    above = before**2 - floor**2
+    share = (before**2 - max(after, floor) ** 2) / above if above > 0 else 0.0
+    verdict = _verdict(len(ladder) > 1 or bool(current.parts), left, after, floor)
+    return Improvement(verdict, share, ladder, terms, told, base, residual, floor, source, left, stopped, last)
 
 
-def _parameters(fit: Fit) -> list[ParameterReport]:
-    spread, out, at = fit.spread(), [], 0
-    for index, (c, term) in enumerate(zip(fit.model.parts, fit.hypothesis, strict=True)):
-        u, s = fit.u[at : at + c.size], spread[at : at + c.size]
-        rooms = c.rooms(u)
-        for k, (name, value) in enumerate(term.values):
-            half = 1.96 * float(s[k] * rooms[k]) if np.isfinite(s[k]) else float("inf")
-            flag = ""
-            if not np.isfinite(half) or half > max(abs(rooms[k]), 1e-12):
-                flag = "not determined by these data"
-            elif abs(u[k]) > AT_BOUND:
-                flag = "at its bound: the range is too small, or the effect is another"
-            elif abs(u[k]) < 1.96 * s[k]:
-                flag = "not told from neutral"
-            out.append(ParameterReport(index, name, value, value - half, value + half, flag))
-        at += c.size
-    return out
-
-
-def appended(before: Hypothesis, term: Term) -> Hypothesis:
-    """A model with one more line."""
-    return (*before, term)
+def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor: float) -> str:
+    if not left and error_after <= 1.3 * floor:
+        return EXPLAINED if changed else NOTHING_MISSING
+    return BETTER if changed else UNEXPLAINED

@@ -1,54 +1,172 @@
-"""What the four verbs work on: measured data, a model, and the residual between them, for many hypotheses at once."""
+"""The contract of every way of comparing: measured trials against one base model, and the residual for many hypotheses.
+
+A way of comparing (open loop, free run, force balance, a user's own) derives from ``Problem``, fills in its fields and
+two methods. Everything above it, from screening to the report, reads what is declared here and nothing else.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.effects.catalogue import FAMILIES, Hypothesis
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, SensorLog
 
 Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
-class Problem(Protocol):
-    """Measured data against one base model.
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where each residual value belongs. Values are cut into segments (windows of a trial); channels have a unit.
 
-    A residual value is (measured - predicted) / scale of its channel, so that values of all channels can be added up.
-    Residuals are cut into ``segments`` (trials, or windows of one): fitting uses some, judging the others.
+    ``time_s`` (n,) is when a value was taken, from the start of its trial; ``reading`` (n,) whether it compares what a
+    channel reads (rather than its texture or a computed command); ``floor`` (n,) its mean square under a perfect model, and
+    ``known`` (n,) the part of that which calibration left. ``joint_of_channel``: the motor that a channel belongs to.
     """
 
+    segments: tuple[str, ...]
+    trial_of_segment: Index
+    segment_of: Index
+    channel_of: Index
+    time_s: Array
+    reading: Mask
+    floor: Array
+    known: Array
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    joint_of_channel: tuple[int | None, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One channel of one trial as people look at it: (T,) times, measured and predicted values in ``unit``."""
+
+    trial: int
+    channel: int
+    unit: str
+    times_s: Array
+    measured: Array
+    predicted: Array
+
+
+class Problem(ABC):
+    """Measured trials against one base model, under one way of comparing.
+
+    A residual value is (measured - predicted) / scale, so that values of all channels can be added up. Facts with a
+    default are those that most ways need not think about.
+    """
+
+    way: str
+    """Its name on the command line, ``task.by``."""
     robot: Robot
     """The base model that hypotheses are applied to."""
-    segments: tuple[str, ...]
-    """Names, ``<trial>@<start>s``; neighbours in time are neighbours here."""
-    segment_of: Index
-    """(n,) the segment of each residual value."""
-    trial_of_segment: Index
-    """(segments,) the trial that each segment is a part of."""
-    trials: tuple[str, ...]
-    channel_of: Index
-    """(n,) the channel of each residual value."""
-    channels: tuple[str, ...]
-    floor: Array
-    """(n,) mean square of each residual value under a perfect model: what noise alone would leave."""
+    measured: tuple[MeasuredTrial, ...]
+    layout: Layout
     error_definition: str
     """One sentence: what the error number is, with its unit."""
+    natural_name: str = "error"
+    """What ``natural`` gives, in a user's words."""
+    natural_unit: str = "standard deviations"
+    families: frozenset[str] = frozenset(FAMILIES)
+    """Families of effects that can show in this way of comparing."""
+    switches: bool = True
+    """Whether effects without a parameter (a part that is lost) can be told in this way of comparing."""
+    rugged: bool = False
+    """Whether the error jumps with its parameters, so that a fit must search rather than follow a slope."""
+    effort: float = 1.0
+    """Scales the length of a search where the error is rugged."""
+    gained: float = 0.0
+    """Energy that the most promising effect took off an untouched robot (from calibration)."""
+    calibrated: bool = False
+    """Whether the model was calibrated on an untouched robot: its own terms are then known, not free."""
 
+    @abstractmethod
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n): one row a hypothesis. Rows with numbers that are not finite mean a model that cannot be simulated.
 
         With ``trials`` only those are computed; values of the others are zero, whatever the hypothesis.
         """
-        ...
 
+    @abstractmethod
     def noise_floor(self) -> tuple[float, str]:
-        """The error that a perfect model would have, and whether it was measured (repeated trials) or estimated."""
-        ...
+        """The error that a perfect model would have, and where the figure comes from."""
+
+    @abstractmethod
+    def raw(self, residual: Array) -> Array:
+        """(n,): residual values in the units of their channels; NaN where a value compares no reading."""
+
+    @abstractmethod
+    def series(self, hypothesis: Hypothesis) -> list[Series]:
+        """Measured and predicted, trial by trial and channel by channel."""
+
+    def natural(self, error: float) -> float:
+        """An error in ``natural_unit``."""
+        return error
+
+    def told(self, error: float) -> str:
+        """An error as people read it, with its unit."""
+        return f"{error:.3g}"
+
+    def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
+        """The simulated motion of each trial with the poses of all parts; None where nothing is simulated."""
+        return [None] * len(self.measured)
+
+    def remarks(self, hypothesis: Hypothesis) -> list[str]:
+        """What this way alone can say about what a model leaves, in lines for people."""
+        return []
+
+    @cached_property
+    def trials(self) -> tuple[str, ...]:
+        return tuple(t.name for t in self.measured)
+
+    @property
+    def looped(self) -> tuple[int, ...]:
+        """Trials in which a controller was in the loop: only there does wiring show."""
+        return ()
+
+    @property
+    def trust(self) -> tuple[float, ...]:
+        """How predictable each trial is, by any scale; equal where the way does not know."""
+        return (1.0,) * len(self.measured)
+
+    # -- names of the layout, which everything reads -------------------------------------------------------------------
+
+    @property
+    def segments(self) -> tuple[str, ...]:
+        return self.layout.segments
+
+    @property
+    def segment_of(self) -> Index:
+        return self.layout.segment_of
+
+    @property
+    def trial_of_segment(self) -> Index:
+        return self.layout.trial_of_segment
+
+    @property
+    def channel_of(self) -> Index:
+        return self.layout.channel_of
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        return self.layout.channels
+
+    @property
+    def floor(self) -> Array:
+        return self.layout.floor
+
+    @cached_property
+    def trial_of(self) -> Index:
+        """(n,) the trial of each residual value."""
+        return np.asarray(self.layout.trial_of_segment[self.layout.segment_of])
 
 
 def error(residuals: Array) -> float:
@@ -56,10 +174,12 @@ def error(residuals: Array) -> float:
     return float(np.sqrt(np.mean(np.square(residuals)))) if np.isfinite(residuals).all() else float("inf")
 
 
-def energy(residuals: Array, segment_of: Index, segments: int) -> Array:
-    """(H, n) -> (H, segments): sums of squares; infinite for a model that cannot be simulated."""
-    rows = np.atleast_2d(residuals)
-    square = np.where(np.isfinite(rows), rows, 0.0) ** 2
-    out = np.stack([np.bincount(segment_of, weights=r, minlength=segments) for r in square])
-    out[~np.isfinite(rows).all(axis=1)] = np.inf
-    return out
+def per_segment(problem: Problem, residual: Array) -> Array:
+    """(segments,) energy of one residual (n,)."""
+    return np.bincount(problem.segment_of, weights=residual**2, minlength=len(problem.segments))
+
+
+def joints_of(robot: Robot, targets: Sequence[str]) -> tuple[int | None, ...]:
+    """The motor that each target (a joint, a part) is, if it is one."""
+    names = list(robot.motor_names)
+    return tuple(names.index(t) if t in names else None for t in targets)

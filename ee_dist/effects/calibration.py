@@ -13,7 +13,7 @@ from dataclasses import replace
 from ee_dist.effects import scales
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range
-from ee_dist.effects.targets import damped_drives, motors, motors_with_speed_limit, position_drives, powered
+from ee_dist.effects.targets import damped_drives, is_arm, motors, motors_with_speed_limit, position_drives, powered
 from ee_dist.robots.model import Drive, Quat, Robot
 
 STABLE = 1.8
@@ -73,9 +73,10 @@ def back_emf(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     family="drive",
     targets=position_drives,
     parameters=(Parameter("factor", "1", 0.01, 100.0, 1.0, "factor on the gain of the position controller", 0.01),),
-    physics="The position controller is set to another gain: a setting of the trial rather than a fault.",
+    physics="The position controller has another gain than the model says: a setting of a trial, or a data sheet that is wrong.",
     signature="Residual command in proportion to the position error.",
-    searchable=False,
+    ranges=scales.always(factor=(0.2, 5.0)),
+    worth_proposing=is_arm,
 )
 def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, kp=d.kp * values["factor"]))
@@ -101,7 +102,7 @@ def _damping(robot: Robot, target: str) -> dict[str, Range]:
     physics="The controller damps more or less than the model says: its gain on the joint's speed is another.",
     signature="Residual command in proportion to speed while the drive is not at its limit; like viscous friction, but gone when "
     "the drive is released.",
-    searchable=False,
+    worth_proposing=is_arm,
     ranges=_damping,
 )
 def speed_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
@@ -159,7 +160,7 @@ def gear_ratio(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     parameters=(Parameter("offset", "rad", -0.1, 0.1, 0.0, "what the encoder reads where the model has zero", 0.001),),
     physics="The encoder was mounted a little turned: where it reads zero the joint is not where the model has its zero.",
     signature="Gravity load shifted along the position axis; nothing where gravity does no work on the joint.",
-    searchable=False,
+    worth_proposing=is_arm,
 )
 def encoder_zero(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     offset = values["offset"]

@@ -23,6 +23,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ee_dist.effects.groups import common, members_of, shared_targets
 from ee_dist.effects.laws import LAWS
 from ee_dist.effects.scales import Range, Ranges
 from ee_dist.robots.model import Robot, RobotError
@@ -84,8 +85,15 @@ class Effect:
     """Whether ``explain`` proposes it by itself."""
     ranges: Ranges | None = None
     """Values worth trying on a robot at a target, for parameters whose scale depends on them."""
+    contains: tuple[str, ...] = ()
+    """Simpler laws that this one becomes for some of its values: it must beat them to be named."""
+
     worth_proposing: Callable[[Robot], bool] | None = None
     """On which robots ``explain`` proposes it, where that is not all of them."""
+
+    def shared(self, robot: Robot) -> tuple[str, ...]:
+        """Groups of joints or sensors that it can act on with one set of values (see groups.py)."""
+        return shared_targets(robot, self.targets(robot))
 
     def proposed(self, robot: Robot) -> tuple[str, ...]:
         """The targets at which ``explain`` proposes it by itself: all or none."""
@@ -109,7 +117,13 @@ class Effect:
         return {p.name: p.neutral for p in self.parameters}
 
     def bounds(self, robot: Robot, target: str) -> dict[str, Range]:
-        """(lower, upper) worth trying at this target, by parameter: finite, around neutral, within the hard bounds."""
+        """(lower, upper) worth trying at this target, by parameter: finite, around neutral, within the hard bounds.
+
+        For a group, what is worth trying at every member.
+        """
+        allowed = self.targets(robot)
+        if target not in allowed and (members := members_of(robot, target, allowed)):
+            return common([self.bounds(robot, m) for m in members])
         own = {} if self.ranges is None else self.ranges(robot, target)
         found = {}
         for p in self.parameters:
@@ -122,6 +136,7 @@ class Effect:
     def unit(self, parameter: str, robot: Robot, target: str) -> str:
         """The unit of a parameter at this target: N on a slide where it is N.m on a hinge, or the unit of a channel."""
         unit = self.parameter(parameter).unit
+        target = next(iter(members_of(robot, target, self.targets(robot))), target)
         if unit == "channel":
             return next((s.unit for s in robot.sensors if s.name == target), unit)
         slide = any(j.name == target and j.kind == "slide" for j in robot.joints)
@@ -139,6 +154,11 @@ class Term:
     def as_dict(self) -> dict[str, Any]:
         """{effect, target, <parameter>: value, ...}: the form of a model file."""
         return {"effect": self.effect, "target": self.target, **dict(self.values)}
+
+    @property
+    def name(self) -> str:
+        """``effect@target``, as typed on the command line."""
+        return f"{self.effect}@{self.target}" if self.target else self.effect
 
     def __str__(self) -> str:
         entry = CATALOGUE.get(self.effect)
@@ -168,6 +188,7 @@ def effect(
     reference: str = "",
     searchable: bool = True,
     ranges: Ranges | None = None,
+    contains: tuple[str, ...] = (),
     worth_proposing: Callable[[Robot], bool] | None = None,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
@@ -195,6 +216,7 @@ def effect(
             reference,
             searchable,
             ranges,
+            contains,
             worth_proposing,
         )
         return transform
@@ -241,15 +263,21 @@ def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
     for t in hypothesis:
         entry = find(t.effect)
         allowed = entry.targets(robot)
-        if t.target not in allowed:
+        places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
+        if not places:
             near = difflib.get_close_matches(t.target, allowed, n=3, cutoff=0.4) or allowed
             raise EffectError(
                 f"{t.effect} cannot act on {t.target!r} of {robot.name}; it can act on: {', '.join(near)}"
             )
         try:
-            robot = entry.transform(robot, t.target, dict(t.values))
+            for place in places:
+                robot = entry.transform(robot, place, dict(t.values))
         except RobotError as error:
             raise EffectError(f"{t}: {error}") from error
+        except (Exception, SystemExit) as error:
+            raise EffectError(f"{t}: its transform failed: {type(error).__name__}: {error}") from error
+        if not isinstance(robot, Robot):
+            raise EffectError(f"{t}: its transform gave {type(robot).__name__}, not a Robot; does it return one?")
     return robot
 
 
@@ -282,7 +310,7 @@ def load_plugin(path: str | Path) -> None:
         spec.loader.exec_module(module)
         if not any(e.transform.__module__ == name for e in _registry.values()):
             raise EffectError("it registers no effect; decorate its transform with @effect(...)")
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         _registry.clear()
         _registry.update(before)
         LAWS.clear()
@@ -297,7 +325,7 @@ def loaded_plugins() -> tuple[str, ...]:
     return tuple(_plugins)
 
 
-def _line_of(error: Exception, file: Path) -> str:
+def _line_of(error: BaseException, file: Path) -> str:
     if isinstance(error, SyntaxError):
         return f", line {error.lineno}"
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(file)]

@@ -31,7 +31,8 @@ class PhysicalRobot:
         if noise:
             changed = _noisy(changed, noise)
         self.trials = 0
-        self._run: Callable[[Any, int, int], SensorLog] = _runner(engine, changed, seed)
+        cause = "the hidden change makes" if hidden else "with nothing hidden, these commands make"
+        self._run: Callable[[Any, int, int], SensorLog] = _runner(engine, changed, seed, cause)
         self.reveal: Callable[[], Hypothesis] = lambda: hidden
 
     def trial(self, driver: Any, steps: int) -> SensorLog:
@@ -39,14 +40,20 @@ class PhysicalRobot:
         self.trials += 1
         return log
 
+    def skip(self) -> None:
+        """A trial that was made before, by a run that is resumed now: the next one is the one after it."""
+        self.trials += 1
 
-def _runner(engine: Engine, robot: Robot, seed: np.random.SeedSequence) -> Callable[[Any, int, int], SensorLog]:
+
+def _runner(
+    engine: Engine, robot: Robot, seed: np.random.SeedSequence, cause: str
+) -> Callable[[Any, int, int], SensorLog]:
     def run(driver: Any, steps: int, index: int) -> SensorLog:
         stream = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, index))
         number = int(stream.generate_state(1, np.uint64)[0])
         (log,) = engine.rollout([Rollout(robot, driver, steps, seed=number, pose=True)])
         if not log.finite:
-            raise EngineError(f"the hidden change makes {robot.name} unstable in {engine.name}: no trial came back")
+            raise EngineError(f"{cause} {robot.name} unstable in {engine.name}: no trial came back")
         return log
 
     return run

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import os
-import socket
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from platform import node, python_version
+from signal import SIGKILL
 from typing import Any
 
 import ray
+from ray.exceptions import ActorDiedError, RayError, RayTaskError
 
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.jobs import Counts, Job
+from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, lost, start_ray
 from ee_dist.evaluation.serial import run_jobs
-
-
-class EvaluatorError(RuntimeError):
-    """Ray could not be started or reached, said in one line."""
-
 
 EngineMaker = Callable[[], Engine]
 
@@ -29,85 +28,46 @@ class _Worker:
     """Lives in an actor process; its engine is made there."""
 
     def __init__(self, make_engine: EngineMaker) -> None:
-        self.engine = make_engine()
+        try:
+            self.engine = make_engine()
+        except SystemExit as stop:
+            raise RuntimeError(f"sys.exit({stop.code!r}) was called") from None
 
     def run(self, jobs: list[Job], chunk: int) -> tuple[list[Any], float]:
         """Results, and the seconds that they took."""
         began = time.perf_counter()
-        return run_jobs(self.engine, jobs, chunk), time.perf_counter() - began
+        try:
+            return run_jobs(self.engine, jobs, chunk), time.perf_counter() - began
+        except SystemExit as stop:
+            raise RuntimeError(f"sys.exit({stop.code!r}) was called") from None
 
-    def pid(self) -> int:
-        return os.getpid()
-
-
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Workers are one process a core: numerical libraries must not start threads of their own in them."""
-
-
-def start_ray(address: str | None, workers: int) -> None:
-    """Connect to the cluster at ``address``, or start Ray on this machine. Raises EvaluatorError."""
-    if ray.is_initialized():
-        return
-    options: dict[str, Any] = {"include_dashboard": False, "log_to_driver": False, "logging_level": logging.ERROR}
-    if not address:
-        # Inherited by the workers that Ray has ready: with a runtime_env it would start others, and a second later.
-        with _environment(ONE_THREAD):
-            ray.init(num_cpus=max(workers, os.cpu_count() or 1), **options)
-        return
-    options["runtime_env"] = {"env_vars": ONE_THREAD}
-    del options["include_dashboard"]
-    _knock(address)
-    try:
-        ray.init(address=address, **options)
-    except Exception as error:
-        first = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise _unreachable(address, first) from None
+    def who(self) -> tuple[str, int, dict[str, str]]:
+        """Host, process, and what is installed there."""
+        return node(), os.getpid(), installed()
 
 
-def stop_ray() -> None:
-    """Stop what ``start_ray`` started, or leave the cluster. Ray's own way at the end of a process begins with a nap."""
-    if ray.is_initialized():
-        ray.shutdown()
+PACKAGES = ("ee_dist", "pybullet", "mujoco", "numpy", "numba", "ray")
+"""What decides the bits of a result, and so must be the same in every process."""
 
 
-@contextmanager
-def _environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables for a while."""
-    before = {name: os.environ.get(name) for name in variables}
-    os.environ.update(variables)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-def _knock(address: str) -> None:
-    """Ray waits for minutes where nobody answers: see first whether somebody does."""
-    host, _, port = address.removeprefix("ray://").rpartition(":")
-    if not host:
-        if address in ("auto", "local"):
-            return
-        raise EvaluatorError(f"ray.address={address}: neither 'auto' nor host:port, such as 127.0.0.1:6379")
-    try:
-        socket.create_connection((host, int(port)), timeout=5).close()
-    except (OSError, ValueError, OverflowError) as error:
-        raise _unreachable(address, str(error)) from None
-
-
-def _unreachable(address: str, why: str) -> EvaluatorError:
-    return EvaluatorError(
-        f"ray.address={address}: no Ray cluster answers there ({why}); "
-        "start one with 'ray start --head', or leave ray.address empty to use this machine"
-    )
+def installed() -> dict[str, str]:
+    """Versions by name; ``-`` for what is not there."""
+    found = {"python": python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "-"
+    return found
 
 
 WORTH_A_CALL = 24
 """Jobs below which a step costs nearly as much for the batch as for its robots: no call carries fewer unless there are
 too few for all workers."""
+LOOK_S = 1.0
+"""How long to wait for results before looking whether Ray is still there."""
+PATIENCE, PATIENCE_S = 30.0, 120.0
+"""A call that takes this many times what it should, and this long (s), hangs: its worker is killed, and it is done again."""
 NEWEST = 0.3
 """Weight of the newest measurement of a worker's speed."""
 
@@ -157,18 +117,22 @@ class RayEvaluator:
         self.chunk = chunk
         self.counts = Counts()
         self.shares = Shares(self.workers)
+        self.patience_s = PATIENCE_S
         start_ray(address, self.workers)
         actor = ray.remote(num_cpus=1 if not workers else 0.01, max_restarts=-1, max_task_retries=-1)(_Worker)
         self.actors = [actor.remote(make_engine) for _ in range(self.workers)]
+        self._asked: list[Any] = [a.who.remote() for a in self.actors]
+        self._pids: dict[int, int] = {}
 
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
+        """Raises EvaluatorError where Ray is lost, and what a job raised where one did."""
         steps = sum(j.rollout.steps for j in jobs)
         self.counts.asked += len(jobs)
         self.counts.asked_steps += steps
         self.counts.simulated += len(jobs)
         self.counts.steps += steps
         results: list[Any] = [None] * len(jobs)
-        running: dict[Any, tuple[int, int, int]] = {}
+        running: dict[Any, _Call] = {}
         idle, share, free = list(range(self.workers)), self.shares.now(), 1.0
         given = 0
         while given < len(jobs) or running:
@@ -177,23 +141,94 @@ class RayEvaluator:
                 size = self.chunk or helping(len(jobs) - given, len(jobs), share[who], share[who] / free)
                 free -= share[who]
                 some = list(jobs[given : given + size])
-                running[self.actors[who].run.remote(some, size)] = (given, len(some), who)
+                call = _Call(given, len(some), who, sum(j.rollout.steps for j in some), time.monotonic())
+                running[self._said(self.actors[who].run.remote, some, size)] = call
                 given += len(some)
-            done, _ = ray.wait(list(running), num_returns=1)
-            for reference in done:
-                first, count, who = running.pop(reference)
-                idle.append(who)
-                free += share[who]
-                found, seconds = ray.get(reference)
-                self.shares.measured(who, sum(j.rollout.steps for j in jobs[first : first + count]), seconds)
-                results[first : first + count] = found
+            for reference in self._done(running):
+                call = running.pop(reference)
+                idle.append(call.who)
+                free += share[call.who]
+                self._compare(call.who)
+                found, seconds = self._said(ray.get, reference)
+                self.shares.measured(call.who, call.steps, seconds)
+                results[call.first : call.first + call.count] = found
         return results
+
+    def _done(self, running: dict[Any, _Call]) -> list[Any]:
+        """References whose results are there, as soon as one is."""
+        while True:
+            done, _ = self._said(ray.wait, list(running), num_returns=1, timeout=LOOK_S)
+            if done:
+                return list(done)
+            if gone := lost():
+                raise RayLostError(f"Ray is lost: {gone}")
+            self._end_hanging(running)
+
+    def _end_hanging(self, running: dict[Any, _Call]) -> None:
+        """Kill the workers of calls that take far longer than they should; Ray starts them and their calls again."""
+        for call in running.values():
+            speed = self.shares.speed[call.who]
+            patience = max(self.patience_s, PATIENCE * call.steps / speed) if speed else PATIENCE * self.patience_s
+            if time.monotonic() - call.began > patience:
+                with suppress(RayError):
+                    ray.kill(self.actors[call.who], no_restart=False)
+                # A stopped process does not listen to Ray. On another machine Ray's own kill has to do.
+                if call.who in self._pids:
+                    with suppress(OSError):
+                        os.kill(self._pids[call.who], SIGKILL)
+                call.began = time.monotonic()
+
+    def _compare(self, who: int) -> None:
+        """Refuse a worker where something else is installed than here. Raises EvaluatorError."""
+        if self._asked[who] is None:
+            return
+        host, pid, theirs = self._said(ray.get, self._asked[who])
+        self._asked[who] = None
+        if host == node():
+            self._pids[who] = pid
+        for name, ours in installed().items():
+            if theirs.get(name) != ours:
+                raise EvaluatorError(
+                    f"the worker on {host} has {name} {theirs.get(name, '-')}, this machine {ours}: results would differ; "
+                    "install the same there, or leave that machine out"
+                )
+
+    def _said(self, ask: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+        """What Ray answers. Raises what a job raised, and EvaluatorError for what is Ray's own."""
+        try:
+            return ask(*arguments, **named)
+        except RayTaskError as error:
+            cause = getattr(error, "cause", None)
+            raise (cause if isinstance(cause, Exception) else EvaluatorError(_last_line(error))) from None
+        except ActorDiedError as error:
+            if gone := lost():
+                raise RayLostError(f"Ray is lost: {gone}") from None
+            raise EvaluatorError(f"a worker could not be started: {_last_line(error)}") from None
+        except RayError as error:
+            raise RayLostError(f"Ray is lost: {lost() or _last_line(error)}") from None
 
     def process_ids(self) -> list[int]:
         """Processes of the actors, for tests that kill one."""
-        return [int(pid) for pid in ray.get([a.pid.remote() for a in self.actors])]
+        return [int(pid) for _, pid, _ in ray.get([a.who.remote() for a in self.actors])]
 
     def close(self) -> None:
         for actor in self.actors:
-            ray.kill(actor)
+            with suppress(RayError):
+                ray.kill(actor)
         self.actors = []
+
+
+@dataclass
+class _Call:
+    """Jobs ``first`` and ``count`` more at a worker, ``steps`` robot-steps in all, since ``began`` (s)."""
+
+    first: int
+    count: int
+    who: int
+    steps: int
+    began: float
+
+
+def _last_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[-1] if lines else type(error).__name__

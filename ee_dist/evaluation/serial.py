@@ -8,9 +8,13 @@ from typing import Any
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.jobs import Counts, Job
 
+MOST_AT_ONCE = 4_000_000
+"""Robot-steps whose logs are in memory together, about a GB: long rollouts go in smaller chunks, with the same results."""
+
 
 def run_jobs(engine: Engine, jobs: Sequence[Job], chunk: int) -> list[Any]:
     """Results of the jobs, simulated ``chunk`` at a time."""
+    chunk = max(1, min(chunk, MOST_AT_ONCE // max((j.rollout.steps for j in jobs), default=1)))
     results: list[Any] = []
     for k in range(0, len(jobs), chunk):
         some = jobs[k : k + chunk]

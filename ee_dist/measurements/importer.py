@@ -1,10 +1,10 @@
-"""A file and a mapping make a sensor log, and a report of what was done to the numbers on the way."""
+"""A recording and a mapping make sensor logs, and a report of what was done to the numbers on the way."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,12 @@ import numpy as np
 
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
+from ee_dist.measurements.clocks import Clocked, check_grid
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Column, Estimated, Mapping
-from ee_dist.measurements.sampling import LowPass, Timing, check_times, grid, held, linear, smoothed
+from ee_dist.measurements.report import Report
+from ee_dist.measurements.robot_channels import check_names, command_kind, command_units, torque_units
+from ee_dist.measurements.sampling import LowPass, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
     command_suspicion,
     speed_suspicion,
@@ -22,91 +25,52 @@ from ee_dist.measurements.suspicious import (
     time_suspicion,
     unit_suspicion,
 )
-from ee_dist.measurements.tables import Table, read_table
+from ee_dist.measurements.table import Recorded
+from ee_dist.measurements.trial_clocks import TrialClocks
+from ee_dist.measurements.trials import trials_of
 from ee_dist.measurements.units import factor
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
-POSITION_UNIT = {"hinge": "rad", "slide": "m"}
-TORQUE_UNIT = {"hinge": "N.m", "slide": "N"}
 SAME_RATE = 1e-3
 """A record whose even step is within this share of the wanted one is taken sample by sample."""
 
 
-@dataclass
-class Report:
-    """What the import of one file did and saw. Rates in Hz, gaps as (row, seconds), ranges as (lowest, highest)."""
-
-    file: str
-    trial: str
-    rows_read: int = 0
-    rows: int = 0
-    seconds: float = 0.0
-    rate_read_hz: float = 0.0
-    rate_hz: float = 0.0
-    even: bool = True
-    resampled: bool = False
-    gaps: list[tuple[int, float]] = field(default_factory=list)
-    ranges: dict[str, tuple[float, float, str]] = field(default_factory=dict)
-    done: list[str] = field(default_factory=list)
-    suspicious: list[str] = field(default_factory=list)
-
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
-
-
 def import_file(path: str | Path, mapping: Mapping, robot: Robot, index: int = 0) -> tuple[TrialRecord, Report]:
-    """One trial from one file. Raises MeasurementError: see ``tables``, ``sampling`` and ``check_names``."""
+    """One trial from one file. Raises MeasurementError: see ``import_files``, and where the file holds several."""
+    found = import_files([Path(path)], mapping, robot)
+    if len(found) != 1:
+        raise MeasurementError(f"{path}: holds {len(found)} trials; expected one")
+    record, report = found[0]
+    return replace(record, index=index), report
+
+
+def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[tuple[TrialRecord, Report]]:
+    """Every trial of the files. Raises MeasurementError: see ``readers``, ``trials``, ``clocks`` and ``check_names``."""
     check_names(mapping, robot)
-    table = read_table(path, mapping.kind, mapping.records, mapping.separator)
-    return _Import(table, mapping, robot, index).run()
-
-
-def check_names(mapping: Mapping, robot: Robot) -> None:
-    """Raises MeasurementError where the mapping names sensors or joints that the robot does not have, or leaves some out."""
-    where, motors = str(mapping.source), robot.motor_names
-    named = {*mapping.sensors, *mapping.commands}
-    if named and not named & {*robot.sensor_names, *motors}:
-        raise MeasurementError(
-            f"{where}: is for another robot: none of its names ({', '.join(sorted(named))}) is one of {robot.name}'s: "
-            f"{', '.join((*robot.sensor_names, *motors))}"
-        )
-    for group, names, allowed in (
-        ("sensors", mapping.sensors, robot.sensor_names),
-        ("commands", mapping.commands, motors),
-        ("torques", mapping.torques, motors),
-    ):
-        for name in names:
-            if name not in allowed:
-                raise MeasurementError(f"{where}: {group}: {robot.name} has no {name!r}; {nearest(name, allowed)}")
-    missing = [m for m in motors if m not in mapping.commands]
-    if missing:
-        raise MeasurementError(f"{where}: commands: no column for joint {missing[0]!r} of {robot.name}")
-    absent = [s for s in robot.sensor_names if s not in mapping.sensors]
-    if absent:
-        raise MeasurementError(
-            f"{where}: sensors: no column for {absent[0]!r} of {robot.name}; add one, or for a speed 'speed_of: <position>', "
-            "or take the sensor out of the robot's description"
-        )
+    return [_Import(r, mapping, robot, i).run() for i, r in enumerate(trials_of(files, mapping))]
 
 
 class _Import:
-    def __init__(self, table: Table, mapping: Mapping, robot: Robot, index: int) -> None:
-        self.table, self.mapping, self.robot, self.index = table, mapping, robot, index
-        self.report = Report(str(table.path), self._name())
+    def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, index: int) -> None:
+        self.recorded, self.mapping, self.robot, self.index = recorded, mapping, robot, index
+        self.where = str(mapping.source)
+        self.header = {k: v for t in reversed(recorded.tables) for k, v in t.header.items()}
+        self.report = Report(str(recorded.tables[0].path), self._name())
+        for table in recorded.tables:
+            self.report.done += list(table.notes)
 
     def run(self) -> tuple[TrialRecord, Report]:
-        timing = self._time()
+        self._time()
         positions = self._sensors()
-        commands = self._motor_columns(self.mapping.commands, POSITION_UNIT, "command")
-        assert commands is not None
-        torques = self._motor_columns(self.mapping.torques, TORQUE_UNIT, "torque")
+        torques = self._motor_columns(self.mapping.torques, torque_units(self.robot), "torque")
+        commands = self._commands(torques)
         supply = None
         if self.mapping.supply is not None:
             supply = self._column(self.mapping.supply, "V", "supply", step_like=True)
         self._released(commands)
-        self._look(timing, commands)
+        self._look(commands)
         joints = None
         if all(m in positions for m in self.robot.motor_names):
             joints = np.stack([positions[m] for m in self.robot.motor_names], axis=1)
@@ -126,33 +90,33 @@ class _Import:
 
     def _name(self) -> str:
         if self.mapping.trial is None:
-            return self.table.path.stem
+            return self.recorded.name
         try:
-            return str(self.mapping.trial).format(**self.table.header)
-        except (KeyError, IndexError, ValueError):
-            keys = ", ".join(self.table.header) or "none"
+            return str(self.mapping.trial).format(**self.header)
+        except (KeyError, IndexError, ValueError, AttributeError):
+            keys = ", ".join(self.header) or "none"
             raise MeasurementError(
-                f"{self.mapping.source}: trial: {self.mapping.trial!r} names an entry that the header of {self.table.path} "
+                f"{self.where}: trial: {self.mapping.trial!r} names an entry that the header of {self.report.file} "
                 f"does not have; there are: {keys}"
             ) from None
 
     # -- time --------------------------------------------------------------------------------------------------------
 
-    def _time(self) -> Timing:
-        column, table, report = self.mapping.time, self.table, self.report
-        raw = table.numbers(column.column)
-        self.times_s = raw * factor(column.unit, "s", f"{self.mapping.source}: time") * column.scale
-        timing = check_times(self.times_s, table.path, column.column, table.first_row)
+    def _time(self) -> None:
+        """Fills ``main`` (the table of the first sensor), ``clocks`` by table, the grid ``at_s`` and ``step_s``."""
+        report = self.report
         step = self.robot.time_step_s if self.mapping.rate_hz is None else 1.0 / self.mapping.rate_hz
-        length = float(self.times_s[-1] - self.times_s[0])
-        if length < step:
-            raise MeasurementError(
-                f"{table.path}: {length:g} s long, less than a step of {step:g} s; are the times in another unit?"
-            )
+        found = TrialClocks(self.recorded, self.mapping, self.robot, report.done)
+        unit = found.unit
+        check_grid(found.main, step, self.mapping.rate_hz is not None, unit)
+        found.cut()
+        self.main, self.clocks = found.main, found.clocks
+        times_s, timing = self.main.times_s, self.main.timing
+        length = float(times_s[-1] - times_s[0])
         self.step_s = step
         self.as_is = timing.even and abs(timing.median_s / step - 1) < SAME_RATE
-        self.at_s = np.arange(len(raw)) * step if self.as_is else grid(self.times_s, step)
-        report.rows_read, report.rows, report.seconds = len(raw), len(self.at_s), length
+        self.at_s = np.arange(len(times_s)) * step if self.as_is else grid(times_s, step)
+        report.rows_read, report.rows, report.seconds = len(times_s), len(self.at_s), length
         report.rate_read_hz, report.rate_hz = 1 / timing.median_s, 1 / step
         report.even, report.resampled, report.gaps = timing.even, not self.as_is, list(timing.gaps)
         if not self.as_is:
@@ -163,25 +127,25 @@ class _Import:
                 f"{how} sampling every {1e3 * timing.median_s:.4g} ms brought to {1e3 * step:.4g} ms: "
                 "states by straight lines, commands held"
             )
-        note = time_suspicion(timing.median_s, length, column.unit)
+        note = time_suspicion(timing.median_s, length, unit)
         if note:
             report.suspicious.append(note)
         for row, seconds in timing.gaps[:5]:
             report.suspicious.append(f"time: a gap of {seconds:.4g} s before row {row}")
-        return timing
 
     # -- columns -----------------------------------------------------------------------------------------------------
 
     def _column(self, column: Column, unit: str, name: str, step_like: bool, quiet: bool = False) -> Array:
         """The column on the grid, in ``unit``; ``step_like`` values are held, others joined by lines."""
-        raw = self.table.numbers(column.column, gaps=column.gaps == "interpolate")
+        own = self.clocks[column.table]
+        raw = own.table.numbers(column.column, gaps=column.gaps == "interpolate")
         if not quiet and not column.signed_bits:
             self.report.suspicious += suspicions(f"{name} ({column.column})", raw[np.isfinite(raw)])
-        size = factor(column.unit, unit, f"{self.mapping.source}: {name}")
+        size = factor(column.unit, unit, f"{self.where}: {name}")
         if np.isnan(raw).any():
             good = np.flatnonzero(np.isfinite(raw))
             if len(good) < 2:
-                raise MeasurementError(f"{self.table.path}: column {column.column!r}: nearly all cells are empty")
+                raise MeasurementError(f"{own.table}: column {column.column!r}: nearly all cells are empty")
             self.report.done.append(f"{name}: {len(raw) - len(good)} empty cells filled by straight lines")
             raw = np.interp(np.arange(len(raw)), good, raw[good])
         if column.signed_bits:
@@ -192,18 +156,29 @@ class _Import:
                 f"{name}: {wrapped} rows of an unsigned {column.signed_bits}-bit counter read as negative"
             )
         values = (column.sign * column.scale * raw + column.offset) * size
+        if not np.isfinite(values).all():
+            raise MeasurementError(f"{own.table}: column {column.column!r}: too large a number to be {name}")
         if column.unwrap:
             values = np.unwrap(values)
-        if not self.as_is:
+        if not self._same_rows(own):
+            # The grid begins where the main table does.
+            at_s = self.at_s + (self.main.times_s[0] - own.times_s[0])
             if step_like:
-                values = held(self.at_s, self.times_s, values, column.lead_s)
+                values = held(at_s, own.times_s, values, column.lead_s)
             else:
-                values = linear(self.at_s, self.times_s, values)
+                values = linear(at_s, own.times_s, values)
         if column.smooth_s > 0:
             values = smoothed(values, self.step_s, column.smooth_s)
             self.report.done.append(f"{name}: mean over {column.smooth_s:g} s")
         self.report.ranges[name] = (float(values.min()), float(values.max()), unit)
         return values
+
+    def _same_rows(self, own: Clocked) -> bool:
+        """Whether the table's rows are those of the grid, so that nothing is resampled."""
+        if own is self.main or not self.as_is:
+            return self.as_is
+        same = len(own.times_s) == len(self.main.times_s)
+        return same and float(np.abs(own.times_s - self.main.times_s).max()) < SAME_RATE * self.step_s
 
     def _sensors(self) -> dict[str, Array]:
         """Fills ``channels``; returns positions by joint."""
@@ -219,7 +194,7 @@ class _Import:
             if isinstance(column, Estimated):
                 if column.speed_of not in self.channels:
                     raise MeasurementError(
-                        f"{self.mapping.source}: sensors: {name}: speed_of: no channel {column.speed_of!r}; "
+                        f"{self.where}: sensors: {name}: speed_of: no channel {column.speed_of!r}; "
                         f"{nearest(column.speed_of, self.channels)}"
                     )
                 low_pass = LowPass(column.cutoff_hz, column.order)
@@ -231,15 +206,25 @@ class _Import:
                 )
         return positions
 
+    def _commands(self, torques: Array | None) -> Array:
+        """What the drives were told, (T, M). Without any: the torques where the drives obey torques, else NaN."""
+        found = self._motor_columns(self.mapping.commands, command_units(self.robot), "command")
+        if found is not None:
+            return found
+        assert torques is not None
+        if all(command_kind(d) == "torque" for d in self.robot.drives):
+            self.report.done.append(
+                "no commands: the drives obey torques, so the measured ones are taken as what was asked"
+            )
+            return torques.copy()
+        self.report.done.append("no commands were recorded: only a balance of forces can compare this log")
+        return np.full(torques.shape, math.nan)
+
     def _motor_columns(self, columns: Any, units: dict[str, str], what: str) -> Array | None:
         if not columns:
             return None
-        missing = [m for m in self.robot.motor_names if m not in columns]
-        if missing:
-            raise MeasurementError(f"{self.mapping.source}: {what}s: no column for joint {missing[0]!r}")
-        kinds = {j.name: j.kind for j in self.robot.joints}
         return np.stack(
-            [self._column(columns[m], units[kinds[m]], f"{what} of {m}", True) for m in self.robot.motor_names], axis=1
+            [self._column(columns[m], units[m], f"{what} of {m}", True) for m in self.robot.motor_names], axis=1
         )
 
     def _released(self, commands: Array) -> None:
@@ -247,26 +232,41 @@ class _Import:
         if self.mapping.enabled is None:
             return
         on = self._column(self.mapping.enabled, "1", "enabled", True, quiet=True) > 0.5
+        if not on.any():
+            raise MeasurementError(
+                f"{self.where}: enabled: {self.mapping.enabled.column!r} is 0 in every row: the drives never obeyed"
+            )
         if not on.all():
             commands[~on] = math.nan
             self.report.done.append(f"drives released in {int((~on).sum())} rows ({self.mapping.enabled.column})")
 
-    def _look(self, timing: Timing, commands: Array) -> None:
-        report = self.report
+    def _look(self, commands: Array) -> None:
+        """Raises MeasurementError for a channel that can only be in another unit; the rest goes into the report."""
         position_of = {s.target: self.channels[s.name] for s in self.robot.sensors if s.kind == "position"}
         for s in self.robot.sensors:
+            column = self.mapping.sensors[s.name]
             if s.kind == "position":
                 joint = self.robot.joint(s.target)
-                report.suspicious += _some(
-                    [unit_suspicion(s.name, self.channels[s.name], joint.lower, joint.upper, s.unit)]
+                unit = column.unit if isinstance(column, Column) and column.scale == 1 else s.unit
+                self._judge(
+                    unit_suspicion(s.name, self.channels[s.name], joint.lower, joint.upper, s.unit, unit), column
                 )
             elif s.kind == "velocity" and s.target in position_of:
-                note = speed_suspicion(s.name, self.channels[s.name], position_of[s.target], self.step_s)
-                report.suspicious += _some([note])
-        for k, motor in enumerate(self.robot.motor_names):
+                self._judge(speed_suspicion(s.name, self.channels[s.name], position_of[s.target], self.step_s), column)
+        for k, drive in enumerate(self.robot.drives):
             obeyed = np.isfinite(commands[:, k])
-            if motor in position_of and obeyed.sum() > 10:
-                report.suspicious += _some([command_suspicion(motor, commands[obeyed, k], position_of[motor][obeyed])])
+            if drive.joint in position_of and obeyed.sum() > 10 and command_kind(drive) == "position":
+                note = command_suspicion(drive.joint, commands[obeyed, k], position_of[drive.joint][obeyed])
+                if note:
+                    self.report.suspicious.append(note)
+
+    def _judge(self, found: tuple[str, bool] | None, column: Column | Estimated) -> None:
+        if found is None:
+            return
+        note, certain = found
+        if certain and not (isinstance(column, Column) and column.sure):
+            raise MeasurementError(f"{self.where}: {note}; if it is right as it stands, add 'sure: true' to it")
+        self.report.suspicious.append(note)
 
     def _settings(self) -> Hypothesis:
         found = []
@@ -275,32 +275,12 @@ class _Import:
             for key, value in s.values.items():
                 if isinstance(value, tuple):
                     name, scale = value
-                    entry = self.table.header.get(name)
-                    if isinstance(entry, bool) or not isinstance(entry, (int, float)):
+                    entry = self.header.get(name)
+                    if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not math.isfinite(entry):
                         raise MeasurementError(
-                            f"{self.table.path}: header entry {name!r} for {s.effect} is {entry!r}; expected a number"
+                            f"{self.report.file}: header entry {name!r} for {s.effect} is {entry!r}; expected a number"
                         )
                     value = float(entry) * scale
                 values[key] = value
             found.append(term(s.effect, s.target, **values))
         return tuple(found)
-
-
-def _some(notes: Iterable[str | None]) -> list[str]:
-    return [n for n in notes if n]
-
-
-def describe(reports: Sequence[Report]) -> str:
-    """The reports as text, for the terminal and a file."""
-    lines: list[str] = []
-    for r in reports:
-        lines.append(f"{r.file}: trial {r.trial!r}")
-        lines.append(
-            f"  {r.rows_read} rows over {r.seconds:.4g} s, {r.rate_read_hz:.4g} Hz"
-            + ("" if r.even else " (median; uneven)")
-            + f" -> {r.rows} rows at {r.rate_hz:.4g} Hz; gaps: {len(r.gaps)}"
-        )
-        lines += [f"  {name}: {low:.5g} to {high:.5g} {unit}" for name, (low, high, unit) in r.ranges.items()]
-        lines += [f"  done: {d}" for d in r.done]
-        lines += [f"  suspicious: {s}" for s in r.suspicious]
-    return "\n".join(lines)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy import signal
 
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.table import Table
 from ee_dist.trials.log import Array
 
 EVEN = 0.02
 """Steps that differ by less than this share of their median count as even."""
+LONGEST = 1e7
+"""Rows of one trial: a thousand a second for nearly three hours."""
 GAP = 5.0
 """Steps longer than this many medians are gaps."""
 
@@ -31,27 +33,35 @@ class Timing:
         return max(self.longest_s - self.median_s, self.median_s - self.shortest_s) <= EVEN * self.median_s
 
 
-def check_times(times_s: Array, path: Path, column: str, first_row: int) -> Timing:
+def check_times(times_s: Array, table: Table, column: str) -> Timing:
     """Raises MeasurementError where time stands still or runs backwards, naming the row, and for a single row."""
     if len(times_s) < 2:
-        raise MeasurementError(f"{path}: one row only; expected a series (zero length in time)")
+        raise MeasurementError(f"{table}: one row only; expected a series (zero length in time)")
     steps = np.diff(times_s)
     wrong = np.flatnonzero(steps <= 0)
     if len(wrong):
         row = int(wrong[0]) + 1
         how = "runs backwards" if steps[row - 1] < 0 else "stands still"
+        first = float(np.median(np.abs(steps)))
+        several = "; several trials in one file? add 'split: restarts'" if steps[row - 1] < -10 * first else ""
         raise MeasurementError(
-            f"{path}: row {row + first_row}, column {column!r}: time {how} ({times_s[row - 1]:.9g} s, then {times_s[row]:.9g} s)"
+            f"{table}: row {table.line(row)}, column {column!r}: time {how} "
+            f"({times_s[row - 1]:.9g} s, then {times_s[row]:.9g} s){several}"
         )
     median = float(np.median(steps))
     long = np.flatnonzero(steps > GAP * median)
-    gaps = tuple((int(i) + 1 + first_row, float(steps[i])) for i in long)
+    gaps = tuple((table.line(int(i) + 1), float(steps[i])) for i in long)
     return Timing(median, float(steps.min()), float(steps.max()), gaps)
 
 
 def grid(times_s: Array, step_s: float) -> Array:
     """Even times (T,) from 0 in steps of ``step_s`` that cover the record and do not go beyond it."""
-    count = int(np.floor((times_s[-1] - times_s[0]) / step_s + 1e-6)) + 1
+    span = float(times_s[-1] - times_s[0])
+    if not 0 < step_s < np.inf or not span / step_s < LONGEST:
+        raise MeasurementError(
+            f"{span:g} s in steps of {step_s:g} s are more than {LONGEST:.0e} rows; check the unit of the time column"
+        )
+    count = int(np.floor(span / step_s + 1e-6)) + 1
     return np.arange(count) * step_s
 
 
@@ -65,7 +75,9 @@ def held(at_s: Array, times_s: Array, values: Array, lead_s: float = 0.0) -> Arr
 
     ``lead_s`` is how long before its time stamp a value took effect, where the stamp was taken after the sending.
     """
-    index = np.searchsorted(times_s - times_s[0] - lead_s, at_s + 1e-9, side="right") - 1
+    # Times since an epoch are known to a quarter of a microsecond only.
+    slack_s = max(1e-9, 4 * float(np.spacing(abs(times_s[-1]))))
+    index = np.searchsorted(times_s - times_s[0] - lead_s, at_s + slack_s, side="right") - 1
     return values[np.clip(index, 0, len(values) - 1)]
 
 

@@ -5,12 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
 
 CLIPPED_SHARE = 0.02
 CLIPPED_DROP = 0.15
 STUCK_SHARE = 0.5
 COUNTERS = (8, 10, 12, 14, 16, 32)
+FAR, STILL, LIVELY = 3.0, 0.03, 0.15
+"""Positions beyond this many times the joint's reach cannot be; a span below the second share of it is suspiciously
+small, where in another unit it would be above the third."""
+RATIOS = tuple(r**k for r in (180 / np.pi, 1000.0, 30 / np.pi, 2 * np.pi) for k in (1, -1))
+"""Between units of speed: degrees and radians, milli and one, turns a minute or a second and radians."""
 
 
 def suspicions(name: str, values: Array) -> list[str]:
@@ -55,17 +61,44 @@ def time_suspicion(median_s: float, length_s: float, declared: str) -> str | Non
     return None
 
 
-def unit_suspicion(name: str, values: Array, low: float, high: float, unit: str) -> str | None:
-    """Whether a joint position lies far outside its range: degrees for radians, millimetres for metres."""
+def unit_suspicion(
+    name: str, values: Array, low: float, high: float, unit: str, declared: str = ""
+) -> tuple[str, bool] | None:
+    """Whether a joint position was taken for another unit than it is in (degrees for radians, millimetres for metres): a
+    sentence, and whether it is certain enough to stop. ``values`` (T,) are in ``unit``; they were ``declared`` to be in
+    another.
+    """
     reach = max(abs(low), abs(high))
+    if not (np.isfinite(reach) and reach > 0):
+        return None
     seen = float(np.max(np.abs(values)))
-    if np.isfinite(reach) and reach > 0 and seen > 3 * reach:
-        return f"{name}: reaches {seen:.4g} {unit}, the joint only {reach:.4g}: another unit (deg, mm)?"
+    kind = UNITS[unit][0]
+    size = UNITS.get(declared, UNITS[unit])[1]
+    fits = {
+        u: seen * s / size
+        for u, (k, s) in UNITS.items()
+        if k == kind and u not in (declared or unit, "turn", "in", "cm")
+    }
+    if seen > FAR * reach:
+        likely = [u for u, s in fits.items() if LIVELY * reach <= s <= 1.2 * reach]
+        cure = f": say unit: {' or '.join(likely)}" if likely else ""
+        return (
+            f"{name}: reaches {seen:.4g} {unit}, the joint only {reach:.4g}; not in {declared or unit!r}?{cure}",
+            True,
+        )
+    if declared and declared != unit and float(np.ptp(values)) < STILL * reach:
+        likely = [u for u, s in fits.items() if LIVELY * reach <= s <= 1.2 * reach]
+        if likely:
+            return (
+                f"{name}: moves by {np.ptp(values):.2g} {unit} if it is in {declared!r}, though the joint reaches "
+                f"{reach:.3g}: say unit: {' or '.join(likely)}"
+            ), True
     return None
 
 
-def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> str | None:
-    """Whether a measured speed is the derivative of its position: sign and scale."""
+def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> tuple[str, bool] | None:
+    """Whether a measured speed is the derivative of its position, in sign and scale: a sentence, and whether it is certain
+    (a ratio between two units) enough to stop."""
     derived = np.gradient(position, step_s)
     a, b = speed - speed.mean(), derived - derived.mean()
     power = float(b @ b)
@@ -74,9 +107,13 @@ def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> 
     correlation = float(a @ b / np.sqrt(power * float(a @ a)))
     slope = float(a @ b / power)
     if correlation < -0.5:
-        return f"{name}: runs against the change of its position (correlation {correlation:.2f}): a swapped sign?"
+        return (
+            f"{name}: runs against the change of its position (correlation {correlation:.2f}): a swapped sign?",
+            False,
+        )
     if correlation > 0.8 and not 0.5 < slope < 2.0:
-        return f"{name}: is {slope:.3g} times the change of its position: another unit?"
+        certain = correlation > 0.9 and any(abs(slope / r - 1) < 0.1 for r in RATIOS)
+        return f"{name}: is {slope:.3g} times the change of its position: another unit of one of the two?", certain
     return None
 
 

@@ -1,4 +1,4 @@
-"""Units as people write them, and the factor to ours (m, kg, s, rad, N, V)."""
+"""Units as people write them, and the factor to ours (m, kg, s, rad, N, V, A)."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "s": ("time", 1.0),
     "ms": ("time", 1e-3),
     "us": ("time", 1e-6),
+    "µs": ("time", 1e-6),
+    "μs": ("time", 1e-6),
     "ns": ("time", 1e-9),
     "min": ("time", 60.0),
     "rad": ("angle", 1.0),
@@ -36,6 +38,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "N.m": ("torque", 1.0),
     "mN.m": ("torque", 1e-3),
     "kgf.cm": ("torque", 0.0980665),
+    "A": ("current", 1.0),
+    "mA": ("current", 1e-3),
     "V": ("voltage", 1.0),
     "mV": ("voltage", 1e-3),
 }
@@ -48,6 +52,11 @@ def factor(unit: str, expected: str, where: str) -> float:
     kind, size = UNITS[unit]
     wanted, base = UNITS[expected]
     if kind != wanted:
+        if kind == "current" and wanted in ("torque", "force"):
+            raise MeasurementError(
+                f"{where}: a current is a {wanted} only through the motor's gain: write 'unit: {expected}, scale: GAIN' "
+                f"with the {expected} of one {unit}"
+            )
         fitting = ", ".join(u for u, (k, _) in UNITS.items() if k == wanted)
         raise MeasurementError(f"{where}: unit {unit!r} is a unit of {kind}; expected one of {wanted}: {fitting}")
     return size / base

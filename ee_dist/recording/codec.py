@@ -73,6 +73,7 @@ def hypothesis_message(record: HypothesisRecord) -> Any:
         rank=record.rank,
         error=record.error,
         final=bool(record.final),
+        stage=record.stage,
         terms=terms,
         text="; ".join(_text(t) for t in terms),
     )
@@ -164,7 +165,7 @@ class TrialBuilder:
 
 def hypothesis_record(message: Any) -> HypothesisRecord:
     m = message
-    return HypothesisRecord(m.pass_index, m.generation, m.rank, _terms(m.terms), m.error, m.final)
+    return HypothesisRecord(m.pass_index, m.generation, m.rank, _terms(m.terms), m.error, m.final, m.stage)
 
 
 def generation_record(message: Any) -> GenerationRecord:

@@ -8,12 +8,13 @@ from pathlib import Path
 from google.protobuf.message import DecodeError
 
 from ee_dist.recording import codec, schemas, topics
-from ee_dist.recording.contents import Contents, read_contents
+from ee_dist.recording.contents import Contents, damage, read_contents
 from ee_dist.recording.errors import RecordingError
-from ee_dist.recording.records import HARDWARE, GenerationRecord, HypothesisRecord, RunRecord, TrialRecord
-from ee_dist.robots.serial import RobotFormatError, robot_from_json
-
-Record = TrialRecord | HypothesisRecord | GenerationRecord
+from ee_dist.recording.records import HARDWARE, HypothesisRecord, RunRecord, TrialRecord
+from ee_dist.recording.upgrade import Record, upgraded
+from ee_dist.robots.model import RobotError
+from ee_dist.robots.plausible import checked
+from ee_dist.robots.serial import robot_from_json
 
 
 def read_run(path: str | Path) -> RunRecord:
@@ -27,15 +28,19 @@ def read_run(path: str | Path) -> RunRecord:
 
 def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
     """The run, and its records in the order in which they were written. Raises RecordingError as ``read_run`` does."""
-    contents, metadata, status = _read(path)
+    contents, version, metadata, status = _read(path)
+    if contents.damaged:
+        raise damage(path, f"attachment {contents.damaged[0]!r:.60}")
     robot = contents.attachments.pop(topics.ROBOT_FILE, None)
     if robot is None:
         raise RecordingError(f"{path}: cut off before its robot was recorded; nothing can be recovered")
     try:
-        run = RunRecord(robot_from_json(robot), metadata, contents.attachments)
-    except (RobotFormatError, UnicodeError) as error:
+        run = RunRecord(checked(robot_from_json(robot)), metadata, contents.attachments)
+    except (RobotError, UnicodeError, RecursionError) as error:
         raise RecordingError(f"{path}: the attachment {topics.ROBOT_FILE} is not a robot of ours: {error}") from error
     records = list(_records(path, contents))
+    if version == topics.FIRST_FORMAT:
+        records = upgraded(records)
     for record in records:
         if isinstance(record, TrialRecord):
             run.trials.append(record)
@@ -48,7 +53,10 @@ def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
 
 
 def read_logs(path: str | Path) -> list[TrialRecord]:
-    """The hardware trials of a recording, in the order of the file. Raises RecordingError if there is none."""
+    """The hardware trials of a recording, in the order of the file. Raises RecordingError if there is none.
+
+    They have checksums of their own: a damaged robot or settings beside them do no harm here.
+    """
     path = Path(path)
     contents = _read(path)[0]
     found = [r for r in _records(path, contents) if isinstance(r, TrialRecord) and r.source == HARDWARE]
@@ -57,8 +65,8 @@ def read_logs(path: str | Path) -> list[TrialRecord]:
     return found
 
 
-def _read(path: Path) -> tuple[Contents, dict[str, str], dict[str, str]]:
-    """The contents, the metadata of the run and its status."""
+def _read(path: Path) -> tuple[Contents, str, dict[str, str], dict[str, str]]:
+    """The contents, the version of the format, the metadata of the run and its status."""
     contents = read_contents(path)
     merged: dict[str, dict[str, str]] = {}
     for record in contents.metadata:
@@ -66,9 +74,11 @@ def _read(path: Path) -> tuple[Contents, dict[str, str], dict[str, str]]:
     version = merged.get(topics.FORMAT_RECORD, {}).get("format")
     if version is None:
         raise RecordingError(f"{path}: cut off before anything was recorded")
-    if version != topics.FORMAT:
-        raise RecordingError(f"{path}: recorded in format {version}; this version reads format {topics.FORMAT}")
-    return contents, merged.get(topics.RUN_RECORD, {}), merged.get(topics.STATUS_RECORD, {})
+    if version not in (topics.FIRST_FORMAT, topics.FORMAT):
+        raise RecordingError(
+            f"{path}: recorded in format {version}; this version reads formats {topics.FIRST_FORMAT} and {topics.FORMAT}"
+        )
+    return contents, version, merged.get(topics.RUN_RECORD, {}), merged.get(topics.STATUS_RECORD, {})
 
 
 def _records(path: Path, contents: Contents) -> Iterator[Record]:

@@ -9,15 +9,23 @@ from ee_dist.engines.drivers import Commands, Network
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import SensorLog
 
-HARDWARE, PREDICTION = "hardware", "prediction"
+HARDWARE, PREDICTION, HINDSIGHT = "hardware", "prediction", "hindsight"
+"""Where a trial was: on hardware; on the model that its controller was chosen on, before it; on the model that was found
+from it, afterwards."""
 REPAIR, DIAGNOSIS = "repair", "diagnosis"
+EVOLVING, EVOLVED, POLISHED, PRUNED = "evolving", "evolved", "polished", "pruned"
+"""How far a hypothesis has come: best of a generation, one of the last population, after its last step to a better
+neighbour, after terms that explain nothing were dropped."""
+STAGES = (EVOLVING, EVOLVED, POLISHED, PRUNED)
 
 
 @dataclass(frozen=True, eq=False)
 class TrialRecord:
-    """One run of a controller: on hardware, or what a model predicted for the hardware trial of the same index.
+    """One run of a controller: on hardware, or what a model said about the hardware trial of the same index.
 
-    ``name`` is for people ("intact", "after the change", "trial 1"). ``believed`` is the hypothesis of a prediction.
+    A PREDICTION was made before the trial, by the model that the controller was chosen on; HINDSIGHT is the trial on the
+    model of the diagnosis that followed it. ``name`` is for people ("intact", "after the change", "trial 1").
+    ``believed`` is the hypothesis behind a prediction or hindsight.
     """
 
     index: int
@@ -32,7 +40,8 @@ class TrialRecord:
 class HypothesisRecord:
     """A hypothesis with its error (lower is better).
 
-    ``rank`` 0 is the best of its generation; ``final`` marks those of the last.
+    ``rank`` 0 is the best of its generation. ``stage`` is one of STAGES. ``final`` marks the one of each pass that the
+    loop believed and acted on; the others were on the way to it.
     """
 
     pass_index: int
@@ -41,6 +50,7 @@ class HypothesisRecord:
     terms: Hypothesis
     error: float
     final: bool = False
+    stage: str = EVOLVING
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+from google.protobuf import descriptor_pb2, descriptor_pool, duration_pb2, message_factory, timestamp_pb2
 
 _FOLDER = Path(__file__).parent
 _FILES = ("ee_dist.proto", "foxglove.proto")
@@ -66,7 +66,8 @@ def _add_field(message: descriptor_pb2.DescriptorProto, package: str, found: re.
 
 def _load() -> dict[str, Any]:
     pool = descriptor_pool.DescriptorPool()
-    pool.AddSerializedFile(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    for known in (timestamp_pb2, duration_pb2):
+        pool.AddSerializedFile(known.DESCRIPTOR.serialized_pb)
     found: dict[str, Any] = {}
     for name in _FILES:
         file = parse_proto(name, (_FOLDER / name).read_text(encoding="utf-8"))
@@ -89,3 +90,5 @@ Hypothesis: Any = MESSAGES["ee_dist.Hypothesis"]
 Generation: Any = MESSAGES["ee_dist.Generation"]
 FrameTransform: Any = MESSAGES["foxglove.FrameTransform"]
 FrameTransforms: Any = MESSAGES["foxglove.FrameTransforms"]
+SceneEntity: Any = MESSAGES["foxglove.SceneEntity"]
+SceneUpdate: Any = MESSAGES["foxglove.SceneUpdate"]

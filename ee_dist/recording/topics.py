@@ -6,7 +6,9 @@ topic                          message                   one per
 ``/hardware/trial``            ee_dist.Trial             hardware trial: names, units, driver; ahead of its rows
 ``/hardware/rows``             ee_dist.Row               row of its sensor log
 ``/hardware/transforms``       foxglove.FrameTransforms  25 Hz picture of its parts, ``floor`` to ``hardware/<part>``
-``/prediction/...``            the same                  what a model predicted, ``believed`` says which
+``/hardware/scene``            foxglove.SceneUpdate      trial: the solids of its parts, in their frames
+``/prediction/...``            the same                  what the model said before the trial, ``believed`` says which
+``/hindsight/...``             the same                  the trial on the model of the diagnosis that followed it
 ``/repair/generation``         ee_dist.Generation        generation of a repair pass
 ``/diagnosis/generation``      ee_dist.Generation        generation of a diagnosis pass
 ``/diagnosis/hypothesis``      ee_dist.Hypothesis        hypothesis, with its error
@@ -23,17 +25,21 @@ reached its end) and attachments (``robot.json``, the robot; those of the run).
 
 from __future__ import annotations
 
-from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
+from ee_dist.recording.records import DIAGNOSIS, HARDWARE, HINDSIGHT, PREDICTION, REPAIR
 
 PROFILE = "ee_dist"
 LIBRARY = "ee_dist recording 1"
 """Fixed, so that identical records give identical bytes under any version of the mcap library."""
-FORMAT = "1"
+FORMAT = "2"
+FIRST_FORMAT = "1"
+"""Of before: its final hypotheses were a last population, and most of its predictions were made after their trial."""
 
-SOURCES = (HARDWARE, PREDICTION)
+SOURCES = (HARDWARE, PREDICTION, HINDSIGHT)
 PHASES = (REPAIR, DIAGNOSIS)
 
 FORMAT_RECORD, RUN_RECORD, STATUS_RECORD = "ee_dist", "run", "status"
+CHECKSUM = "crc32"
+"""Entry of a metadata record: checksum of the others, since MCAP has one for attachments and chunks alone."""
 ROBOT_FILE = "robot.json"
 FLOOR_FRAME = "floor"
 HYPOTHESIS_TOPIC = f"/{DIAGNOSIS}/hypothesis"
@@ -49,6 +55,10 @@ def rows_topic(source: str) -> str:
 
 def transforms_topic(source: str) -> str:
     return f"/{source}/transforms"
+
+
+def scene_topic(source: str) -> str:
+    return f"/{source}/scene"
 
 
 def generation_topic(phase: str) -> str:

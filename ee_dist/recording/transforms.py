@@ -18,24 +18,26 @@ from ee_dist.recording.schemas import FrameTransform, FrameTransforms
 from ee_dist.recording.topics import FLOOR_FRAME, part_frame
 from ee_dist.robots.kinematics import Array, part_poses
 from ee_dist.robots.model import Robot
+from ee_dist.trials.motion import base_poses, joint_positions
 
 PERIOD_NS = SECOND_NS // 25
 
 
 def transform_messages(record: TrialRecord, robot: Robot, start_ns: int) -> Iterator[tuple[int, Any]]:
-    """(log time in ns, FrameTransforms) of the parts, about 25 a second; nothing where the log does not tell poses.
+    """(log time in ns, FrameTransforms) of the parts, about 25 a second.
 
-    A prediction is drawn as the model that it comes from: a part that its hypothesis says is lost does not appear.
+    Joints that the log does not hold are taken from its position sensors; a body whose place was not measured stays
+    where it starts. A prediction is drawn as the model that it comes from, without parts that its hypothesis says are lost.
     """
     log = record.log
-    base = log.base_pose
-    if base is None and not robot.free_base:
-        base = np.tile([*robot.start_position_m, *robot.start_rotation], (len(log), 1)).astype(float)
-    if base is None or log.joints is None or log.motor_names != robot.motor_names or not len(log):
+    if not len(log):
         return
     offsets = offsets_ns(log.times_s)
     rows = _thinned(offsets)
-    poses = part_poses(_model(record, robot), base[rows], log.joints[rows])
+    # A sensor may say infinity; such a pose gets no frame below.
+    with np.errstate(invalid="ignore", over="ignore"):
+        base, joints = base_poses(robot, log)[rows], joint_positions(robot, log)[rows]
+        poses = part_poses(model_of(record, robot), base, joints)
     frames = {part_frame(record.source, name): _single(pose) for name, pose in poses.items()}
     for k, row in enumerate(rows):
         log_time = start_ns + int(offsets[row])
@@ -58,7 +60,8 @@ def transform_messages(record: TrialRecord, robot: Robot, start_ns: int) -> Iter
         )
 
 
-def _model(record: TrialRecord, robot: Robot) -> Robot:
+def model_of(record: TrialRecord, robot: Robot) -> Robot:
+    """The robot to draw: under what a prediction believes."""
     try:
         return apply(robot, record.believed)
     except EffectError:  # an effect of a plugin that is not loaded: draw the robot as it was

@@ -18,9 +18,11 @@ from mcap_protobuf.schema import register_schema
 
 from ee_dist.recording import codec, schemas, topics
 from ee_dist.recording.clock import RunClock, offsets_ns
+from ee_dist.recording.contents import with_checksum
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.records import GenerationRecord, HypothesisRecord, TrialRecord
-from ee_dist.recording.transforms import transform_messages
+from ee_dist.recording.scene import scene_message
+from ee_dist.recording.transforms import model_of, transform_messages
 from ee_dist.robots.model import Robot
 from ee_dist.robots.serial import robot_to_json
 
@@ -64,11 +66,11 @@ class RunWriter:
                 f"{self.path.parent}: no recording can be written there ({error.strerror}); name a writable folder"
             ) from error
         self._open = True
-        self._mcap: Any = Writer(self._file, compression=CompressionType.ZSTD)
+        self._mcap: Any = Writer(self._file, compression=CompressionType.ZSTD, enable_data_crcs=True)
         with self._writing():
             self._mcap.start(profile=topics.PROFILE, library=topics.LIBRARY)
-            self._mcap.add_metadata(topics.FORMAT_RECORD, {"format": topics.FORMAT})
-            self._mcap.add_metadata(topics.RUN_RECORD, dict(sorted(metadata.items())))
+            self._note(topics.FORMAT_RECORD, {"format": topics.FORMAT})
+            self._note(topics.RUN_RECORD, metadata)
             self._attach(topics.ROBOT_FILE, robot_to_json(robot).encode())
             for name, data in sorted(attachments.items()):
                 self._attach(name, data)
@@ -94,6 +96,10 @@ class RunWriter:
                 zip(offsets.tolist(), codec.row_messages(number, record.log), strict=True)
             ):
                 self._mcap.add_message(channel, start + offset, data, start + offset, row)
+            length = int(offsets.max(initial=0))
+            if len(record.log):
+                solids = scene_message(model_of(record, self._robot), record.source, start, length)
+                self._add(topics.scene_topic(record.source), solids, start)
             for log_time, message in transform_messages(record, self._robot, start):
                 self._add(topics.transforms_topic(record.source), message, log_time)
             self._save()
@@ -131,9 +137,9 @@ class RunWriter:
         _check_texts(metadata)
         with self._writing():
             if metadata:
-                self._mcap.add_metadata(topics.RUN_RECORD, dict(sorted(metadata.items())))
+                self._note(topics.RUN_RECORD, metadata)
             self._mcap.flush()
-            self._mcap.add_metadata(topics.STATUS_RECORD, {"complete": "true" if complete else "false"})
+            self._note(topics.STATUS_RECORD, {"complete": "true" if complete else "false"})
             self._mcap.finish()
             self._file.flush()
             os.fsync(self._file.fileno())
@@ -180,6 +186,9 @@ class RunWriter:
         self._mcap.flush()
         self._file.flush()
         os.fsync(self._file.fileno())
+
+    def _note(self, name: str, metadata: Mapping[str, str]) -> None:
+        self._mcap.add_metadata(name, with_checksum(name, dict(sorted(metadata.items()))))
 
     def _attach(self, name: str, data: bytes) -> None:
         self._mcap.add_attachment(0, 0, name, _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream"), data)

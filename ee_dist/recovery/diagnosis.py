@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +13,14 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.evaluation.jobs import Evaluator, Job, Reduction
 from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
-from ee_dist.recording.records import DIAGNOSIS, GenerationRecord, HypothesisRecord
+from ee_dist.recording.records import DIAGNOSIS, EVOLVED, POLISHED, PRUNED, GenerationRecord, HypothesisRecord
 from ee_dist.recovery.genome import LENGTH, decode, first_hypotheses, neighbours
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import SensorLog
 
-FINAL_RANKS = 10
+LAST_RANKS = 10
 """How many of the last population's different hypotheses are recorded."""
 
 
@@ -58,6 +59,44 @@ class Judge:
         return found.mean(axis=1)
 
 
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What a diagnosis came to: the hypothesis to act on and its error; the genome joins the database of later passes."""
+
+    genome: Genomes
+    hypothesis: Hypothesis
+    error: float
+
+
+def believe(
+    judge: Judge,
+    database: Sequence[Genomes],
+    budget: Budget,
+    polishing: int,
+    parsimony: float,
+    seed: np.random.SeedSequence,
+    observer: Observer,
+    pass_index: int,
+) -> Belief:
+    """A whole diagnosis: evolve, polish, prune (the last two may be 0: left out), and tell the observer of each stage.
+
+    The last stage is told as the final one: it is what the loop acts on.
+    """
+    genome, error = diagnose(judge, database, budget, seed, observer, pass_index)
+    hypothesis = judge.hypothesis(genome)
+    told = [HypothesisRecord(pass_index, budget.generations, 0, hypothesis, error, stage=EVOLVED)]
+    if polishing:
+        genome, error = polish(judge, genome, error, polishing)
+        hypothesis = judge.hypothesis(genome)
+        told.append(replace(told[-1], terms=hypothesis, error=error, stage=POLISHED))
+    if parsimony:
+        hypothesis, error = prune(judge, hypothesis, error, parsimony)
+        told.append(replace(told[-1], terms=hypothesis, error=error, stage=PRUNED))
+    # The best that evolved was told with its population.
+    observer.hypotheses([*told[1:-1], replace(told[-1], final=True)])
+    return Belief(genome, hypothesis, error)
+
+
 def diagnose(
     judge: Judge,
     database: Sequence[Genomes],
@@ -92,7 +131,7 @@ def diagnose(
         )
         best = judge.hypothesis(ga.genomes[0])
         observer.hypotheses([HypothesisRecord(pass_index, ga.generation - 1, 0, best, float(-ga.scores[0]))])
-    observer.hypotheses(_final(ga, judge, pass_index))
+    observer.hypotheses(_last_population(ga, judge, pass_index))
     return ga.genomes[0].copy(), float(-ga.scores[0])
 
 
@@ -127,14 +166,14 @@ def prune(judge: Judge, hypothesis: Hypothesis, error: float, parsimony: float) 
     return hypothesis, error
 
 
-def _final(ga: GeneticAlgorithm, judge: Judge, pass_index: int) -> list[HypothesisRecord]:
+def _last_population(ga: GeneticAlgorithm, judge: Judge, pass_index: int) -> list[HypothesisRecord]:
     different: dict[Hypothesis, float] = {}
     for genome, score in zip(ga.genomes, ga.scores, strict=True):
         different.setdefault(judge.hypothesis(genome), float(-score))
-        if len(different) == FINAL_RANKS:
+        if len(different) == LAST_RANKS:
             break
     last = ga.generation - 1
     return [
-        HypothesisRecord(pass_index, last, rank, terms, error, final=True)
+        HypothesisRecord(pass_index, last, rank, terms, error, stage=EVOLVED)
         for rank, (terms, error) in enumerate(different.items())
     ]

@@ -14,9 +14,8 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.evolution.ga import Budget, Genomes
-from ee_dist.recording.records import HARDWARE, PREDICTION, TrialRecord
-from ee_dist.recovery.diagnosis import Judge, diagnose, polish, prune
-from ee_dist.recovery.genome import decode
+from ee_dist.recording.records import HARDWARE, HINDSIGHT, PREDICTION, TrialRecord
+from ee_dist.recovery.diagnosis import Judge, believe
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.recovery.repair import repair
@@ -93,11 +92,19 @@ def recover(
     best, expected = repair(robot, [], evaluator, plan.repair, plan.steps, repair_seeds[0], observer, 0)
     controllers: list[Network] = [best]
     result.expected_m.append(expected)
+
+    def say(index: int, name: str, source: str, driver: Network, hypothesis: Hypothesis) -> None:
+        """Record what the model under this hypothesis does in the trial of that index."""
+        rollout = Rollout(apply(robot, hypothesis), driver, plan.steps, pose=True)
+        (said,) = evaluator.evaluate([Job(rollout, Whole())])
+        observer.trial(TrialRecord(index, name, source, driver, said, hypothesis))
+
+    say(0, "intact", PREDICTION, best, ())
     log = intact.trial(best, plan.steps)
     result.intact_m = log.travel_m
     observer.trial(TrialRecord(0, "intact", HARDWARE, best, log))
-    _predict(0, "intact", robot, best, (), evaluator, plan.steps, observer)
 
+    say(1, "after the change", PREDICTION, best, ())
     log = changed.trial(best, plan.steps)
     result.after_m = log.travel_m
     observer.trial(TrialRecord(1, "after the change", HARDWARE, best, log))
@@ -105,16 +112,13 @@ def recover(
     believed: list[Genomes] = []
     for k in range(passes):
         judge = Judge(robot, trials, metric, evaluator)
-        genome, error = diagnose(judge, believed, plan.diagnosis, diagnosis_seeds[k], observer, k)
-        genome, error = polish(judge, genome, error, plan.polish)
-        hypothesis = decode(genome, robot)
-        believed.append(genome)
-        if plan.parsimony:
-            hypothesis, error = prune(judge, hypothesis, error, plan.parsimony)
+        belief = believe(judge, believed, plan.diagnosis, plan.polish, plan.parsimony, diagnosis_seeds[k], observer, k)
+        hypothesis = belief.hypothesis
+        believed.append(belief.genome)
         result.hypotheses.append(hypothesis)
-        result.errors.append(error)
+        result.errors.append(belief.error)
         name = "after the change" if k == 0 else f"trial {k}"
-        _predict(k + 1, name, robot, trials[-1][0], hypothesis, evaluator, plan.steps, observer)
+        say(k + 1, name, HINDSIGHT, trials[-1][0], hypothesis)
 
         model = apply(robot, hypothesis)
         known = controllers if k >= min(plan.restarts, passes - 1) else controllers[:1]
@@ -123,26 +127,10 @@ def recover(
         )
         controllers.append(best)
         result.expected_m.append(expected)
+        say(k + 2, f"trial {k + 1}", PREDICTION, best, hypothesis)
         log = changed.trial(best, plan.steps)
         result.trials_m.append(log.travel_m)
         observer.trial(TrialRecord(k + 2, f"trial {k + 1}", HARDWARE, best, log))
         trials.append((best, log))
-    _predict(passes + 1, f"trial {passes}", robot, best, result.hypotheses[-1], evaluator, plan.steps, observer)
     result.controllers = controllers
     return result
-
-
-def _predict(
-    index: int,
-    name: str,
-    robot: Robot,
-    driver: Network,
-    hypothesis: Hypothesis,
-    evaluator: Evaluator,
-    steps: int,
-    observer: Observer,
-) -> None:
-    """Record what the model under this hypothesis does in the trial of that index."""
-    rollout = Rollout(apply(robot, hypothesis), driver, steps, pose=True)
-    (log,) = evaluator.evaluate([Job(rollout, Whole())])
-    observer.trial(TrialRecord(index, name, PREDICTION, driver, log, hypothesis))

@@ -16,6 +16,7 @@ from functools import cache
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
 from ee_dist.robots.model import Robot, RobotError
+from ee_dist.robots.untrusted import UntrustedError, json_of
 
 VERSION = 1
 _NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
@@ -48,9 +49,9 @@ def robot_to_json(robot: Robot) -> str:
 def robot_from_json(text: str | bytes) -> Robot:
     """The robot that ``robot_to_json`` was given. Raises RobotFormatError."""
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise RobotFormatError(f"robot: not JSON ({error})") from error
+        data = json_of(text)
+    except UntrustedError as error:
+        raise RobotFormatError(f"robot: {error}") from error
     return robot_from_dict(data)
 
 

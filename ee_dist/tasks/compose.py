@@ -6,12 +6,14 @@ import importlib
 import re
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
+from hydra._internal.utils import get_args_parser
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.config import Config, ConfigError, check_keys, groups_of, one_of
+from ee_dist.effects.catalogue import find, load_plugin
+from ee_dist.tasks.config import Config, ConfigError, Handling, check_keys, groups_of, one_of
 
 TASKS = (
     "recover",
@@ -27,7 +29,9 @@ TASKS = (
     "robot",
     "export",
 )
-_SCENARIO = re.compile(r"^(\+{0,2}scenario)=([0-9, ]+)$")
+_SWEEP = ("-m", "--multirun")
+_RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
+_SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
 
 
 def quoted(arguments: list[str]) -> list[str]:
@@ -40,7 +44,23 @@ def quoted(arguments: list[str]) -> list[str]:
         numbers = ",".join(f"'{n.strip()}'" for n in match.group(2).split(",") if n.strip())
         return f"{match.group(1)}={numbers}"
 
-    return [quote(a) for a in arguments]
+    # The parser of the command line takes flags only where they stand together.
+    sweep = [a for a in arguments if a in _SWEEP]
+    where = "hydra.sweep.dir" if sweep else "hydra.run.dir"
+    resumed = [m.group(1) for a in arguments if (m := _RESUME.match(a))]
+    arguments = [*arguments, *(f"{where}={folder}" for folder in resumed)]
+    return [*sweep, *(quote(a) for a in arguments if a not in _SWEEP)]
+
+
+def check_flags(arguments: list[str]) -> None:
+    """Raises ConfigError for a flag that there is not: the parser itself would print eight lines."""
+
+    def complain(message: str) -> NoReturn:
+        raise ConfigError(f"{message}; settings are written key=value, and --help lists them")
+
+    parser = get_args_parser()
+    parser.error = complain  # type: ignore[method-assign]
+    parser.parse_args(arguments)
 
 
 def folder_name(overrides: str) -> str:
@@ -66,18 +86,31 @@ def task_module(name: str) -> ModuleType:
     return importlib.import_module(f"ee_dist.tasks.{name}_" if name == "import" else f"ee_dist.tasks.{name}")
 
 
+_HANDLING = Handling.__dataclass_fields__
+
+
+def handling(composed: DictConfig) -> Handling:
+    """How the folder of the run is to be treated. Raises ConfigError."""
+    found: Handling = _typed(Handling, OmegaConf.create({k: composed[k] for k in _HANDLING if k in composed}), "")
+    return found
+
+
 def settings(composed: DictConfig) -> tuple[Config, ModuleType, Any]:
     """Checked settings, the module of the task and its options. Raises ConfigError in one line."""
-    tree = {str(k): v for k, v in composed.items() if k != "hydra"}
+    tree = {str(k): v for k, v in composed.items() if k != "hydra" and k not in _HANDLING}
     task = tree.pop("task")
-    check_keys("", tree, Config)
+    check_keys("", tree, Config, tuple(_HANDLING))
     for name, kind in groups_of(Config).items():
         if isinstance(tree.get(name), DictConfig):
             check_keys(name, tree[name], kind)
     module = task_module(str(task.name))
     check_keys("task", task, module.Options)
     config = _typed(Config, OmegaConf.create(tree), "")
+    for path in config.plugins:
+        load_plugin(path)
     options = _typed(module.Options, task, "task.")
+    for text in getattr(options, "without", None) or ():
+        find(str(text).partition("@")[0])
     return config, module, options
 
 

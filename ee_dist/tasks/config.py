@@ -19,6 +19,12 @@ class ConfigError(ValueError):
     """A setting that cannot be: which one, why, and what would be right."""
 
 
+def within(what: str, value: float, low: float, high: float) -> None:
+    """Raises ConfigError outside of [low, high]: memory and time are taken only for what can come to an end."""
+    if not low <= value <= high:
+        raise ConfigError(f"{what}={value}: must be from {low:,} to {high:,}".replace(",", " "))
+
+
 def one_of(what: str, value: str, allowed: tuple[str, ...]) -> str:
     """The value, if it is allowed. Raises ConfigError with the nearest names."""
     if value not in allowed:
@@ -43,8 +49,7 @@ class EngineConfig:
 
     def __post_init__(self) -> None:
         one_of("engine", self.name, ENGINES)
-        if self.threads < 0:
-            raise ConfigError(f"engine.threads={self.threads}: must be 0 (automatic) or more")
+        within("engine.threads", self.threads, 0, 1024)
 
 
 @dataclass
@@ -56,9 +61,8 @@ class EvaluatorConfig:
 
     def __post_init__(self) -> None:
         one_of("evaluator", self.name, EVALUATORS)
-        for key in ("workers", "chunk"):
-            if getattr(self, key) < 0:
-                raise ConfigError(f"evaluator.{key}={getattr(self, key)}: must be 0 (automatic) or more")
+        within("evaluator.workers", self.workers, 0, 100_000)
+        within("evaluator.chunk", self.chunk, 0, 1_000_000)
 
 
 @dataclass
@@ -85,6 +89,13 @@ class MetricConfig:
             raise ConfigError(str(error)) from None
 
 
+_MOST = {
+    "population": 100_000, "generations": 100_000, "diagnosis_population": 100_000, "diagnosis_generations": 100_000,
+    "crossovers": 25_000, "compensating_trials": 1000, "steps": 1_000_000, "polish": 1000, "restarts": 1000,
+}  # fmt: skip
+"""Far beyond use, and still within the memory of a machine and the time of a cluster."""
+
+
 @dataclass
 class BudgetConfig:
     name: str = "paper"
@@ -103,6 +114,8 @@ class BudgetConfig:
     related: float = 1.0
 
     def __post_init__(self) -> None:
+        for name, most in _MOST.items():
+            within(f"budget.{name}", getattr(self, name), 0, most)
         self.plan()
 
     def plan(self) -> Plan:
@@ -129,7 +142,9 @@ class ScenarioConfig:
     changes: list[dict[str, Any]] = field(default_factory=list)
 
     def hidden(self) -> Hypothesis:
-        """What happens to the physical robot. Raises EffectError for an unknown effect or value."""
+        """What happens to the physical robot. Raises EffectError for an unknown effect or value, ConfigError without one."""
+        if self.number < 0 and not self.changes:
+            raise ConfigError("scenario: neither one of the scenarios, such as +scenario=8, nor scenario.changes=[...]")
         return tuple(from_dict(entry) for entry in self.changes)
 
 
@@ -159,8 +174,20 @@ class Config:
     def __post_init__(self) -> None:
         if not 0 <= self.seed < 2**63:
             raise ConfigError(f"seed={self.seed}: must be a whole number from 0 to 2^63 - 1")
+        if self.metric.name == "rolling_mean" and self.metric.header > self.budget.steps:
+            raise ConfigError(
+                f"metric.header={self.metric.header}: longer than a trial; must be at most budget.steps ({self.budget.steps})"
+            )
         if not 0.0 <= self.noise <= 1.0:
             raise ConfigError(f"noise={self.noise}: must be a share of the channels' range, from 0 to 1")
+
+
+@dataclass
+class Handling:
+    """How the folder of a run is treated. Decides nothing of the result, so it is not part of the recorded settings."""
+
+    overwrite: bool = False
+    resume: str | None = None
 
 
 def unknown_key(owner: str, key: str, known: tuple[str, ...], otherwise: str = "") -> ConfigError:
@@ -181,7 +208,7 @@ def groups_of(kind: Any) -> dict[str, Any]:
 def known_settings(kind: Any = Config, prefix: str = "") -> tuple[str, ...]:
     """Names of all settings but those of a task, with their owners: ``seed``, ``budget.population``."""
     groups = groups_of(kind)
-    names: list[str] = []
+    names = [f.name for f in fields(Handling)] if kind is Config else []
     for f in fields(kind):
         names.append(prefix + f.name)
         if f.name in groups:
@@ -189,9 +216,9 @@ def known_settings(kind: Any = Config, prefix: str = "") -> tuple[str, ...]:
     return tuple(names)
 
 
-def check_keys(owner: str, given: Any, kind: type) -> None:
-    """Raise ConfigError for keys that the dataclass does not have."""
-    known = tuple(f.name for f in fields(kind))
+def check_keys(owner: str, given: Any, kind: type, others: tuple[str, ...] = ()) -> None:
+    """Raise ConfigError for keys that the dataclass does not have; ``others`` are known beside its own."""
+    known = (*(f.name for f in fields(kind)), *others)
     for key in given:
         if str(key) not in known:
             raise unknown_key(owner, str(key), known)

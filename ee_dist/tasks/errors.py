@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import os
 import re
+import traceback
+from pathlib import Path
 
 from hydra.errors import HydraException
 
-from ee_dist.effects.catalogue import EffectError
+from ee_dist.effects.catalogue import EffectError, loaded_plugins
 from ee_dist.engines.contract import EngineError
-from ee_dist.evaluation.ray_actors import EvaluatorError
+from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, abandon_ray
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError, known_settings, unknown_key
+from ee_dist.tasks.help import options_with
 from ee_dist.trials.excitation import ExcitationError
 from ee_dist.trials.log import LogError
 
+__all__ = ("USER_ERRORS", "RayLostError", "abandon_evaluators", "defect", "hydra_message", "unasked_end")
+
+_LONGEST = 300
+"""Characters of an error that nobody foresaw: some libraries put whole arrays into theirs."""
 USER_ERRORS = (
     ConfigError,
     EffectError,
@@ -25,6 +33,46 @@ USER_ERRORS = (
     RobotError,
     ExcitationError,
 )
+
+
+def abandon_evaluators() -> None:
+    """End what this process started beside itself, for one that ends without more ado."""
+    abandon_ray()
+
+
+def unasked_end(error: BaseException) -> str:
+    """A run that was ended from within: by code of the user's that calls ``sys.exit``, or for want of memory."""
+    where = _of_plugin(error)
+    if isinstance(error, MemoryError):
+        return (
+            f"{where}not enough memory for this; ask for less at a time: a smaller population, fewer steps or workers"
+        )
+    stop = error.code if isinstance(error, SystemExit) else error
+    return (
+        f"{where}sys.exit({stop!r}) was called in the middle of the run; code of your own must raise an error instead"
+    )
+
+
+def defect(error: Exception, out: Path) -> str:
+    """An error that nobody foresaw in one line; its trace goes into ``out/error.txt``."""
+    said = " ".join(f"{type(error).__name__}: {error}".split())[:_LONGEST]
+    trace = "".join(traceback.format_exception(error))
+    path = out / "error.txt"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        path.write_text(trace, encoding="utf-8")
+    except OSError:
+        return said
+    whose = _of_plugin(error)
+    blame = "" if whose else "; this is a defect of ee_dist: please report it"
+    return f"{whose}{said}{blame} (the trace is in {os.path.relpath(path)})"
+
+
+def _of_plugin(error: BaseException) -> str:
+    """File and line of a plugin in which the error arose, if it was one."""
+    plugins = set(loaded_plugins())
+    found = [f for f in traceback.extract_tb(error.__traceback__) if os.path.abspath(f.filename) in plugins]
+    return f"plugin {os.path.relpath(found[-1].filename)}, line {found[-1].lineno}: " if found else ""
 
 
 def hydra_message(error: HydraException) -> str:
@@ -48,4 +96,14 @@ def _absent(name: str) -> str:
     """A setting without a plus that the configuration does not have."""
     if name == "scenario":
         return "scenario: there is none yet; add it with a plus sign: +scenario=8"
-    return str(unknown_key("", name, known_settings(), "'python -m ee_dist --help' lists them"))
+    if name.startswith("task."):
+        return f"{name}: this verb has no such setting; 'python -m ee_dist task=VERB --help' lists those of a verb"
+    if name in known_settings():
+        group, having = name.partition(".")[0], options_with(name)
+        there = (
+            f"{' and '.join(having)} {'has' if len(having) == 1 else 'have'} it"
+            if having
+            else "add it with a plus sign"
+        )
+        return f"{name}: the chosen {group} has no such setting; {there}"
+    return str(unknown_key("", name, known_settings(), "'python -m ee_dist task=VERB --help' lists them"))

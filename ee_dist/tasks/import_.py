@@ -1,25 +1,37 @@
-"""task=import: measurements of other formats become our recording, with a report of what was done and what looks wrong."""
+"""task=import: measurements of other formats become our recording, with a report of what was done and what looks wrong.
+
+Without a mapping one is proposed, written down, and used where nothing was left open.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.box import SIMPLE
 from rich.console import Console
+from rich.table import Table
 
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.importer import Report, describe, import_file
+from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping, read_mapping
-from ee_dist.measurements.tables import FORMATS
+from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.model import UNITS_TO_ASK, Hints, Proposal
+from ee_dist.measurements.proposal.write import as_yaml, rows
+from ee_dist.measurements.readers import FORMATS, kind_of
+from ee_dist.measurements.report import Report, describe
 from ee_dist.recording.records import TrialRecord
 from ee_dist.recording.writer import RunWriter
-from ee_dist.robots.describe import load_robot, robot_of
+from ee_dist.robots.describe import BUILT_IN, load_robot, robot_of
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.config import Config, ConfigError, one_of
 from ee_dist.tasks.summary import Stopwatch, write_summary
+
+MAPPING = "mapping.yaml"
 
 
 @dataclass
@@ -27,25 +39,42 @@ class Options:
     name: str = "import"
     mapping: str | None = None
     output: str = "measured.mcap"
+    joints: Any = None
+    gains: Any = None
+    unit: str | None = None
+    rate_hz: float | None = None
 
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Read every file of ``config.measured`` by the mapping and write ``out/measured.mcap``, report and summary.
 
-    Raises MeasurementError, RobotError, EffectError, ConfigError.
+    Without a mapping the proposed one is written to ``out/mapping.yaml`` and read back. Raises MeasurementError, RobotError,
+    EffectError, ConfigError.
     """
-    watch = Stopwatch()
-    if not options.mapping:
-        raise ConfigError(
-            "task.mapping=: which column is which channel? name a YAML file; see docs/bring_your_robot.md"
-        )
+    watch, console = Stopwatch(), Console()
     if Path(options.output).name != options.output or not options.output.endswith(".mcap"):
         raise ConfigError(
             f"task.output={options.output}: expected the name of a file that ends in .mcap, such as measured.mcap"
         )
-    mapping = read_mapping(options.mapping)
-    robot, notes = robot_of_mapping(mapping, config)
-    found = [import_file(f, mapping, robot, i) for i, f in enumerate(files_of(config.measured, mapping.kind))]
+    hints = hints_of(options)
+    proposal = None
+    if options.mapping:
+        given = [k for k in ("joints", "gains", "unit", "rate_hz") if getattr(options, k) is not None]
+        if given:
+            raise ConfigError(f"task.{given[0]}= is for an import without a mapping; write it into {options.mapping}")
+        mapping = read_mapping(options.mapping)
+        robot, notes = robot_of_mapping(mapping, config)
+        files = files_of(config.measured, mapping.reading.kind)
+    else:
+        files = files_of(config.measured)
+        robot, notes = robot_of(config.robot.name, config.robot.urdf, config.robot.drives)
+        if not robot.drives:
+            raise ConfigError(
+                f"{robot.name} has no drives: describe them in a YAML (robot=urdf robot.drives=FILE.yaml)"
+            )
+        proposal = proposal_for(files, robot, hints)
+        mapping = written(proposal, config, files, out, console)
+    found = import_files(files, mapping, robot)
     reports = [report for _, report in found]
     text = describe(reports)
     out.mkdir(parents=True, exist_ok=True)
@@ -54,13 +83,75 @@ def run(config: Config, options: Options, out: Path) -> None:
             writer.trial(record)
     (out / "report.txt").write_text(text + "\n", encoding="utf-8")
     rest = summary_of(reports, notes, options.output)
+    if proposal is not None:
+        rest["mapping"] = MAPPING
+        rest["proposed"] = [
+            dict(zip(("channel", "column", "unit", "sure", "why"), r, strict=True)) for r in rows(proposal)
+        ]
     write_summary(out, "import", config, options, watch, digest_of([r for r, _ in found]), rest)
-    console = Console()
     for line in (*(f"note: {n}" for n in notes), *text.splitlines()):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     console.print(
         f"wrote {out / options.output}: {len(found)} trial(s) of {robot.name}", highlight=False, soft_wrap=True
     )
+
+
+def hints_of(options: Options) -> Hints:
+    """What the user said beside the file. Raises ConfigError."""
+    joints = None if options.joints is None else [str(j) for j in _listed(options.joints)]
+    gains: list[float] | None = None
+    if options.gains is not None:
+        gains = []
+        for g in _listed(options.gains):
+            if isinstance(g, bool) or not isinstance(g, (int, float)) or not math.isfinite(g) or g == 0:
+                raise ConfigError(f"task.gains: expected numbers in N.m per A, none of them 0, not {g!r}")
+            gains.append(float(g))
+    if options.unit is not None:
+        one_of("task.unit", options.unit, UNITS_TO_ASK)
+    rate = options.rate_hz
+    if rate is not None and not 0 < rate <= 1e6:
+        raise ConfigError(f"task.rate_hz={rate}: expected rows a second, more than 0 and at most 1e6")
+    return Hints(joints, gains, options.unit, rate)
+
+
+def _listed(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (list, tuple)) else [value]
+
+
+def written(proposal: Proposal, config: Config, files: list[Path], out: Path, console: Console) -> Mapping:
+    """Show the proposal, write it, read it back. Raises MeasurementError for what is left open, in one line."""
+    table = Table(title="Proposed mapping", title_justify="left", box=SIMPLE)
+    for head in ("channel", "column", "unit", "how sure", "why"):
+        table.add_column(head, overflow="fold")
+    for row in rows(proposal):
+        table.add_row(*row)
+    # A pipe has no width of its own.
+    Console(width=None if console.is_terminal else 140).print(table, highlight=False, markup=False)
+    for note in proposal.notes:
+        console.print(f"note: {note}", highlight=False, markup=False, soft_wrap=True)
+    out.mkdir(parents=True, exist_ok=True)
+    names = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
+    path = out / MAPPING
+    path.write_text(as_yaml(proposal, robot_source(config), names), encoding="utf-8")
+    console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+    if proposal.questions:
+        more = f" (and {len(proposal.questions) - 1} more)" if len(proposal.questions) > 1 else ""
+        raise MeasurementError(
+            f"{names}: what the file cannot say{more}: {proposal.questions[0]}; then again with task.mapping={path}"
+            if "task." not in proposal.questions[0]
+            else f"{names}: what the file cannot say{more}: {proposal.questions[0]} (the rest is in {path})"
+        )
+    return read_mapping(path)
+
+
+def robot_source(config: Config) -> Any:
+    """The configured robot as a mapping names it, from wherever that stands."""
+    robot = config.robot
+    if robot.name in BUILT_IN:
+        return robot.name
+    named = [f for f in (robot.urdf, robot.drives) if f is not None] or [robot.name]
+    # Where a description and its URDF are named apart, the settings of the command line go on saying which belong together.
+    return str(Path(named[0]).resolve()) if len(named) == 1 else None
 
 
 def robot_of_mapping(mapping: Mapping, config: Config) -> tuple[Robot, tuple[str, ...]]:
@@ -81,13 +172,11 @@ def files_of(measured: Any, kind: str | None = None) -> list[Path]:
     files: list[Path] = []
     for name in names:
         path = Path(str(name))
-        if path.is_dir():
-            wanted = {s for s, k in FORMATS.items() if kind is None or k == kind}
-            inside = sorted(f for f in path.iterdir() if f.is_file() and f.suffix.lower() in wanted)
+        if path.is_dir() and kind_of(path) is None:
+            inside = sorted(f for f in path.iterdir() if kind_of(f) is not None and kind in (None, kind_of(f)))
             if not inside:
-                raise MeasurementError(
-                    f"{path}: no file to import in this folder; expected {', '.join(sorted(wanted))}"
-                )
+                wanted = [s for s, k in FORMATS.items() if kind in (None, k)]
+                raise MeasurementError(f"{path}: no file to import in this folder; expected {', '.join(wanted)}")
             files += inside
         else:
             files.append(path)

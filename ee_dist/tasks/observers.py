@@ -1,10 +1,10 @@
-"""Passes what a run tells on to its recording."""
+"""Passes what a run tells on to its recording, and keeps what its beliefs went through."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ee_dist.recording.records import GenerationRecord, HypothesisRecord, TrialRecord
+from ee_dist.recording.records import EVOLVING, GenerationRecord, HypothesisRecord, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.recovery.observer import Observer
 
@@ -23,3 +23,18 @@ class Recorder(Observer):
 
     def trial(self, record: TrialRecord) -> None:
         self.writer.trial(record)
+
+
+class Beliefs(Observer):
+    """The error of each diagnosis by stage: ``[{"evolved": ..., "polished": ..., "pruned": ...}, ..]``, those that were run."""
+
+    def __init__(self) -> None:
+        self.stages: list[dict[str, float]] = []
+
+    def hypotheses(self, records: Sequence[HypothesisRecord]) -> None:
+        for r in records:
+            if r.stage == EVOLVING or r.rank:
+                continue
+            if r.pass_index == len(self.stages):
+                self.stages.append({})
+            self.stages[r.pass_index][r.stage] = r.error

@@ -17,6 +17,7 @@ from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recovery.repair import network
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.folder import write_whole
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.wiring import build_robot, evaluator_of
 
@@ -51,7 +52,6 @@ def run(config: Config, options: Options, out: Path) -> None:
     regained = (end - at_change) / lost if lost > 0 else float("nan")
     trials = after[0][-1][0]
     offset = before[0][-1][0]
-    _figure(before[0], [(n + offset, d) for n, d in after[0]], config.scenario.title, out / "online.html")
     write_summary(out, "online", config, options, watch, digest_of((before[0], after[0])), {
         "scenario": config.scenario.number,
         "distance_m": {"intact": intact, "after": at_change, "end": end},
@@ -59,6 +59,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "regained_of_lost": regained,
         "best_by_trials": {"before": before[0], "after": after[0]},
     })  # fmt: skip
+    _figure(before[0], [(n + offset, d) for n, d in after[0]], config.scenario.title, out / "online.html")
     console.print(
         f"Evolution on the body alone, scenario {config.scenario.number} ({config.scenario.title}), seed {config.seed}:\n"
         f"  intact {intact:.2f} m, after the change {at_change:.2f} m, after {trials:,} further trials on the body "
@@ -98,4 +99,4 @@ def _figure(before: list[tuple[int, float]], after: list[tuple[int, float]], tit
     figure.update_layout(title="Evolution on the body alone")
     figure.update_xaxes(title="trials on the body")
     figure.update_yaxes(title="best forward distance (m)")
-    figure.write_html(path, include_plotlyjs=True)
+    write_whole(path, figure.to_html(include_plotlyjs=True))

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ee_dist.recording.records import HARDWARE, REPAIR, GenerationRecord, TrialRecord
+from ee_dist.recording.records import HARDWARE, REPAIR, GenerationRecord, HypothesisRecord, TrialRecord
 from ee_dist.recovery.observer import Observer
+from ee_dist.viewing.story import told
+
+
+@contextmanager
+def starting(console: Console, what: str) -> Iterator[None]:
+    """Say what happens before there is anything to count: live on a terminal, elsewhere as a line."""
+    if console.is_terminal:
+        with console.status(what):
+            yield
+    else:
+        console.print(f"     0 s  {what}", style="dim", highlight=False)
+        yield
 
 
 class PassProgress(Observer):
@@ -39,8 +53,9 @@ class PassProgress(Observer):
             disable=not self.live,
         )
         self.run_bar = self.bars.add_task("whole run (%)", total=100, best="")
-        self.pass_bar = self.bars.add_task("starting", total=1, best="")
+        self.pass_bar = self.bars.add_task("first generation: compiling, loading", total=1, best="")
         self.phase, self.index, self.generations = "", 0, 1
+        self.evolved = float("nan")
 
     def __enter__(self) -> PassProgress:
         self.bars.start()
@@ -55,14 +70,31 @@ class PassProgress(Observer):
         self.phase, self.index, self.generations = phase, pass_index, generations + 1
         name = f"{phase} {pass_index + 1} of {self.passes[phase]}"
         self.bars.reset(self.pass_bar, total=self.generations, description=name, best="")
+        if not self.live and not self.done:
+            seconds = time.monotonic() - self.started
+            self.console.print(f"{seconds:6.0f} s  {name}, {generations} generations", style="dim", highlight=False)
 
     def generation(self, record: GenerationRecord) -> None:
         self.done += self.weights[self.phase] / self.generations
         good = f"best {record.best:.2f} m" if record.phase == REPAIR else f"error {record.best:.4f}"
         self.bars.update(self.pass_bar, advance=1, best=good)
         self.bars.update(self.run_bar, completed=round(100 * self.done / self.total))
-        if record.generation == self.generations - 1:
+        if record.generation < self.generations - 1:
+            return
+        if record.phase == REPAIR:
             self._say(f"{record.phase} pass {record.pass_index + 1}: {good}")
+        else:
+            # Not yet what the loop will believe: that is told when it is final.
+            self.evolved = record.best
+            self.bars.update(self.pass_bar, description=f"{record.phase} {record.pass_index + 1}: polishing")
+
+    def hypotheses(self, records: Sequence[HypothesisRecord]) -> None:
+        for r in records:
+            if r.final:
+                self._say(f"diagnosis pass {r.pass_index + 1}: error {r.error:.5f} (evolved: {self.evolved:.5f})")
+                self.bars.console.print(
+                    f"{'':10}believes: {told(r.terms)}", highlight=False, style="dim", soft_wrap=True
+                )
 
     def trial(self, record: TrialRecord) -> None:
         if record.source == HARDWARE:

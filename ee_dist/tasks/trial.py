@@ -14,24 +14,26 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ee_dist.discrepancy.candidates import candidate
 from ee_dist.discrepancy.draw import draw
-from ee_dist.discrepancy.measured import driver_of
+from ee_dist.discrepancy.measured_trial import driver_of
+from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, apply, find, from_dict, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.physical import PhysicalRobot
-from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.folder import write_whole
+from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.seal import FILE, sealed
 from ee_dist.tasks.summary import Stopwatch, package_version, write_summary
+from ee_dist.tasks.unfinished import remembered
 from ee_dist.tasks.wiring import build_robot, engine_maker
 from ee_dist.trials.excitation import Excitation, parse
+from ee_dist.trials.hardware import Hardware
 from ee_dist.trials.log import SensorLog
 from ee_dist.trials.noise import with_noise
-from ee_dist.viewing.rerun_scene import write_rrd
 
 TYPICAL = 0.35
 """How far from neutral, as a share of the range worth trying, an effect chosen by name alone is put."""
@@ -77,20 +79,21 @@ def run(config: Config, options: Options, out: Path) -> None:
         "floor": PhysicalRobot(engine, robot, hidden, floor_seed),
         "stand": PhysicalRobot(engine, robot, (*hidden, term("on_stand")), stand_seed),
     }
+    tried = {name: remembered(name, body, robot) for name, body in hardware.items()}
     path, sums = out / "trial.mcap", hashlib.sha256()
     table = Table(title=f"Trials of {robot.name}, hidden change sealed", title_justify="left")
     for column in ("trial", "what was done", "seconds", "rows"):
         table.add_column(column)
+    # The truth before the log that is sealed with it: a log without its envelope could never be opened.
+    write_whole(out / FILE, text)
     with RunWriter(path, robot, metadata) as writer:
         for k, excitation in enumerate(plan * options.repeats):
-            log, record = one_trial(hardware[excitation.fixture], excitation, robot, k)
+            log, record = one_trial(tried[excitation.fixture], excitation, robot, k)
             writer.trial(record)
             sums.update(np.ascontiguousarray(log.sensors).tobytes())
             table.add_row(str(k + 1), str(excitation), f"{excitation.seconds:g}", str(len(log)))
         writer.finish({"result_digest": sums.hexdigest()})
     engine.close()
-    (out / FILE).write_text(text, encoding="utf-8")
-    write_rrd(read_run(path), out / "trial.rrd")
     console.print(table)
     console.print(
         f"Noise: {config.noise or options.noise:.1%} of each channel's range. Seal {digest[:16]}.", highlight=False
@@ -99,16 +102,15 @@ def run(config: Config, options: Options, out: Path) -> None:
         "trials": [e.as_dict() for e in plan * options.repeats], "noise": config.noise or options.noise, "seal": digest,
         "log": str(path), "channels": [{"name": s.name, "unit": s.unit} for s in robot.sensors],
     })  # fmt: skip
-    for label, file in (("log", path), ("rerun", out / "trial.rrd"), ("truth", out / FILE)):
+    scene = drawn(path)
+    for label, file in (("log", path), ("rerun", scene), ("truth", out / FILE)):
         console.print(f"  {label:<10}{os.path.relpath(file)}", highlight=False, soft_wrap=True)
     console.print(
         f"Next: python -m ee_dist task=explain measured={os.path.relpath(path)}", highlight=False, soft_wrap=True
     )
 
 
-def one_trial(
-    hardware: PhysicalRobot, excitation: Excitation, robot: Robot, index: int
-) -> tuple[SensorLog, TrialRecord]:
+def one_trial(hardware: Hardware, excitation: Excitation, robot: Robot, index: int) -> tuple[SensorLog, TrialRecord]:
     """Run it, and write down what the experimenter knows: what was sent, and what the sensors said."""
     driver = driver_of(excitation, robot)
     log = hardware.trial(driver, excitation.steps(robot))

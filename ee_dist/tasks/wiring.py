@@ -7,15 +7,23 @@ import gc
 import os
 from dataclasses import dataclass
 
+from ee_dist import leaving
 from ee_dist.effects.catalogue import load_plugin
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
-from ee_dist.evaluation.ray_actors import RayEvaluator, stop_ray
+from ee_dist.evaluation.journal import JournaledEvaluator
+from ee_dist.evaluation.ray_actors import RayEvaluator
+from ee_dist.evaluation.ray_session import stop_ray
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.describe import robot_of
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config
+from ee_dist.tasks.unfinished import note_in
+
+ONE_JOINT = "one_joint"
+LARGE = 1024
+"""Robots of one joint that are simulated in one batch."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +38,10 @@ class EngineMaker:
         for path in self.plugins:
             load_plugin(path)
         # An engine is imported where it is used: a run with one does not wait for the other.
+        if self.name == ONE_JOINT:
+            from ee_dist.engines.one_joint import OneJointEngine
+
+            return OneJointEngine(LARGE)
         if self.name == "mujoco":
             from ee_dist.engines.mujoco.engine import MuJoCoEngine
 
@@ -39,10 +51,11 @@ class EngineMaker:
         return PyBulletEngine()
 
 
-def engine_maker(config: Config, alone: bool) -> EngineMaker:
-    """``alone``: whether the engine has the machine for itself, or shares its cores with other workers."""
+def engine_maker(config: Config, alone: bool, name: str = "") -> EngineMaker:
+    """``alone``: whether the engine has the machine for itself, or shares its cores with other workers. ``name``: another
+    engine than the one of the settings."""
     threads = config.engine.threads or ((os.cpu_count() or 1) if alone else 1)
-    return EngineMaker(config.engine.name, threads, tuple(os.path.abspath(p) for p in config.plugins))
+    return EngineMaker(name or config.engine.name, threads, tuple(os.path.abspath(p) for p in config.plugins))
 
 
 def build_robot(config: Config) -> Robot:
@@ -53,7 +66,7 @@ def build_robot(config: Config) -> Robot:
 _kept: dict[object, Evaluator] = {}
 
 
-def evaluator_of(config: Config) -> Evaluator:
+def evaluator_of(config: Config, engine: str = "") -> Evaluator:
     """The evaluator of these settings, its counts at zero. Raises EvaluatorError where Ray cannot be reached.
 
     The jobs of a sweep run one after the other in this process and share it: its warm worlds and actors, and what it
@@ -66,20 +79,24 @@ def evaluator_of(config: Config) -> Evaluator:
         settings.chunk,
         settings.cache,
         config.ray.address,
-        engine_maker(config, True),
+        engine_maker(config, True, engine),
     )
     if key not in _kept:
         close_evaluators()
         inner: Evaluator
+        chunk = LARGE if engine == ONE_JOINT else 256
         if settings.name == "serial":
-            inner = SerialEvaluator(engine_maker(config, alone=True)(), settings.chunk or 256)
+            inner = SerialEvaluator(engine_maker(config, True, engine)(), settings.chunk or chunk)
         else:
             inner = RayEvaluator(
-                engine_maker(config, alone=False), settings.workers, settings.chunk, config.ray.address
+                engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address
             )
+            leaving.arm()  # Ray has put handlers of its own in place
+        inner = JournaledEvaluator(inner)
         _kept[key] = CachedEvaluator(inner) if settings.cache else inner
     evaluator = _kept[key]
     evaluator.counts.reset()
+    note_in(evaluator)
     return evaluator
 
 

@@ -18,6 +18,8 @@ from ee_dist.robots.ranges import command_span
 from ee_dist.trials.log import Array, start_of
 
 RISE_S = 0.5
+LONGEST = 1_000_000
+"""Rows of a trial."""
 FIXTURES = ("floor", "stand")
 KINDS = {
     "rest": "no motion: what the robot does under its own weight",
@@ -58,6 +60,8 @@ class Excitation:
             )
         if self.fixture not in FIXTURES:
             raise ExcitationError(f"{self.kind}: no fixture {self.fixture!r}; there are: {', '.join(FIXTURES)}")
+        if not 0 <= self.seed < 2**63:
+            raise ExcitationError(f"{self.kind}: seed {self.seed} must be a whole number from 0 to 2^63 - 1")
         if not 0.1 <= self.seconds <= 600.0:
             raise ExcitationError(f"{self.kind}: {self.seconds:g} s must lie between 0.1 and 600 s")
 
@@ -68,7 +72,13 @@ class Excitation:
         return f"{self.kind} ({self.seconds:g} s, amplitude {self.amplitude:g}, seed {self.seed}, {self.fixture})"
 
     def steps(self, robot: Robot) -> int:
-        return max(2, round(self.seconds / robot.time_step_s))
+        """Raises ExcitationError for more rows than a trial may have."""
+        steps = max(2, round(self.seconds / robot.time_step_s))
+        if steps > LONGEST:
+            raise ExcitationError(
+                f"{self.kind}: {self.seconds:g} s in steps of {robot.time_step_s:g} s are {steps} rows; at most {LONGEST}"
+            )
+        return steps
 
     def weights(self, robot: Robot) -> tuple[float, ...] | None:
         """Weights of the network controller that drives a gait; None for an excitation of planned commands."""

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.components import AbsoluteTimeRange
 
+from ee_dist.recording.clock import SECOND_NS
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.viewing.stream import RUN_TIME
 
 WINDOW_S = (-0.5, 3.5)
 """What the plots show around the moment being played."""
+WHOLE_S = 60.0
+LONG_WINDOW_S = (-5.0, 25.0)
 DARK = (18, 21, 28)
 GRID_M = 0.1
 
@@ -39,6 +44,11 @@ def fixed_axis(start_s: float, end_s: float) -> rrb.TimeAxis:
     """A window of time that stays."""
     start, end = (rr.TimeRangeBoundary.absolute(seconds=s) for s in (start_s, end_s))
     return rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
+
+
+def whole_axis(end_s: float) -> rrb.TimeAxis:
+    """The whole recording where it is short enough to be read at once, else a window that moves with the cursor."""
+    return fixed_axis(0.0, end_s) if end_s <= WHOLE_S else moving_axis(*LONG_WINDOW_S)
 
 
 def plot(
@@ -77,6 +87,12 @@ def in_brackets(unit: str) -> str:
     return "" if unit in ("", "1") else f" ({unit})"
 
 
+def command_unit(robot: Robot) -> str:
+    """The unit of a robot's commands, in brackets; nothing where its drives are of both kinds."""
+    kinds = {robot.joint(name).kind for name in robot.motor_names}
+    return in_brackets({"hinge": "rad", "slide": "m"}.get(kinds.pop(), "")) if len(kinds) == 1 else ""
+
+
 def lanes(origin: str, name: str) -> rrb.StateTimelineView:
     """States over time, one lane for each entity below ``origin``."""
     return rrb.StateTimelineView(origin=origin, name=name, time_view=moving_axis())
@@ -93,12 +109,17 @@ def bars(origin: str, name: str, legend: bool = False) -> rrb.BarChartView:
     return rrb.BarChartView(origin=origin, name=name, plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend))
 
 
-def framed(content: rrb.Container) -> rrb.Blueprint:
-    """The whole window: the content and the play bar, side panels folded away."""
+def framed(content: rrb.Container, loop_s: tuple[float, float] | None = None) -> rrb.Blueprint:
+    """The whole window: the content and the play bar, side panels folded away. Play repeats ``loop_s``, or everything."""
+    selected = None
+    if loop_s is not None:
+        start, end = (round(s * SECOND_NS) for s in loop_s)
+        selected = AbsoluteTimeRange(start, end)
+    loop: Literal["all", "selection"] = "all" if selected is None else "selection"
     return rrb.Blueprint(
         content,
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=RUN_TIME, loop_mode="all"),
+        rrb.TimePanel(state="collapsed", timeline=RUN_TIME, loop_mode=loop, time_selection=selected),
         auto_views=False,
     )

@@ -7,7 +7,9 @@ Rgb = tuple[int, int, int]
 MEASURED: Rgb = (86, 156, 230)
 """Blue: what the hardware did."""
 PREDICTED: Rgb = (255, 167, 38)
-"""Orange: what the model says."""
+"""Orange: what the model says; of a run, what it said before the trial."""
+HINDSIGHT: Rgb = (178, 148, 255)
+"""Violet: what another model says; of a run, that of the diagnosis after the trial."""
 TOUCHING: Rgb = (105, 219, 124)
 """Green: a foot whose touch sensor reports contact."""
 LIMB: Rgb = (158, 196, 238)
@@ -27,7 +29,8 @@ SERIES: tuple[Rgb, ...] = (
 )
 """For lists of things of one kind: passes, motors."""
 
-MEASURED_NAME, PREDICTED_NAME = "measured", "predicted"
+MEASURED_NAME, PREDICTED_NAME, HINDSIGHT_NAME = "measured", "predicted", "predicted_after"
+"""Places among the entities; the viewer draws lines in their order, and thin ones must lie upon the thick measured one."""
 RESIDUALS: tuple[Rgb, ...] = ((236, 94, 94), *SERIES[2:])
 """For what is left when the prediction is taken off: neither blue nor orange."""
 

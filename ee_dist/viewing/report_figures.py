@@ -27,6 +27,16 @@ class Overlay:
     improved: Array | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Residuals (n,) over something (n,), before and perhaps after."""
+
+    label: str
+    x: Array
+    before: Array
+    after: Array | None = None
+
+
 def _styled(figure: go.Figure, height: int) -> go.Figure:
     figure.update_layout(
         template="plotly_white",
@@ -64,25 +74,34 @@ def overlays(items: Sequence[Overlay]) -> go.Figure:
     return figure
 
 
-def heat_map(heat: Array, segments: Sequence[str], channels: Sequence[str], floor: float = 1.0) -> go.Figure:
-    """(segments, channels) root mean squares; white is the noise."""
-    shown = [k for k in range(heat.shape[1]) if heat[:, k].any()]
-    z = heat[:, shown].T
-    top = max(4.0, float(np.quantile(z, 0.98)))
-    figure = go.Figure(
-        go.Heatmap(
-            z=z,
-            x=list(segments),
-            y=[channels[k].replace("_", " ") for k in shown],
-            zmin=0.0,
-            zmax=top,
-            colorscale=[[0, "#f7fbff"], [min(1.3 * floor / top, 0.9), "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]],
-            colorbar={"title": {"text": "standard deviations", "side": "right"}, "thickness": 12},
-            hovertemplate="%{y}<br>%{x}<br>%{z:.2f} standard deviations<extra></extra>",
+def heat_map(
+    tables: Sequence[Array], segments: Sequence[str], channels: Sequence[str], floor: float = 1.0
+) -> go.Figure:
+    """(segments, channels) root mean squares, one table or before and after; white is the noise."""
+    shown = [k for k in range(tables[0].shape[1]) if any(t[:, k].any() for t in tables)]
+    top = max(4.0, float(np.quantile(tables[0][:, shown], 0.98)))
+    titles = ["before", "after"] if len(tables) > 1 else None
+    figure = make_subplots(rows=len(tables), cols=1, shared_xaxes=True, subplot_titles=titles, vertical_spacing=0.06)
+    for row, table in enumerate(tables, start=1):
+        figure.add_trace(
+            go.Heatmap(
+                z=table[:, shown].T,
+                x=list(segments),
+                y=[channels[k].replace("_", " ") for k in shown],
+                coloraxis="coloraxis",
+                hovertemplate="%{y}<br>%{x}<br>%{z:.2f} standard deviations<extra></extra>",
+            ),
+            row=row,
+            col=1,
         )
+    _styled(figure, 140 + (20 + 17 * len(shown)) * len(tables))
+    scale = [[0, "#f7fbff"], [min(1.3 * floor / top, 0.9), "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]]
+    bar = {"title": {"text": "standard deviations", "side": "right"}, "thickness": 12}
+    figure.update_layout(
+        coloraxis={"cmin": 0.0, "cmax": top, "colorscale": scale, "colorbar": bar},
+        hovermode="closest",
+        margin={"l": 170, "r": 20, "t": 30, "b": 110},
     )
-    _styled(figure, 140 + 17 * len(shown))
-    figure.update_layout(hovermode="closest", margin={"l": 170, "r": 20, "t": 20, "b": 110})
     figure.update_yaxes(autorange="reversed")
     figure.update_xaxes(tickangle=-60, tickfont={"size": 10})
     return figure
@@ -114,7 +133,9 @@ def ranking(
     )
     _styled(figure, 110 + 34 * len(names))
     least = min([100 * i[0] for i in intervals] + [0.0])
-    figure.update_xaxes(title_text="squared residual taken off on held-out data (%)", range=[max(least - 3, -25), 104])
+    figure.update_xaxes(
+        title_text="of what is above the noise, taken off on held-out data (%)", range=[max(least - 3, -25), 104]
+    )
     figure.update_yaxes(autorange="reversed", automargin=True)
     figure.update_layout(margin={"l": 20, "r": 20, "t": 10, "b": 45}, hovermode="closest")
     return figure
@@ -145,20 +166,40 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
     return figure
 
 
-def signatures(panels: Sequence[tuple[str, Sequence[tuple[str, Array, Array]]]]) -> go.Figure:
-    """For each channel, residuals against position, speed, command and load: (title, [(x label, x, residual)])."""
+def signatures(panels: Sequence[tuple[str, Sequence[Cloud]]]) -> go.Figure:
+    """For each channel, residuals against position, speed, command and load, with the mean over each tenth of the range."""
     columns = max(len(p) for _, p in panels)
-    labels = [x for _, p in panels for x, _, _ in p]
+    labels = [c.label for _, p in panels for c in p]
     figure = make_subplots(rows=len(panels), cols=columns, subplot_titles=labels, vertical_spacing=0.3 / len(panels),
                            horizontal_spacing=0.05)  # fmt: skip
     for r, (title, parts) in enumerate(panels, start=1):
-        for c, (_, x, y) in enumerate(parts, start=1):
-            marker = {"color": RESIDUAL, "size": 4, "opacity": 0.45}
-            figure.add_scatter(x=x, y=y, mode="markers", marker=marker, name=title, showlegend=False, row=r, col=c)
+        for c, cloud in enumerate(parts, start=1):
+            series = [("before", cloud.before, RESIDUAL)]
+            if cloud.after is not None:
+                series.append(("after", cloud.after, IMPROVED))
+            for name, y, colour in series:
+                first = r == 1 and c == 1
+                marker = {"color": colour, "size": 4, "opacity": 0.25}
+                figure.add_scattergl(x=cloud.x, y=y, mode="markers", marker=marker, name=name, legendgroup=name,
+                                     showlegend=first and len(series) > 1, row=r, col=c)  # fmt: skip
+                at, mean = _trend(cloud.x, y)
+                line = {"color": colour, "width": 3}
+                figure.add_scatter(x=at, y=mean, mode="lines", line=line, showlegend=False, legendgroup=name,
+                                   hoverinfo="skip", row=r, col=c)  # fmt: skip
         figure.update_yaxes(title_text=title, row=r, col=1)
     figure = _styled(figure, 80 + 220 * len(panels))
     figure.update_layout(hovermode="closest")
     return figure
+
+
+def _trend(x: Array, y: Array, bins: int = 24) -> tuple[Array, Array]:
+    """Middles and means of the bins that hold anything."""
+    edges = np.linspace(float(x.min()), float(x.max()) + 1e-12, bins + 1)
+    which = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
+    count = np.bincount(which, minlength=bins)
+    mean = np.bincount(which, weights=np.nan_to_num(y), minlength=bins) / np.maximum(count, 1)
+    middle = (edges[:-1] + edges[1:]) / 2
+    return middle[count > 2], mean[count > 2]
 
 
 def bars(names: Sequence[str], values: Sequence[float], label: str, floor: float | None = None) -> go.Figure:

@@ -8,60 +8,97 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from ee_dist.recording.records import DIAGNOSIS, PREDICTION, REPAIR, RunRecord, TrialRecord
+from ee_dist.recording.records import DIAGNOSIS, HARDWARE, HINDSIGHT, PREDICTION, REPAIR, RunRecord, TrialRecord
 from ee_dist.robots.ranges import command_units
-from ee_dist.viewing import blueprint, channels, search_curves, story, world
-from ee_dist.viewing.channels import Pair
+from ee_dist.viewing import blueprint, channels, palette, search_curves, story, world
+from ee_dist.viewing.channels import Model, Shot
 from ee_dist.viewing.robot3d import Appearance, Shown
 from ee_dist.viewing.stream import interval_s, log_digest, recording, starts_of
+from ee_dist.viewing.text import document
+from ee_dist.viewing.trial_scene import write_trial_rrd
+from ee_dist.viewing.world import Ghost
 
 APPLICATION = "ee_dist"
+ZERO = "texts/zero"
+SAID = {
+    PREDICTION: Model(palette.PREDICTED_NAME, "expected before", palette.PREDICTED),
+    HINDSIGHT: Model(palette.HINDSIGHT_NAME, "explained after", palette.HINDSIGHT),
+}
+"""The models of a run: that which a controller was chosen on, and that of the diagnosis after its trial."""
 
 
 def write_rrd(run: RunRecord, path: str | Path) -> None:
-    """Write a run as an ``.rrd`` with its blueprint. Equal runs give equal recordings but for rerun's own row ids."""
+    """Write a run of the loop as an ``.rrd`` with its blueprint; a recording of trials alone as a scene of those.
+
+    Equal runs give equal recordings but for rerun's own row ids.
+    """
+    if not _is_loop(run):
+        write_trial_rrd(run, path)
+        return
     trials = [t for t in story.hardware_trials(run) if len(t.log)]
-    predicted = {t.index: t for t in run.trials if t.source == PREDICTION and len(t.log)}
-    logs = [(t.index, [t.log, *([predicted[t.index].log] if t.index in predicted else [])]) for t in trials]
-    starts = starts_of(logs)
-    real, ghost = _appearances(run, trials, starts, predicted)
+    said = {(t.source, t.index): t for t in run.trials if len(t.log)}
+    beside = [[said[s, t.index] for s in SAID if (s, t.index) in said] for t in trials]
+    starts = starts_of([(t.index, [t.log, *(m.log for m in models)]) for t, models in zip(trials, beside, strict=True)])
+    real, ghosts = _appearances(run, trials, starts, said)
+    models = [SAID[s] for s in SAID if any((s, t.index) in said for t in trials)]
     identity = [run.robot.digest, repr(sorted(run.metadata.items())), *(log_digest(t.log) for t in run.trials)]
     with recording(path, APPLICATION, identity, story.title_of(run), _blueprint(run, trials, starts, real)) as stream:
         for place, text in (("texts/result", story.result_text(run)), ("texts/details", story.details_text(run))):
-            stream.log(place, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+            stream.log(place, document(text), static=True)
         if trials:
-            pairs = [
-                Pair(t.name, s, g[0], g[1] if len(g) > 1 else None)
-                for t, s, (_, g) in zip(trials, starts, logs, strict=True)
+            shots = [
+                Shot(t.name, s, t.log, {SAID[m.source].key: m.log for m in own})
+                for t, s, own in zip(trials, starts, beside, strict=True)
             ]
             switches = [s.name for s in run.robot.sensors if s.kind == "touch"]
-            world.send_world(stream, run.robot, real, ghost, starts)
-            channels.send_sensors(stream, pairs, switches)
-            channels.send_commands(stream, pairs)
-            channels.send_touch(stream, pairs, switches)
-            channels.send_trial_lane(stream, pairs, [label(t) for t in trials])
-        for phase, where, what in ((REPAIR, "search/distance", "repair"), (DIAGNOSIS, "search/error", "diagnosis")):
-            search_curves.send_curve(stream, where, [g for g in run.generations if g.phase == phase], what)
+            world.send_world(stream, run.robot, real, ghosts, starts)
+            channels.send_sensors(stream, shots, models, switches)
+            channels.send_commands(stream, shots)
+            channels.send_touch(stream, shots, [SAID[PREDICTION]], switches)
+            channels.send_trial_lane(stream, shots, [label(t) for t in trials])
+        _send_search(stream, run)
+
+
+def _is_loop(run: RunRecord) -> bool:
+    """Whether a search was recorded, or at least models beside the trials."""
+    return "scenario" in run.metadata or bool(run.generations) or any(t.source != HARDWARE for t in run.trials)
+
+
+def _send_search(stream: rr.RecordingStream, run: RunRecord) -> None:
+    of = {phase: [g for g in run.generations if g.phase == phase] for phase in (REPAIR, DIAGNOSIS)}
+    for phase, own in of.items():
+        if own and not search_curves.anything(own):
+            text = f"It was 0 in each of the {len(own)} generations of {phase}."
+            stream.log(f"{ZERO}/{phase}", document(text), static=True)
+    search_curves.send_curve(stream, "search/distance", of[REPAIR], "repair")
+    search_curves.send_curve(stream, "search/error", of[DIAGNOSIS], "diagnosis", story.beliefs(run))
 
 
 def _appearances(
-    run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[float], predicted: Mapping[int, TrialRecord]
-) -> tuple[Shown, Shown]:
-    """The robot and its prediction, one of each for every trial."""
+    run: RunRecord,
+    trials: Sequence[TrialRecord],
+    starts: Sequence[float],
+    said: Mapping[tuple[str, int], TrialRecord],
+) -> tuple[Shown, list[Ghost]]:
+    """The robot and what its models say, one of each for every trial."""
     truth = story.truth_of(run) or ()
-    aside = world.BESIDE_M if run.robot.free_base else 0.0
     real: list[Appearance | None] = []
-    ghost: list[Appearance | None] = []
     for t, start in zip(trials, starts, strict=True):
         body = world.believed_model(run.robot, () if t.name == story.INTACT else truth)
         real.append(world.seen(Appearance(start, body, t.log, label(t))))
-        p = predicted.get(t.index)
-        if p is None:
-            ghost.append(None)
-            continue
-        model, text = world.believed_model(run.robot, p.believed), f"predicted: {p.log.travel_m:.2f} m"
-        ghost.append(world.seen(Appearance(start, model, p.log, text, aside)))
-    return real, ghost
+    ghosts = []
+    for k, (source, model) in enumerate(SAID.items()):
+        aside = (k + 1) * world.BESIDE_M if run.robot.free_base else 0.0
+        shown: list[Appearance | None] = []
+        for t, start in zip(trials, starts, strict=True):
+            m = said.get((source, t.index))
+            if m is None:
+                shown.append(None)
+                continue
+            text = f"{model.label}: {m.log.travel_m:.2f} m"
+            shown.append(world.seen(Appearance(start, world.believed_model(run.robot, m.believed), m.log, text, aside)))
+        ghosts.append(Ghost(model.key, model.colour, shown))
+    return real, ghosts
 
 
 def label(trial: TrialRecord) -> str:
@@ -75,15 +112,11 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
         rrb.TextDocumentView(origin="/texts/details", name="Details"),
         active_tab=0,
     )
-    search = rrb.Vertical(
-        blueprint.bars("/search/distance", "Repair: best distance (m), generation by generation"),
-        blueprint.bars("/search/error", "Diagnosis: least error, generation by generation"),
-    )
+    search = _search_views(run)
     if not trials:
-        return blueprint.framed(rrb.Horizontal(search, text))
-    scene = blueprint.scene_view(
-        run.robot, "Robot (blue) and what its model expected (orange)", world.eye(run.robot, real)
-    )
+        return blueprint.framed(rrb.Horizontal(*search, text))
+    named = "Robot (blue), expected before (orange), explained after (violet)"
+    scene = blueprint.scene_view(run.robot, named, world.eye(run.robot, real))
     axis = blueprint.moving_axis()
     touch = [s for s in run.robot.sensors if s.kind == "touch"]
     others = [s for s in run.robot.sensors if s.kind != "touch"]
@@ -96,9 +129,25 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
     beside = [blueprint.sensor_plots(others, "Other channels", axis)] if others else []
     below = rrb.Horizontal(rrb.Tabs(*tabs, active_tab=0), *beside)
     left = rrb.Vertical(scene, below, row_shares=[13, 10])
-    right = rrb.Vertical(text, search, row_shares=[9, 5])
+    right = rrb.Vertical(text, *search, row_shares=[18, 5, 5][: 1 + len(search)])
     end_s = starts[-1] + interval_s(trials[-1].log)
     whole = rrb.Vertical(
         rrb.Horizontal(left, right, column_shares=[5, 3]), blueprint.chapters(end_s), row_shares=[10, 1]
     )
     return blueprint.framed(whole)
+
+
+def _search_views(run: RunRecord) -> list[rrb.View]:
+    """The course of the search; only what has anything to show."""
+    views: list[rrb.View] = []
+    for phase, origin, name in (
+        (REPAIR, "/search/distance", "Repair: best distance (m), generation by generation"),
+        (DIAGNOSIS, "/search/error", "Diagnosis: least error (violet: of what was believed)"),
+    ):
+        own = [g for g in run.generations if g.phase == phase]
+        if search_curves.anything(own):
+            views.append(blueprint.bars(origin, name))
+        elif own:
+            # Bars of nothing but zeros would be an empty panel.
+            views.append(rrb.TextDocumentView(origin=f"{ZERO}/{phase}", name=name))
+    return views

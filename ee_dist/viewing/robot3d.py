@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from ee_dist.engines.loop import gravity_vector
 from ee_dist.robots.kinematics import part_poses
 from ee_dist.robots.model import Robot
+from ee_dist.robots.pictured import Solid, solids_of
 from ee_dist.trials.log import Array, SensorLog
+from ee_dist.trials.motion import base_poses, joint_positions
 from ee_dist.viewing import drawn
 from ee_dist.viewing.palette import FOOT, GRAVITY, LIMB, MEASURED, TOUCHING, Rgb
 from ee_dist.viewing.stream import seconds_of, times
@@ -45,7 +47,7 @@ class Appearance:
         """Thinned times (K,) on the timeline, s, and poses (K, 7) of every part; rows that the log lacks left out."""
         seconds = seconds_of(self.log)
         rows = thinned(seconds, POSE_HZ)
-        base, joints = _base_poses(self.model, self.log)[rows].copy(), joint_positions(self.model, self.log)[rows]
+        base, joints = base_poses(self.model, self.log)[rows].copy(), joint_positions(self.model, self.log)[rows]
         base[:, 1] += self.aside_m
         known = np.isfinite(base).all(axis=1) & np.isfinite(joints).all(axis=1)
         return self.start_s + seconds[rows][known], part_poses(self.model, base[known], joints[known])
@@ -75,7 +77,7 @@ def send_robot(
         columns = rr.Transform3D.columns(translation=pose[:, :3], quaternion=pose[:, 3:])
         stream.send_columns(place, [times(np.concatenate([at for at, _ in moves]))], columns)
         seen = [a is not None and part.name in a.moves[1] for a in shown]
-        for solid in drawn.solids_of(robot, part):
+        for solid in solids_of(robot, part):
             own = f"{place}/{solid.name}"
             colour = None if solid.senses else ghost or (MEASURED if part is robot.root else LIMB)
             _send_solid(stream, own, solid, colour, ghost is not None, seen, starts_s)
@@ -86,31 +88,6 @@ def send_robot(
             _send_track(stream, f"{path}/track", a, start, ghost)
             _send_gravity(stream, f"{path}/gravity", a, start)
         _send_labels(stream, f"{path}/label", shown, starts_s, ghost or MEASURED)
-
-
-def joint_positions(robot: Robot, log: SensorLog) -> Array:
-    """Joint positions (T, M) as far as a log tells: its own, else from position or angle channels, else zero."""
-    if log.joints is not None and log.motor_names == robot.motor_names:
-        return log.joints
-    found = np.zeros((len(log), len(robot.drives)))
-    column = {name: k for k, name in enumerate(robot.motor_names)}
-    for sensor in robot.sensors:
-        if sensor.target not in column or sensor.name not in log.sensor_names:
-            continue
-        if sensor.kind == "position":
-            found[:, column[sensor.target]] = log.channel(sensor.name)
-        elif sensor.kind == "angle":
-            joint = robot.joint(sensor.target)
-            middle, half = (joint.lower + joint.upper) / 2, (joint.upper - joint.lower) / 2
-            found[:, column[sensor.target]] = middle + half * log.channel(sensor.name)
-    return found
-
-
-def _base_poses(robot: Robot, log: SensorLog) -> Array:
-    """Pose (T, 7) of the root part: as logged, else where the robot starts."""
-    if log.base_pose is not None:
-        return log.base_pose
-    return np.tile(np.array([*robot.start_position_m, *robot.start_rotation]), (len(log), 1))
 
 
 def thinned(seconds: Array, hz: float) -> Rows:
@@ -129,7 +106,7 @@ def _touch_sensor(robot: Robot, part: str) -> str:
 def _send_solid(
     stream: rr.RecordingStream,
     place: str,
-    solid: drawn.Solid,
+    solid: Solid,
     colour: Rgb | None,
     ghost: bool,
     seen: Sequence[bool],
@@ -146,7 +123,7 @@ def _send_solid(
 def _send_touch(
     stream: rr.RecordingStream,
     place: str,
-    solid: drawn.Solid,
+    solid: Solid,
     sensor: str,
     shown: Shown,
     seen: Sequence[bool],

@@ -6,21 +6,37 @@ own and so stay in sight while the robot walks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import rerun as rr
 
-from ee_dist.recording.records import GenerationRecord
-from ee_dist.viewing.palette import series_colour
+from ee_dist.recording.records import GenerationRecord, HypothesisRecord
+from ee_dist.viewing.palette import HINDSIGHT, series_colour
 
 BETWEEN_PASSES = 4
 """Empty places between the bars of two passes."""
+BELIEVED = "believed"
 
 
-def send_curve(stream: rr.RecordingStream, path: str, records: Sequence[GenerationRecord], what: str) -> None:
-    """Bars at ``<path>/<what>_<pass>``: best of each generation; the axis counts generations over all passes."""
+def anything(records: Sequence[GenerationRecord]) -> bool:
+    """Whether any bar would be seen: bars of nothing but zeros are an empty panel."""
+    return any(r.best for r in records)
+
+
+def send_curve(
+    stream: rr.RecordingStream,
+    path: str,
+    records: Sequence[GenerationRecord],
+    what: str,
+    believed: Mapping[int, HypothesisRecord] | None = None,
+) -> None:
+    """Bars at ``<path>/<what>_<pass>``: best of each generation; the axis counts generations over all passes.
+
+    ``believed``: what each diagnosis came to after polish and prune, one more bar behind those of its pass.
+    """
     begin = 0
+    ends: list[tuple[float, float]] = []
     for pass_index in sorted({r.pass_index for r in records}):
         own = sorted((r for r in records if r.pass_index == pass_index), key=lambda r: r.generation)
         place = f"{path}/{what}_{pass_index + 1}"
@@ -33,4 +49,12 @@ def send_curve(stream: rr.RecordingStream, path: str, records: Sequence[Generati
             ),
             static=True,
         )
-        begin += own[-1].generation + 1 + BETWEEN_PASSES
+        begin += own[-1].generation + 1
+        if believed and pass_index in believed:
+            ends.append((begin + 0.5, believed[pass_index].error))
+            begin += 2
+        begin += BETWEEN_PASSES
+    if ends:
+        at, errors = np.array(ends).T
+        chart = rr.BarChart(errors, color=HINDSIGHT, abscissa=at, widths=[2.0] * len(ends))
+        stream.log(f"{path}/{BELIEVED}", chart, static=True)

@@ -7,15 +7,31 @@ from collections.abc import Sequence
 from typing import Any
 
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, from_dict
-from ee_dist.recording.records import HARDWARE, HypothesisRecord, RunRecord, TrialRecord
+from ee_dist.recording.records import (
+    EVOLVED,
+    EVOLVING,
+    HARDWARE,
+    HINDSIGHT,
+    PREDICTION,
+    STAGES,
+    HypothesisRecord,
+    RunRecord,
+    TrialRecord,
+)
+from ee_dist.robots.model import Robot
 
 INTACT = "intact"
 """Name of the trial before the change."""
 
-GUIDE = """\
-**Blue**: what the robot did. **Orange**: what its model expected. **Green** foot: its sensor reports the floor. \
-Press play: the trials run one after another.\
-"""
+
+def guide(robot: Robot, hindsight: bool) -> str:
+    """How to read the screen, for this robot."""
+    said = ["**Blue**: what the robot did.", "**Orange**: what its model expected, before the trial."]
+    if hindsight:
+        said.append("**Violet**: the same trial on the model of the diagnosis that followed.")
+    if any(s.kind == "touch" for s in robot.sensors):
+        said.append("**Green**: a foot whose sensor reports the floor.")
+    return " ".join([*said, "Press play: the trials run one after another."])
 
 
 def truth_of(run: RunRecord) -> Hypothesis | None:
@@ -35,14 +51,14 @@ def _term(entry: dict[str, Any]) -> Term:
         return Term(str(entry.get("effect", "?")), str(entry.get("target") or ""), values)
 
 
-def best_hypotheses(run: RunRecord) -> dict[int, HypothesisRecord]:
-    """The best of the last generation of each diagnosis pass."""
-    best: dict[int, HypothesisRecord] = {}
-    for record in run.hypotheses:
-        have = best.get(record.pass_index)
-        if have is None or (record.generation, -record.rank) > (have.generation, -have.rank):
-            best[record.pass_index] = record
-    return best
+def beliefs(run: RunRecord) -> dict[int, HypothesisRecord]:
+    """What the loop believed after each diagnosis pass, and acted on; of a pass that was cut off, nothing."""
+    return {r.pass_index: r for r in run.hypotheses if r.final}
+
+
+def evolved(run: RunRecord) -> dict[int, HypothesisRecord]:
+    """The best of the last population of each diagnosis pass: where polish and prune began."""
+    return {r.pass_index: r for r in run.hypotheses if r.stage == EVOLVED and r.rank == 0 and not r.final}
 
 
 def told(hypothesis: Hypothesis | None) -> str:
@@ -77,19 +93,22 @@ def result_text(run: RunRecord) -> str:
     """The first thing to read: what is to be seen, what happened, what was believed, how far the robot went."""
     trials = hardware_trials(run)
     intact = intact_distance(trials)
-    predicted = {t.index: t for t in run.trials if t.source != HARDWARE}
-    best = best_hypotheses(run)
-    truth = truth_of(run)
-    lines = [f"### {title_of(run)}", "", GUIDE, "", "**How far it went forward**", ""]
-    lines += ["| trial | measured, m | of intact | predicted, m |", "|---|---|---|---|"]
+    said = {(t.source, t.index): t for t in run.trials}
+    after = any(source == HINDSIGHT for source, _ in said)
+    lines = [f"### {title_of(run)}", "", guide(run.robot, after), "", "**How far it went forward (m)**", ""]
+    lines += ["| trial | measured | of intact | expected before | explained after |", "|---|---|---|---|---|"]
     for t in trials:
-        p = predicted.get(t.index)
-        expected = "" if p is None else f"{p.log.travel_m:.2f}"
-        lines.append(f"| {t.name} | {t.log.travel_m:.2f} | {share_text(t, intact)} | {expected} |")
-    if best or truth is not None:
-        lines += ["", "**What it believed had changed**", "", "| diagnosis | error | hypothesis |", "|---|---|---|"]
-        lines += [f"| {k + 1} | {r.error:.3g} | {told(r.terms)} |" for k, r in sorted(best.items())]
-        lines.append(f"| **truth** | | **{told(truth)}** |")
+        models = [said.get((source, t.index)) for source in (PREDICTION, HINDSIGHT)]
+        told_of = ["" if m is None else f"{m.log.travel_m:.2f}" for m in models]
+        lines.append(f"| {t.name} | {t.log.travel_m:.2f} | {share_text(t, intact)} | {' | '.join(told_of)} |")
+    believed, truth, start = beliefs(run), truth_of(run), evolved(run)
+    if believed or truth is not None:
+        # Not a table: the viewer cuts its rows instead of folding them.
+        lines += ["", "**What it believed had changed**", ""]
+        for k, r in sorted(believed.items()):
+            began = f", as evolved {start[k].error:.3g}" if k in start else ""
+            lines.append(f"- Diagnosis {k + 1} (error {r.error:.3g}{began}): {told(r.terms)}")
+        lines.append(f"- **Truth: {told(truth)}**")
     if not run.complete:
         lines += ["", "*This recording was cut short: the run did not reach its end.*"]
     return "\n".join(lines)
@@ -99,9 +118,12 @@ def details_text(run: RunRecord) -> str:
     """Everything that the recording says about itself, for the tab behind the first one."""
     lines = ["# About this run", "", "| key | value |", "|---|---|"]
     lines += [f"| {key} | {value} |" for key, value in sorted(run.metadata.items()) if key != "truth"]
-    final = [h for h in run.hypotheses if h.final]
-    for pass_index in sorted({h.pass_index for h in final}):
-        lines += ["", f"## Last hypotheses of diagnosis {pass_index + 1}", "", "| error | hypothesis |", "|---|---|"]
-        own = sorted((h for h in final if h.pass_index == pass_index), key=lambda h: h.rank)
-        lines += [f"| {h.error:.4g} | {told(h.terms)} |" for h in own]
+    last = [h for h in run.hypotheses if h.final or h.stage != EVOLVING]
+    for pass_index in sorted({h.pass_index for h in last}):
+        lines += ["", f"## Diagnosis {pass_index + 1}: its last population, and what was made of the best", ""]
+        lines += ["| stage | error | hypothesis |", "|---|---|---|"]
+        own = sorted(
+            (h for h in last if h.pass_index == pass_index), key=lambda h: (STAGES.index(h.stage), h.final, h.rank)
+        )
+        lines += [f"| {h.stage}{' (believed)' if h.final else ''} | {h.error:.4g} | {told(h.terms)} |" for h in own]
     return "\n".join(lines)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import re
 import uuid
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,8 @@ from ee_dist.trials.log import Array, SensorLog
 
 RUN_TIME = "run_time"
 """The timeline of every scene: seconds, trials one after another."""
+_SYSTEM = re.compile(r"([^:]*)\(os error (\d+)\)")
+"""How rerun words an error of the system."""
 _IDS = uuid.UUID("6b1f3a52-7c1e-5d0a-9f57-1d2c0f6e8a34")
 
 
@@ -37,17 +41,32 @@ def recording(
     stream = rr.RecordingStream(application, recording_id=name, send_properties=False)
     _fix_ids(blueprint)
     try:
-        stream.save(part)
+        with _writing(target):
+            stream.save(part)
         stream.send_blueprint(blueprint)
         stream.send_recording_name(title)
         yield stream
-        stream.flush()
-        stream.disconnect()
+        with _writing(target):
+            stream.flush()
+            stream.disconnect()
         os.replace(part, target)
     except BaseException:
-        stream.disconnect()
-        part.unlink(missing_ok=True)
+        with suppress(RuntimeError):
+            stream.disconnect()
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def _writing(target: Path) -> Iterator[None]:
+    """Rerun says RuntimeError for what the system refused, such as a full disk; here it is an OSError again."""
+    try:
+        yield
+    except RuntimeError as error:
+        found = _SYSTEM.search(str(error))
+        number, why = (int(found[2]), found[1].strip()) if found else (errno.EIO, "the disk may be full")
+        raise OSError(number, why, str(target)) from error
 
 
 def times(seconds: Array) -> rr.TimeColumn:

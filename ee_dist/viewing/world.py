@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
@@ -11,9 +12,9 @@ import rerun.blueprint as rrb
 
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
 from ee_dist.robots.model import Robot
+from ee_dist.robots.pictured import reach
 from ee_dist.trials.log import Array
-from ee_dist.viewing.drawn import reach
-from ee_dist.viewing.palette import GROUND, PREDICTED
+from ee_dist.viewing.palette import GROUND, Rgb
 from ee_dist.viewing.robot3d import Appearance, Shown, send_robot
 from ee_dist.viewing.stream import times
 
@@ -29,16 +30,28 @@ FIXED_DISTANCE = 2.2
 """Of the camera, in sizes of what moves."""
 
 
-def send_world(stream: rr.RecordingStream, robot: Robot, real: Shown, ghost: Shown, starts_s: Sequence[float]) -> None:
-    """Send all that is seen in 3-D: an appearance a trial of the robot, and of its prediction if there is one."""
+@dataclass(frozen=True)
+class Ghost:
+    """A robot drawn see-through: what a model says. An appearance a trial, None where it is not to be seen."""
+
+    key: str
+    colour: Rgb
+    shown: Shown
+
+
+def send_world(
+    stream: rr.RecordingStream, robot: Robot, real: Shown, ghosts: Sequence[Ghost], starts_s: Sequence[float]
+) -> None:
+    """Send all that is seen in 3-D: an appearance a trial of the robot and of its ghosts; the camera heeds the first."""
     stream.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     if any(real):
         send_robot(stream, f"{WORLD}/measured", robot, real, starts_s, None)
-    if any(ghost):
-        send_robot(stream, f"{WORLD}/predicted", robot, ghost, starts_s, PREDICTED)
+    for ghost in ghosts:
+        if any(ghost.shown):
+            send_robot(stream, f"{WORLD}/{ghost.key}", robot, ghost.shown, starts_s, ghost.colour)
     if robot.free_base and any(real):
-        _send_marks(stream, [*real, *ghost])
-        _send_focus(stream, real, ghost)
+        _send_marks(stream, [*real, *(a for g in ghosts for a in g.shown)])
+        _send_focus(stream, real, ghosts[0].shown if ghosts else [None] * len(real))
 
 
 def seen(appearance: Appearance) -> Appearance | None:

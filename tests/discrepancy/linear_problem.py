@@ -1,4 +1,4 @@
-"""A problem whose answer is known, with no simulation."""
+"""A problem whose answer is known, with no simulation: a way of comparing in a few lines."""
 
 from __future__ import annotations
 
@@ -6,28 +6,51 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.quadruped_lab import quadruped_lab
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, SensorLog
 
 ROBOT = quadruped_lab()
 SEGMENTS, PER = 20, 40
 
 
-class Linear:
-    """A problem in which each (effect, joint) adds its own random pattern, in proportion to its first value."""
+def idle_log(rows: int, seed: int = 0) -> SensorLog:
+    """Some commands, and sensors that say nothing."""
+    commands = np.random.default_rng([4, seed]).uniform(-0.1, 0.1, (rows, len(ROBOT.drives)))
+    units = tuple(x.unit for x in ROBOT.sensors)
+    zeros = np.zeros((rows, len(ROBOT.sensors)))
+    return SensorLog(np.arange(rows) * 0.01, zeros, commands, ROBOT.sensor_names, units, ROBOT.motor_names)
 
-    def __init__(self, hidden: Hypothesis, seed: int = 0, extra: float = 0.0) -> None:
+
+class Linear(Problem):
+    """A problem in which each (effect, joint) adds its own random pattern, in proportion to its first value.
+
+    ``motions``: trials, each of other commands, that the segments are shared out to.
+    """
+
+    way = "linear"
+    error_definition = "root mean square"
+
+    def __init__(self, hidden: Hypothesis, seed: int = 0, extra: float = 0.0, motions: int = 1) -> None:
         self.robot = ROBOT
         n = SEGMENTS * PER
-        self.segments = tuple(f"trial@{k}s" for k in range(SEGMENTS))
-        self.segment_of = np.repeat(np.arange(SEGMENTS), PER)
-        self.trial_of_segment = np.zeros(SEGMENTS, dtype=int)
-        self.trials = ("trial",)
-        self.channels = ("a", "b")
-        self.channel_of = np.arange(n) % 2
-        self.floor = np.ones(n)
-        self.error_definition = "root mean square"
+        names = ["trial"] if motions == 1 else [f"trial {k}" for k in range(motions)]
+        self.measured = tuple(MeasuredTrial(name, idle_log(n, k)) for k, name in enumerate(names))
+        self.layout = Layout(
+            segments=tuple(f"{names[k * motions // SEGMENTS]}@{k}s" for k in range(SEGMENTS)),
+            trial_of_segment=np.arange(SEGMENTS) * motions // SEGMENTS,
+            segment_of=np.repeat(np.arange(SEGMENTS), PER),
+            channel_of=np.arange(n) % 2,
+            time_s=(np.arange(n) % (n // motions)) * 0.01,
+            reading=np.ones(n, dtype=bool),
+            floor=np.ones(n),
+            known=np.zeros(n),
+            channels=("a", "b"),
+            units=("rad", "rad"),
+            joint_of_channel=(0, 1),
+        )
         rng = np.random.default_rng(seed)
         self.data = rng.standard_normal(n) + self.shift(hidden) + extra * np.sin(np.arange(n) / 25.0)
 
@@ -40,7 +63,19 @@ class Linear:
         return total
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
-        return np.stack([self.data - self.shift(h) for h in hypotheses])
+        rows = np.stack([self.data - self.shift(h) for h in hypotheses])
+        return rows if trials is None else np.where(np.isin(self.trial_of, trials), rows, 0.0)
 
     def noise_floor(self) -> tuple[float, str]:
         return 1.0, "known"
+
+    def raw(self, residual: Array) -> Array:
+        return residual
+
+    def series(self, hypothesis: Hypothesis) -> list[Series]:
+        shift, out = self.shift(hypothesis), []
+        for k in range(len(self.measured)):
+            for c, unit in enumerate(self.layout.units):
+                own = (self.trial_of == k) & (self.channel_of == c)
+                out.append(Series(k, c, unit, self.layout.time_s[own], self.data[own], shift[own]))
+        return out

@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 import yaml
 
-from ee_dist.discrepancy.candidates import candidates
-from ee_dist.discrepancy.judge import needed
-from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
-from ee_dist.discrepancy.misfit import leftovers
-from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.evidence.judge import LUCK
+from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.examine import Effort
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.screen import screen
-from ee_dist.discrepancy.unmodelled import from_entries, of_trial, to_entries, unmodelled_by
+from ee_dist.discrepancy.search.candidates import candidates
+from ee_dist.discrepancy.search.screen import screen
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.discrepancy.ways.open_loop.unmodelled import from_entries, of_trial, to_entries
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.contract import Engine
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
@@ -25,7 +29,7 @@ from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.tasks.config import ConfigError
-from ee_dist.tasks.measured import _calibration
+from ee_dist.tasks.measurements import _calibration
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.noise import with_noise
 
@@ -67,7 +71,7 @@ def test_a_stuck_touch_sensor_is_better_explained_by_the_truth_than_by_nothing(m
     nothing, truth = p.residuals([(), hidden])
     assert float(nothing @ nothing) - float(truth @ truth) > 100.0
     pool = candidates(ROBOT, only=["sensor_stuck@touch_front_right", "sensor_stuck@touch_rear_left"])
-    right, wrong = sorted(screen(p, pool), key=lambda s: -s.promise)
+    right, wrong = sorted(screen(Search(p), pool), key=lambda s: -s.promise)
     assert right.candidate.target == "touch_front_right"
     assert right.promise > 5 * wrong.promise
 
@@ -106,12 +110,19 @@ def test_a_calibration_survives_its_file_and_serves_trials_it_did_not_see(tmp_pa
         _calibration(path, ROBOT)
     entries = to_entries(before, names, units)  # type: ignore[arg-type]
     path.with_suffix(".calibration.yaml").write_text(yaml.safe_dump({"unmodelled": entries, "gained": 21.5}))
-    left, gained = _calibration(path, ROBOT)
-    assert left is not None and set(left) == set(before) and gained == 21.5
+    left, gained, way = _calibration(path, ROBOT)
+    assert left is not None and set(left) == set(before) and gained == 21.5 and way == "open_loop"
 
 
 def test_what_an_effect_took_off_an_untouched_robot_is_no_evidence(mujoco: MuJoCoEngine) -> None:
-    p = problem(mujoco, trials(mujoco, ()))
-    plain = needed(p, 100)
-    p.gained = 50.0
-    assert plain + 50.0 < needed(p, 100) <= plain + 200.0
+    p = problem(mujoco, trials(mujoco, (term("sensor_bias", "roll", bias=0.02),)))
+    pool = candidates(ROBOT, only=["sensor_bias@roll", "sensor_bias@pitch"])
+    quick = Effort(first=2, second=2, final=2, starts=1)
+    found = explain(p, pool, effort=quick)
+    assert found.verdict == EFFECT and found.best is not None
+    p.gained = found.best.gain * float(np.sum(found.base**2))
+    again = explain(p, pool, effort=quick)
+    assert again.verdict != EFFECT and again.verdict != NOTHING_MISSING, (
+        "an effect took as much where nothing was wrong"
+    )
+    assert again.candidates[0].why_not == LUCK

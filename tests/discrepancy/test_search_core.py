@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from linear_problem import ROBOT, Linear
 
-from ee_dist.discrepancy.candidates import Candidate, candidate, candidates, known, parse
-from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, Effort, explain
-from ee_dist.discrepancy.folds import bootstrap, halves
-from ee_dist.discrepancy.improve import WORTH, improve, worth
-from ee_dist.discrepancy.misfit import leftovers
-from ee_dist.discrepancy.screen import screen
+from ee_dist.discrepancy.evidence.holdout import MOTIONS, SETTINGS, bootstrap, travelling, windows
+from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.examine import Effort
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, explain
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates, known, parse
+from ee_dist.discrepancy.search.screen import screen
+from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import EffectError, Hypothesis, term
 from ee_dist.trials.log import Array
 
@@ -26,7 +30,7 @@ def test_the_hidden_effect_is_named_with_its_value() -> None:
     found = explain(Linear(hidden), POOL, effort=QUICK)
     assert found.verdict == EFFECT
     assert found.best is not None and found.best.name == "motor_weak@knee_front_left"
-    assert found.best.hypothesis[0].values[0][1] == pytest.approx(0.4, abs=0.05)
+    assert found.best.terms[0].values[0][1] == pytest.approx(0.4, abs=0.05)
     assert found.best.tied_with == []
     assert 0 < found.best.interval[0] < found.best.gain < found.best.interval[1] < 1
 
@@ -82,8 +86,26 @@ def test_an_earlier_effect_is_fitted_again() -> None:
 
 
 def test_every_segment_is_held_out_once() -> None:
-    half = halves(Linear(()))
-    assert set(half) == {0, 1} and abs(half.mean() - 0.5) <= 0.05
+    fold = windows(Linear(())).fold_of
+    assert set(fold) == {0, 1} and abs(fold.mean() - 0.5) <= 0.05
+
+
+def test_motions_and_settings_are_held_out_whole() -> None:
+    assert travelling(Linear(())) == [], "one motion, one setting"
+    problem = Linear((), motions=4)
+    (motions,) = travelling(problem)
+    assert motions.name == MOTIONS and motions.folds == 2
+    for k in range(4):
+        assert len(set(motions.fold_of[problem.trial_of_segment == k])) == 1
+    heavy = (term("on_stand"),)
+    problem.measured = tuple(replace(t, setup=heavy if k < 2 else ()) for k, t in enumerate(problem.measured))
+    _, settings = travelling(problem)
+    assert settings.name == SETTINGS
+    assert settings.fold_of.tolist() == (problem.trial_of_segment >= 2).astype(int).tolist()
+    # Of the same commands under two names: repeats of one motion, which does not travel to itself.
+    log = problem.measured[0].log
+    problem.measured = tuple(replace(t, log=log, setup=()) for t in problem.measured)
+    assert travelling(problem) == []
 
 
 def test_leftovers_of_noise_are_none() -> None:
@@ -110,7 +132,7 @@ def test_screening_finds_the_exact_gain_of_a_linear_effect() -> None:
     problem = Linear((term("motor_weak", "hip_rear_left", loss=0.2),))
     base = problem.residuals([()])[0]
     best = problem.residuals([(term("motor_weak", "hip_rear_left", loss=0.2),)])[0]
-    promise = {s.candidate.name: s.promise for s in screen(problem, POOL)}
+    promise = {s.candidate.name: s.promise for s in screen(Search(problem), POOL)}
     top = max(promise, key=lambda k: promise[k])
     assert top == "motor_weak@hip_rear_left"
     assert promise[top] == pytest.approx(base @ base - best @ best, rel=0.05)
@@ -132,9 +154,3 @@ def test_bootstrap_holds_the_sum() -> None:
     d = np.random.default_rng(1).normal(1.0, 0.1, 50)
     low, high = bootstrap(d)
     assert low < d.sum() < high and low > 40
-
-
-def test_a_step_is_worth_what_it_takes_of_the_error_above_the_floor() -> None:
-    assert worth(2.0, 1.0, 1.0) == pytest.approx(1.0)
-    assert worth(1.1, 1.09, 0.6) < WORTH < worth(1.1, 1.0, 0.6)
-    assert worth(0.9, 0.9, 1.0) == 1.0, "nothing was above the floor"

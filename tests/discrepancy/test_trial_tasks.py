@@ -11,7 +11,7 @@ import pytest
 from ee_dist.effects.catalogue import EffectError, term
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.tasks.config import ConfigError
-from ee_dist.tasks.measured import checked, files_of
+from ee_dist.tasks.measurements import checked, files_of
 from ee_dist.tasks.seal import FILE, opened, sealed
 from ee_dist.tasks.trial import hypothesis
 from ee_dist.trials.log import LogError, SensorLog

@@ -17,7 +17,8 @@ from ee_dist.engines.drivers import Network, weight_count
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Job, Travel, Whole
-from ee_dist.evaluation.ray_actors import EvaluatorError, RayEvaluator, start_ray
+from ee_dist.evaluation.ray_actors import RayEvaluator
+from ee_dist.evaluation.ray_session import EvaluatorError, start_ray
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.quadruped import quadruped
 
@@ -99,6 +100,48 @@ def test_a_killed_worker_changes_nothing():
     assert victim not in evaluator.process_ids(), "the actor did not die, so nothing was tested"
     assert found == expected
     evaluator.close()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("ray_once")
+def test_a_hanging_worker_is_replaced_and_changes_nothing(reference):
+    evaluator = RayEvaluator(PyBulletEngine, 2, 1)
+    assert content(evaluator.evaluate(jobs())) == reference
+    evaluator.patience_s = 8.0  # long enough for a worker to start again
+    victim = evaluator.process_ids()[0]
+    os.kill(victim, signal.SIGSTOP)
+    assert content(evaluator.evaluate(jobs())) == reference
+    assert victim not in evaluator.process_ids()
+    evaluator.close()
+
+
+@pytest.mark.usefixtures("ray_once")
+def test_a_worker_with_something_else_installed_is_refused_by_name(monkeypatch):
+    evaluator = RayEvaluator(PyBulletEngine, 1, 1)
+    monkeypatch.setattr("ee_dist.evaluation.ray_actors.installed", lambda: {"pybullet": "9.9.9"})
+    with pytest.raises(EvaluatorError, match=r"the worker on .* has pybullet [\d.]+, this machine 9\.9\.9"):
+        evaluator.evaluate(jobs(2))
+    evaluator.close()
+
+
+def broken_engine() -> PyBulletEngine:
+    raise SystemExit(0)
+
+
+@pytest.mark.usefixtures("ray_once")
+def test_what_a_worker_raises_is_raised_here():
+    evaluator = RayEvaluator(broken_engine, 1, 1)
+    with pytest.raises(EvaluatorError, match=r"sys\.exit\(0\) was called"):
+        evaluator.evaluate(jobs(2))
+    evaluator.close()
+
+
+def test_more_workers_than_a_machine_can_have_are_refused():
+    import ray
+
+    ray.shutdown()
+    with pytest.raises(EvaluatorError, match=r"evaluator\.workers=100000: this machine has \d+ cores"):
+        start_ray(None, 100_000)
 
 
 def test_cache_simulates_each_key_once_and_gives_the_same():

@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ee_dist.measurements.importer import describe, import_file
+from ee_dist.measurements.importer import import_file
 from ee_dist.measurements.mapping import Mapping, mapping_of
+from ee_dist.measurements.report import describe
 from ee_dist.measurements.sampling import LowPass, decimated, held, linear, smoothed
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.servo_pendulum import servo_pendulum

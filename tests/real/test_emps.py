@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.candidates import candidate, candidates
-from ee_dist.discrepancy.closed_loop import closed_loop
-from ee_dist.discrepancy.fit import Model
-from ee_dist.discrepancy.force_balance import ForceBalance
-from ee_dist.discrepancy.ladder import Rule, climb, fit_everything
-from ee_dist.discrepancy.measured import MeasuredTrial
-from ee_dist.discrepancy.remains import remains
+from ee_dist.discrepancy.improve import BETTER, improve
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.search.candidates import candidate, candidates
+from ee_dist.discrepancy.search.fit import fit_one
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.discrepancy.ways.free_run.closed_loop import closed_loop
 from ee_dist.effects.catalogue import apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.engines.one_joint import OneJointEngine
@@ -34,10 +35,10 @@ def problem() -> ForceBalance:
     return ForceBalance([MeasuredTrial(record.name, record.log)], MODEL.robot)
 
 
-def fitted(problem: ForceBalance, *added: str):  # type: ignore[no-untyped-def]
+def fitted(problem: ForceBalance, *added: str) -> Fit:
     parts = [candidate(MODEL.robot, t.effect, t.target) for t in MODEL.terms]
     model = Model((*parts, *(candidate(MODEL.robot, e, "carriage") for e in added)))
-    return fit_everything(problem, model, [0.05 * model.upper, 0.005 * model.upper])
+    return fit_one(Search(problem), model, [0.05 * model.upper, 0.005 * model.upper])
 
 
 @pytest.mark.parametrize(
@@ -65,13 +66,14 @@ def test_published_parameters(problem: ForceBalance) -> None:
 
 
 def test_the_ladder_finds_them_in_order_and_stops(problem: ForceBalance) -> None:
-    names = ("coulomb_friction", "friction_asymmetry", "offset_torque", "command_delay")
-    rungs = climb(problem, MODEL.terms, [(c,) for c in candidates(MODEL.robot, only=names)], Rule(folds=2))
-    assert [r.added for r in rungs] == ["start", "coulomb_friction@carriage", "friction_asymmetry@carriage", "stopped"]
-    held = [r.error_heldout for r in rungs]
-    assert held[2] < 0.032 < held[1] < 0.072 < held[0]
-    # A delay cannot show in a balance of forces, so it is not even judged.
-    assert "command_delay@carriage" not in {v.name for v in rungs[-1].tried}
+    names = ("coulomb_friction", "friction_asymmetry", "offset_torque")
+    found = improve(problem, candidates(MODEL.robot, only=names, families=problem.families), MODEL.terms)
+    steps = [r.name for r in found.ladder]
+    assert steps[2:] == ["coulomb_friction@carriage", "friction_asymmetry@carriage"]
+    held = [100 * problem.natural(r.error_heldout) for r in found.ladder[1:]]
+    assert held == pytest.approx([17.98, 7.14, 3.12], abs=0.011)
+    assert found.last is not None and all(j.why_not for j in found.last.judged)
+    assert found.verdict == BETTER, "what is left belongs to places on the screw, which no effect describes"
 
 
 def test_closed_loop_errors_are_below_the_published(problem: ForceBalance) -> None:
@@ -86,7 +88,7 @@ def test_closed_loop_errors_are_below_the_published(problem: ForceBalance) -> No
 
 
 def test_what_is_left_repeats_with_position(problem: ForceBalance) -> None:
-    found = remains(problem, fitted(problem, "coulomb_friction", "friction_asymmetry").hypothesis)
+    found = problem.remains(fitted(problem, "coulomb_friction", "friction_asymmetry").hypothesis)
     assert found.rms == pytest.approx(1.67, abs=0.05)
     assert all(r.repeats > 0.9 for r in found.ripples)
     assert found.ripples[0].wavelength == pytest.approx(0.0025, rel=0.05)

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.candidates import candidate
-from ee_dist.discrepancy.fit import Model
-from ee_dist.discrepancy.free_run import FreeRun
-from ee_dist.discrepancy.global_fit import search_all
-from ee_dist.discrepancy.measured import MeasuredTrial
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.cloud import follow_cloud
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.effects.model_file import read_model
 from ee_dist.engines.one_joint import OneJointEngine
@@ -80,8 +81,8 @@ def test_the_large_step_is_friction_by_load(trials: list[MeasuredTrial]) -> None
     base = [candidate(MODEL.robot, t.effect, t.target) for t in MODEL.terms]
     added = ((), ("coulomb_friction",), ("coulomb_friction", "load_friction", "quadratic_friction"))
     models = [Model((*base, *(candidate(MODEL.robot, e, "servo") for e in names))) for names in added]
-    everything = np.ones(len(some.segment_of), dtype=bool)
-    fits = search_all(some, [(m, 0.02 * m.upper) for m in models], (), everything, generations=40, seeds=(1, 2))
+    search = Search(some)
+    fits = follow_cloud(search, [(m, 0.02 * m.upper) for m in models], search.everything, generations=40, seeds=(1, 2))
     viscous, coulomb, loaded = (float(some.mean_absolute(f.hypothesis).mean()) for f in fits)
     assert viscous - coulomb < 0.3 * (coulomb - loaded)
     assert loaded < 0.046

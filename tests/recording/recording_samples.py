@@ -15,6 +15,7 @@ from ee_dist.recording.records import (
     DIAGNOSIS,
     HARDWARE,
     PREDICTION,
+    PRUNED,
     REPAIR,
     GenerationRecord,
     HypothesisRecord,
@@ -59,7 +60,7 @@ def sample_run() -> RunRecord:
         ]
         run.generations.append(GenerationRecord(DIAGNOSIS, k, 0, 0.25, 0.5, 3, 100, 20))
         run.generations.append(GenerationRecord(REPAIR, k, 0, 1.25, 0.5, 7, 100, 60))
-        run.hypotheses.append(HypothesisRecord(k, 0, 0, LOST_LEG, 0.125, final=True))
+        run.hypotheses.append(HypothesisRecord(k, 0, 0, LOST_LEG, 0.125, final=True, stage=PRUNED))
         run.hypotheses.append(HypothesisRecord(k, 0, 1, (), 0.25))
     return run
 

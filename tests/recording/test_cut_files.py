@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import zstandard
+from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
+from mcap.records import Chunk
 from mcap.writer import Writer
 from recording_samples import bits, record, sample_log, write
 
@@ -127,9 +132,91 @@ def test_damage_in_the_middle_costs_what_it_hit_and_no_more(make_file: Callable[
 def test_a_damaged_robot_is_an_error_in_one_line(make_file: Callable[[], Path]) -> None:
     path = make_file()
     path.write_bytes(path.read_bytes().replace(b'"mass_kg"', b'"mess_kg"'))
-    with pytest.raises(RecordingError, match=r"robot\.json is not a robot of ours: robot\.parts\[0\]"):
+    with pytest.raises(RecordingError, match=r"attachment 'robot\.json' is damaged \(its checksum does not hold\)"):
         read_run(path)
     assert len(read_logs(path)) == 2
+
+
+def test_a_robot_of_another_kind_is_an_error_in_one_line(
+    make_file: Callable[[], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for text in ('{"mess": 1}', "[" * 100_000, "nothing"):
+        monkeypatch.setattr("ee_dist.recording.writer.robot_to_json", lambda _, text=text: text)
+        with pytest.raises(RecordingError, match=r"robot\.json is not a robot of ours: [^\n]+$"):
+            read_run(make_file())
+
+
+def places(whole: bytes, count: int) -> list[int]:
+    """Bits spread over the file, and one in 601 of its first and last kilobytes, where metadata and names stand."""
+    bits_in_all = len(whole) * 8
+    ends = [*range(0, 1024 * 8, 601), *range(bits_in_all - 4096 * 8, bits_in_all, 601)]
+    return sorted({*(bits_in_all * k // count for k in range(count)), *(b for b in ends if 0 <= b < bits_in_all)})
+
+
+def test_a_flipped_bit_alters_nothing_that_is_returned(make_file: Callable[[], Path], run: RunRecord) -> None:
+    """Robot, settings and metadata are as they were, or the file is refused in one line, or says it is not complete."""
+    path = make_file()
+    whole = path.read_bytes()
+    original = read_run(path)
+    assert original.complete
+    outcomes = {"incomplete": 0, "unharmed": 0}
+    said: list[str] = []
+    for place in places(whole, 90):
+        flipped = bytearray(whole)
+        flipped[place // 8] ^= 1 << place % 8
+        path.write_bytes(bytes(flipped))
+        try:
+            found = read_run(path)
+        except RecordingError as error:
+            said.append(str(error))
+            continue
+        assert found.robot == original.robot
+        assert found.attachments.items() <= original.attachments.items()
+        assert found.metadata.items() <= original.metadata.items()
+        kept = [bits(t) for t in original.trials]
+        assert all(bits(t) in kept for t in found.trials)
+        if found.complete:
+            assert found.metadata == original.metadata and found.attachments == original.attachments
+            assert bits(tuple(found.trials)) == bits(tuple(original.trials))
+            assert found.hypotheses == original.hypotheses
+        outcomes["unharmed" if found.complete else "incomplete"] += 1
+    assert min(*outcomes.values(), len(said)) > 2, outcomes
+    assert not [text for text in said if "\n" in text or not text.startswith(str(path))]
+
+
+def test_damaged_metadata_are_refused_in_a_cut_file_too(make_file: Callable[[], Path]) -> None:
+    path = make_file()
+    path.write_bytes(path.read_bytes()[:-200].replace(b"recover", b"discover"[1:], 1))
+    with pytest.raises(RecordingError, match=r"metadata record 'run' is damaged"):
+        read_run(path)
+
+
+def test_a_claimed_size_takes_no_memory(make_file: Callable[[], Path]) -> None:
+    """A length of 2^60 in an attachment, and a chunk that would unpack to 2^40 bytes."""
+    path = make_file()
+    whole = path.read_bytes()
+    start = whole.index(b"application/json") + len(b"application/json")
+    path.write_bytes(whole[:start] + struct.pack("<Q", 2**60) + whole[start + 8 :])
+    tracemalloc.start()
+    with pytest.raises(RecordingError):
+        read_run(path)
+    chunk = Chunk(
+        compression="zstd", data=zstandard.compress(bytes(1000)), message_start_time=0, message_end_time=0,
+        uncompressed_crc=0, uncompressed_size=2**40,
+    )  # fmt: skip
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile=PROFILE)
+        writer.add_metadata("ee_dist", {"format": "1"})
+        builder = RecordBuilder()
+        chunk.write(builder)
+        writer.finish()
+        file.write(builder.end())
+    with pytest.raises(RecordingError):
+        read_run(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 50e6
 
 
 # -- repair ------------------------------------------------------------------------------------------------------------
@@ -216,7 +303,7 @@ def test_what_is_not_a_recording_is_refused_in_one_line(tmp_path: Path) -> None:
     refused(tmp_path / "noise.mcap")
     refused(tmp_path, "a folder")
     refused(foreign(tmp_path / "ros.mcap", "ros2"), "something else", "'ros2'", "expected profile 'ee_dist'")
-    refused(foreign(tmp_path / "newer.mcap", PROFILE, "99"), "format 99", "reads format 1")
+    refused(foreign(tmp_path / "newer.mcap", PROFILE, "99"), "format 99", "reads formats 1 and 2")
 
 
 def test_a_missing_file_points_to_its_unfinished_one(tmp_path: Path, run: RunRecord) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -68,8 +70,8 @@ def test_status_tells_a_complete_run_without_our_reader(make_file: Callable[[], 
         reader = make_reader(file)
         records = [(m.name, m.metadata) for m in reader.iter_metadata()]
         header = reader.get_header()
-    assert ("status", {"complete": "true"}) in records
-    assert ("run", {"seed": "0", "task": "recover"}) in records
+    assert "true" in [entries["complete"] for name, entries in records if name == "status"]
+    assert records[1][0] == "run" and {"seed": "0", "task": "recover"}.items() <= records[1][1].items()
     assert (header.profile, header.library) == ("ee_dist", "ee_dist recording 1"), "no version of a library"
 
 
@@ -116,10 +118,14 @@ def test_an_unknown_effect_does_not_stop_the_picture() -> None:
     assert len(frames(record)[0][1]) == 9
 
 
-def test_no_picture_without_poses_and_none_of_a_part_that_is_nowhere() -> None:
-    assert frames(trial(base_pose=None)) == []
-    assert frames(trial(joints=None)) == []
-    assert frames(trial(rows=1, motor_names=tuple("abcdefgh"))) == []
+def test_what_was_not_measured_stays_at_its_start_and_a_part_that_is_nowhere_has_no_frame() -> None:
+    robot = quadruped()
+    body = frames(trial(base_pose=None))[-1][1]["hardware/body"].translation
+    assert (body.x, body.y, body.z) == pytest.approx(robot.start_position_m)
+    # Angle sensors tell how the hips stand where the joints were not recorded.
+    hips = [f[1]["hardware/upper_rear_left"].rotation.z for f in frames(trial(joints=None, base_pose=None))]
+    assert np.ptp(hips) > 0.01
+    assert len(frames(trial(rows=1, motor_names=tuple("abcdefgh")))) == 1
     joints = np.zeros((1, 8))
     joints[0, 0] = np.nan
     missing = {"hardware/upper_front_left", "hardware/lower_front_left"}
@@ -130,6 +136,59 @@ def test_a_slow_log_is_shown_row_by_row() -> None:
     assert len(frames(trial(rows=10, times_s=np.arange(10.0)))) == 10
 
 
+# -- solids ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_recording_opens_with_solids_in_the_frames_that_move(make_file: Callable[[], Path], run: RunRecord) -> None:
+    path = make_file()
+    for source, lost in (("hardware", ()), ("prediction", LOST_LEG)):
+        scenes, moves = decoded(path, f"/{source}/scene"), decoded(path, f"/{source}/transforms")
+        assert len(scenes) == 2, "one a trial"
+        for scene in scenes:
+            framed = {e.frame_id: e for e in scene.entities}
+            assert set(framed) <= {t.child_frame_id for t in moves[0].transforms} | {
+                t.child_frame_id for t in moves[-1].transforms
+            }
+            assert set(framed) == {
+                f"{source}/{p.name}" for p in run.robot.parts if p.name not in apply(run.robot, lost).lost
+            }
+            assert all(e.frame_locked and e.lifetime.nanos == 990_000_000 for e in scene.entities)
+    body = next(e for e in decoded(path, "/hardware/scene")[0].entities if e.id == "hardware/body")
+    shape = run.robot.root.shapes[0]
+    assert [body.cubes[0].size.x, body.cubes[0].size.y, body.cubes[0].size.z] == [2 * h for h in shape.size]
+    assert body.cubes[0].color.a == 1.0
+    leg = next(e for e in decoded(path, "/hardware/scene")[0].entities if e.id == "hardware/upper_rear_left")
+    (rod,), balls = leg.cylinders, leg.spheres
+    ends = np.array([[b.pose.position.x, b.pose.position.y, b.pose.position.z] for b in balls])
+    assert np.linalg.norm(ends[0] - ends[1]) == pytest.approx(rod.size.z)
+    assert (rod.bottom_scale, rod.top_scale) == (1.0, 1.0)
+    assert all(b.size.x == rod.size.x for b in balls)
+
+
+def test_the_layout_for_foxglove_asks_for_what_a_recording_has(make_file: Callable[[], Path]) -> None:
+    layout = json.loads((Path(__file__).parents[2] / "docs" / "foxglove_layout.json").read_text())
+    with make_file().open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        assert summary is not None
+        topics = {c.topic for c in summary.channels.values()}
+    # Of a run with a diagnosis after its trials; the sample has none.
+    topics |= {f"/hindsight/{what}" for what in ("rows", "scene", "transforms")}
+    fields = {f.name for f in schemas.Row.DESCRIPTOR.fields} | {f.name for f in schemas.Generation.DESCRIPTOR.fields}
+    panels = layout["configById"]
+    asked = [t for p in panels.values() for t in p.get("topics", {})]
+    asked += [p["topicPath"] for p in panels.values() if "topicPath" in p]
+    paths = [line["value"] for p in panels.values() for line in p.get("paths", [])]
+    assert asked
+    assert paths
+    assert set(asked) <= topics
+    for path in paths:
+        topic, _, field = path.partition(".")
+        assert topic in topics
+        assert field.split("[")[0] in fields
+    assert set(re.findall(r'"(\w+!\w+)"', json.dumps(layout["layout"]))) == set(panels)
+
+
 # -- schemas -----------------------------------------------------------------------------------------------------------
 
 FOLDER = Path(schemas.__file__).parent
@@ -138,11 +197,12 @@ FOLDER = Path(schemas.__file__).parent
 @pytest.mark.skipif(shutil.which("protoc") is None, reason="needs protoc")
 @pytest.mark.parametrize("name", ["ee_dist.proto", "foxglove.proto"])
 def test_our_reading_of_a_schema_is_that_of_protoc(name: str, tmp_path: Path) -> None:
-    well_known = tmp_path / "google" / "protobuf" / "timestamp.proto"
-    well_known.parent.mkdir(parents=True)
-    well_known.write_text(
-        'syntax = "proto3"; package google.protobuf; message Timestamp { int64 seconds = 1; int32 nanos = 2; }'
-    )
+    well_known = tmp_path / "google" / "protobuf"
+    well_known.mkdir(parents=True)
+    for message in ("Timestamp", "Duration"):
+        (well_known / f"{message.lower()}.proto").write_text(
+            f'syntax = "proto3"; package google.protobuf; message {message} {{ int64 seconds = 1; int32 nanos = 2; }}'
+        )
     output = tmp_path / "out"
     command = ["protoc", f"-I{FOLDER}", f"-I{tmp_path}", f"--descriptor_set_out={output}", name]
     subprocess.run(command, check=True)
@@ -162,6 +222,20 @@ def test_frames_have_the_numbers_that_foxglove_gave_them() -> None:
     assert fields["timestamp"].message_type.full_name == timestamp_pb2.Timestamp.DESCRIPTOR.full_name
     assert fields["translation"].message_type.full_name == "foxglove.Vector3"
     assert fields["rotation"].message_type.full_name == "foxglove.Quaternion"
+
+
+def test_solids_have_the_numbers_that_foxglove_gave_them() -> None:
+    entity = {f.name: f.number for f in schemas.SceneEntity.DESCRIPTOR.fields}
+    assert entity == {
+        "timestamp": 1, "frame_id": 2, "id": 3, "lifetime": 4, "frame_locked": 5, "cubes": 8, "spheres": 9, "cylinders": 10,
+    }  # fmt: skip
+    assert schemas.SceneUpdate.DESCRIPTOR.fields_by_name["entities"].number == 2
+    numbers = {name: {f.name: f.number for f in schemas.MESSAGES[f"foxglove.{name}"].DESCRIPTOR.fields}
+               for name in ("Pose", "Color", "CubePrimitive", "SpherePrimitive", "CylinderPrimitive")}  # fmt: skip
+    assert numbers["Pose"] == {"position": 1, "orientation": 2}
+    assert numbers["Color"] == {"r": 1, "g": 2, "b": 3, "a": 4}
+    assert numbers["CubePrimitive"] == numbers["SpherePrimitive"] == {"pose": 1, "size": 2, "color": 3}
+    assert numbers["CylinderPrimitive"] == {"pose": 1, "size": 2, "bottom_scale": 3, "top_scale": 4, "color": 5}
 
 
 @pytest.mark.parametrize(

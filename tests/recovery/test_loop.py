@@ -13,9 +13,19 @@ from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.evolution.ga import Budget
-from ee_dist.recording.records import HARDWARE, PREDICTION, GenerationRecord, HypothesisRecord, TrialRecord
+from ee_dist.recording.records import (
+    EVOLVED,
+    HARDWARE,
+    HINDSIGHT,
+    POLISHED,
+    PREDICTION,
+    PRUNED,
+    GenerationRecord,
+    HypothesisRecord,
+    TrialRecord,
+)
 from ee_dist.recovery import loop
-from ee_dist.recovery.diagnosis import Judge, diagnose, polish, prune
+from ee_dist.recovery.diagnosis import Judge, believe, diagnose, polish, prune
 from ee_dist.recovery.genome import decode, first_hypotheses
 from ee_dist.recovery.loop import Plan, recover
 from ee_dist.recovery.metrics import RollingMean
@@ -72,7 +82,11 @@ def test_passes_and_trials_come_in_the_papers_order(finished):
     assert notes.passes == [("repair", 0), ("diagnosis", 0), ("repair", 1), ("diagnosis", 1), ("repair", 2)]
     hardware = [(t.index, t.name) for t in notes.trials if t.source == HARDWARE]
     assert hardware == [(0, "intact"), (1, "after the change"), (2, "trial 1"), (3, "trial 2")]
-    assert sorted(t.index for t in notes.trials if t.source == PREDICTION) == [0, 1, 2, 3]
+    said = [(t.index, t.source) for t in notes.trials]
+    before, after = [i for i, s in said if s == PREDICTION], [i for i, s in said if s == HINDSIGHT]
+    assert (before, after) == ([0, 1, 2, 3], [1, 2]), "each trial is forecast, each diagnosed one explained"
+    assert all(said.index((k, PREDICTION)) < said.index((k, HARDWARE)) for k in before)
+    assert all(said.index((k, HINDSIGHT)) > said.index((k, HARDWARE)) for k in after)
     assert changed.trials == 3, "one right after the change, two compensating"
     assert len(result.trials_m) == len(result.hypotheses) == 2
 
@@ -112,13 +126,46 @@ def test_a_lost_leg_is_found_and_the_repair_then_keeps_its_promise(finished):
     )
 
 
-def test_the_final_ten_hypotheses_are_different_and_sorted(finished):
+def test_a_prediction_is_what_the_pass_that_chose_the_controller_expected(finished):
+    result, notes, _ = finished
+    forecast = {t.index: t for t in notes.trials if t.source == PREDICTION}
+    assert [forecast[k].believed for k in range(4)] == [(), (), *result.hypotheses]
+    expected = [result.expected_m[0], *result.expected_m]
+    assert [forecast[k].log.travel_m for k in range(4)] == expected
+    hindsight = {t.index: t.believed for t in notes.trials if t.source == HINDSIGHT}
+    assert hindsight == dict(enumerate(result.hypotheses, start=1))
+
+
+def test_the_last_population_is_different_and_sorted(finished):
     _, notes, _ = finished
     for k in range(2):
-        final = [h for h in notes.said if h.final and h.pass_index == k]
-        assert 1 < len(final) <= 10
-        assert len({h.terms for h in final}) == len(final)
-        assert [h.error for h in final] == sorted(h.error for h in final)
+        last = [h for h in notes.said if h.stage == EVOLVED and h.pass_index == k]
+        assert 1 < len(last) <= 10
+        assert not any(h.final for h in last)
+        assert len({h.terms for h in last}) == len(last)
+        assert [h.error for h in last] == sorted(h.error for h in last)
+
+
+def test_what_the_loop_acts_on_is_told_as_final_and_nothing_else_is(finished):
+    result, notes, _ = finished
+    assert [(h.pass_index, h.terms, h.error) for h in notes.said if h.final] == [
+        (k, h, e) for k, (h, e) in enumerate(zip(result.hypotheses, result.errors, strict=True))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("polishing", "parsimony", "stages"),
+    [(2, 0.1, [POLISHED, PRUNED]), (2, 0.0, [POLISHED]), (0, 0.1, [PRUNED]), (0, 0.0, [EVOLVED])],
+)
+def test_stages_that_are_left_out_are_not_told(engine, polishing, parsimony, stages):
+    judge, notes = judge_of(engine, (term("motor_weak", "knee_front_left", loss=0.5),)), Notes()
+    belief = believe(judge, [], SMALL, polishing, parsimony, SEED, notes, 0)
+    population = [h for h in notes.said if h.stage == EVOLVED and not h.final]
+    told = notes.said[notes.said.index(population[-1]) + 1 :]
+    assert [h.stage for h in told] == stages
+    assert [h.final for h in told] == [False] * (len(stages) - 1) + [True]
+    assert (told[-1].terms, told[-1].error) == (belief.hypothesis, belief.error)
+    assert population[0].error >= told[0].error
 
 
 def test_repair_fitness_never_falls_within_a_pass(finished):

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.candidates import candidates
-from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Effort, explain
-from ee_dist.discrepancy.locate import compare
-from ee_dist.discrepancy.measured import MeasuredTrial, driver_of, setup_of
-from ee_dist.discrepancy.open_loop import OpenLoop
+from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.examine import Effort
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
+from ee_dist.discrepancy.plan import ENOUGH, next_trials
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.separate import ENOUGH, proposals
+from ee_dist.discrepancy.search.candidates import candidates
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.evaluation.cache import CachedEvaluator
@@ -103,5 +104,5 @@ def test_compare_says_where_it_fails(engine: MuJoCoEngine) -> None:
 def test_a_trial_that_separates_is_proposed(engine: MuJoCoEngine) -> None:
     tied = [(term("viscous_friction", f"knee_{leg}", damping_nm_s_rad=0.3),) for leg in ("front_left", "front_right")]
     library = (Excitation("rest", 0.6, fixture="stand"), Excitation("multisine", 1.2, 0.5, 2, "stand"))
-    ahead = proposals(ROBOT, tied, CachedEvaluator(SerialEvaluator(engine)), library)
+    ahead = next_trials(ROBOT, tied, CachedEvaluator(SerialEvaluator(engine)), library)
     assert ahead[0].excitation.kind == "multisine" and ahead[0].separation > ENOUGH

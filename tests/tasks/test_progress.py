@@ -7,7 +7,7 @@ import io
 from rich.console import Console
 
 from ee_dist.recording.records import REPAIR, GenerationRecord
-from ee_dist.tasks.progress import PassProgress
+from ee_dist.tasks.progress import PassProgress, starting
 
 
 def test_a_finished_run_has_nothing_left_to_wait_for() -> None:
@@ -22,3 +22,13 @@ def test_a_finished_run_has_nothing_left_to_wait_for() -> None:
     lines = [line for line in out.getvalue().splitlines() if "left" in line]
     assert len(lines) == passes
     assert lines[-1].rstrip().endswith("about 0 s left")
+
+
+def test_what_is_done_before_the_first_bar_is_said() -> None:
+    out = io.StringIO()
+    console = Console(file=out, width=80)
+    with starting(console, "starting Ray and its workers"):
+        assert "starting Ray and its workers" in out.getvalue()
+    with PassProgress(console, {REPAIR: 2}, {REPAIR: 1.0}) as progress:
+        progress.pass_started(REPAIR, 0, 40)
+        assert "repair 1 of 2, 40 generations" in out.getvalue()

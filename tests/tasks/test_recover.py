@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+from rerun.chunk import RrdReader
 
 from ee_dist.effects import apply
+from ee_dist.effects.catalogue import from_dict
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
+from ee_dist.viewing.story import told
 
 KEYS = {
     "format", "task", "version", "config_digest", "result_digest", "seed", "engine", "wall_s", "cpu_s", "scenario",
@@ -64,7 +69,8 @@ def test_plain_mcap_lists_every_trial_and_hypothesis(finished):
             counts[channel.topic] = counts.get(channel.topic, 0) + 1
         names = {a.name for a in reader.iter_attachments()}
     assert counts["/hardware/trial"] == 6, "intact, after the change, four compensating"
-    assert counts["/prediction/trial"] == 6
+    assert counts["/prediction/trial"] == 6, "each forecast by the pass that chose its controller"
+    assert counts["/hindsight/trial"] == 4, "each diagnosed"
     assert counts["/hardware/rows"] == 6 * 80
     assert counts["/repair/generation"] == 5 * 3
     assert counts["/diagnosis/generation"] == 4 * 3
@@ -72,13 +78,79 @@ def test_plain_mcap_lists_every_trial_and_hypothesis(finished):
     assert {"robot.json", "config.yaml"} <= names
 
 
+def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
+    """In the summary, in the MCAP by the plain package, in rerun's scene, in the progress and in the terminal's table."""
+    folder, out, summary = finished
+    believed = [tuple(from_dict({"effect": t["effect"], "target": t["target"], **t["values"]}) for t in h)
+                for h in summary["hypotheses"]]  # fmt: skip
+    assert len(believed) == 4
+
+    with (folder / "recovery.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        messages = [d.decoded_message for d in reader.iter_decoded_messages(topics=["/diagnosis/hypothesis"])]
+    final = [m for m in messages if m.final]
+    assert [[(t.effect, t.target, [(v.name, v.value) for v in t.values]) for t in m.terms] for m in final] == [
+        [(t.effect, t.target, list(t.values)) for t in h] for h in believed
+    ]
+    assert [m.error for m in final] == summary["diagnosis_error"]
+    assert {m.stage for m in messages} == {"evolving", "evolved", "polished", "pruned"}
+    stages = [{m.stage: m.error for m in messages if m.pass_index == k and not m.rank and m.stage != "evolving"}
+              for k in range(4)]  # fmt: skip
+    assert stages == summary["diagnosis_stages"]
+
+    run = read_run(folder / "recovery.mcap")
+    acted_on = {t.index: t.believed for t in run.trials if t.source == PREDICTION}
+    assert [acted_on[k + 2] for k in range(4)] == believed, "the model of the next controller is the one believed"
+
+    scene = documents(folder / "recovery.rrd")["/texts/result"]
+    rows = re.findall(r"^- Diagnosis \d \(error (\S+), as evolved \S+\): (.*)$", scene, re.MULTILINE)
+    assert [text for _, text in rows] == [told(h) for h in believed]
+    assert [float(error) for error, _ in rows] == pytest.approx(summary["diagnosis_error"], rel=1e-2)
+
+    progress = [line.split("believes: ")[1] for line in out.splitlines() if "believes: " in line]
+    assert progress == [told(h) for h in believed]
+
+    *_, head = [line for line in out.splitlines() if "what the robot believed" in line]
+    column, folded = head.index("what the robot believed"), []
+    for line in out.split(head)[1].split("Function ")[0].splitlines():
+        if line[:column].strip() and line[column:].strip():
+            folded.append([])
+        if line[column:].strip() and folded:
+            folded[-1].append(line[column:].strip())
+    cells = [" ".join(words) for words in folded if set("".join(words)) != {"─"}]
+    assert cells[1:5] == [told(h).replace("; ", " ") for h in believed], "after the intact robot's"
+
+
+def test_the_recipes_of_the_page_on_recordings_tell_the_same(finished, tmp_path, monkeypatch, capsys):
+    folder, _, summary = finished
+    (tmp_path / "run.mcap").write_bytes((folder / "recovery.mcap").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    page = (Path(__file__).parents[2] / "docs" / "recording.md").read_text()
+    recipes = [r for r in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "run.mcap.part" not in r]
+    said: dict[str, object] = {}
+    for recipe in recipes:
+        exec(recipe, said)
+    out = capsys.readouterr().out
+    last = [from_dict({"effect": t["effect"], "target": t["target"], **t["values"]}) for t in summary["hypotheses"][-1]]
+    assert f"{'; '.join(map(str, last))} {summary['diagnosis_error'][-1]}" in out, "by the plain package"
+    assert "\n  ".join(["in the end:", *map(str, last)]) in out, "by this one"
+
+
+def documents(path):
+    """Texts of a rerun recording by entity."""
+    found = {}
+    for chunk in RrdReader(path).stream().to_chunks():
+        batch = chunk.to_record_batch()
+        if "TextDocument:text" in batch.schema.names:
+            found[chunk.entity_path] = batch.column("TextDocument:text").to_pylist()[0][0]
+    return found
+
+
 def test_the_recorded_trials_are_what_the_hardware_did(finished):
     """A recorded controller on the true model gives the recorded log, bit for bit."""
     folder, _, summary = finished
     run = read_run(folder / "recovery.mcap")
     assert run.complete
-    from ee_dist.effects.catalogue import from_dict
-
     truth = [from_dict(t) for t in json.loads(run.metadata["truth"])]
     hardware = {t.index: t for t in run.trials if t.source == HARDWARE}
     engine = PyBulletEngine()

@@ -7,9 +7,10 @@ import pytest
 
 from ee_dist.robots.kinematics import quat_rotate
 from ee_dist.robots.model import Joint, Part, Robot, Shape, Wiring
+from ee_dist.robots.pictured import solids_of
 from ee_dist.robots.quadruped import FOOT_M, LOWER_M, UPPER_M, quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
-from ee_dist.viewing.drawn import columns, solids_of
+from ee_dist.viewing.drawn import columns
 
 INERTIA = (1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)
 

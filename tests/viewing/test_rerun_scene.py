@@ -15,7 +15,7 @@ from ee_dist.effects import apply
 from ee_dist.engines.loop import gravity_vector
 from ee_dist.recording.clock import RunClock
 from ee_dist.recording.reader import read_run
-from ee_dist.recording.records import HARDWARE, PREDICTION, RunRecord, TrialRecord
+from ee_dist.recording.records import HARDWARE, HINDSIGHT, PREDICTION, RunRecord, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.kinematics import part_poses
 from ee_dist.viewing.palette import FOOT, TOUCHING
@@ -43,6 +43,39 @@ def test_sensor_values_and_times_are_those_of_the_logs(run: RunRecord, rrd: Path
         np.testing.assert_allclose(times[rows][:-1], k * PERIOD_S + log.times_s, atol=1e-9)
         assert np.isnan(flat[rows][-1]), "a line must end with its trial"
     assert len(flat) == len(NAMES) * (STEPS + 1)
+
+
+def test_hindsight_is_kept_apart_from_the_forecast(run: RunRecord, rrd: Path) -> None:
+    """One trial has both: what was expected before it and what the diagnosis after it makes of it."""
+    _, values = rows_of(rrd, "sensors/angle_rear_left/predicted_after", "Scalars:scalars")
+    log = trial(run, 1, HINDSIGHT).log
+    np.testing.assert_array_equal([v[0] for v in values][:-1], log.channel("angle_rear_left"))
+    assert not np.array_equal(log.channel("angle_rear_left"), trial(run, 1, PREDICTION).log.channel("angle_rear_left"))
+    _, labels = rows_of(rrd, "sensors/angle_rear_left/predicted_after", "SeriesLines:names")
+    assert labels == [["explained after"]]
+    assert rows_of(rrd, "sensors/angle_rear_left/predicted", "SeriesLines:names")[1] == [["expected before"]]
+    assert drawn_in(rrd, "world/predicted_after/upper_front_left/capsule_0", "Capsules3D:lengths") == [
+        False,
+        True,
+        False,
+    ]
+
+
+def test_errors_that_are_all_zero_are_told_instead_of_drawn(run: RunRecord, tmp_path: Path) -> None:
+    flat = [replace(g, best=0.0) if g.phase == "diagnosis" else g for g in run.generations]
+    write_rrd(replace(run, generations=flat), tmp_path / "zero.rrd")
+    text = rows_of(tmp_path / "zero.rrd", "texts/zero/diagnosis", "TextDocument:text")[1][0][0]
+    assert text == "It was 0 in each of the 5 generations of diagnosis."
+    told = "\n".join(contents_of(tmp_path / "zero.rrd", blueprint=True))
+    assert "'texts/zero/diagnosis'" in told.replace("'/texts", "'texts")
+    assert "search/error" not in told
+
+
+def test_a_believed_error_follows_the_generations_of_its_pass(rrd: Path) -> None:
+    at = rows_of(rrd, "search/error/believed", "BarChart:abscissa")[1][0][0]["buffer"]
+    own = rows_of(rrd, "search/error/diagnosis_1", "BarChart:abscissa")[1][0][0]["buffer"]
+    assert rows_of(rrd, "search/error/believed", "BarChart:values")[1][0][0]["buffer"] == [0.15]
+    assert at[0] > own[-1]
 
 
 def test_commands_are_those_of_the_hardware(run: RunRecord, rrd: Path) -> None:
@@ -186,11 +219,14 @@ def test_the_text_tells_distances_beliefs_and_truth(run: RunRecord, rrd: Path) -
         line = next(line for line in text.splitlines() if line.startswith(f"| {name} |"))
         assert f"{trial(run, k, HARDWARE).log.travel_m:.2f}" in line
         assert f"{expected:.2f}" in line
-    assert "| 1 | 0.2 | part lost at lower rear right |" in text
-    assert "**part lost at upper front left**" in text
+    explained = trial(run, 1, HINDSIGHT).log.travel_m
+    assert f"| {trial(run, 1, PREDICTION).log.travel_m:.2f} | {explained:.2f} |" in text
+    assert "- Diagnosis 1 (error 0.15, as evolved 0.2): part lost at lower rear right" in text
+    assert "**Truth: part lost at upper front left**" in text
     assert "cut short" not in text
     details = rows_of(rrd, "texts/details", "TextDocument:text")[1][0][0]
-    assert "| 0.9 | nothing changed |" in details
+    assert "| evolved | 0.9 | nothing changed |" in details
+    assert "| pruned (believed) | 0.15 | part lost at lower rear right |" in details
 
 
 def test_the_blueprint_is_in_the_file_and_names_its_views(rrd: Path) -> None:

@@ -6,6 +6,7 @@ import importlib.util
 import struct
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -13,12 +14,14 @@ import psutil
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
+from finding_samples import finding
 
-from ee_dist.recording.records import HARDWARE, PREDICTION, RunRecord
+from ee_dist.recording.records import RunRecord
 from ee_dist.viewing import headless
-from ee_dist.viewing.comparison import Rung, write_comparison_rrd
+from ee_dist.viewing.finding_scene import write_compare_rrd, write_explain_rrd, write_improve_rrd
 from ee_dist.viewing.headless import HeadlessViewer, ViewerError, vulkan_devices
 from ee_dist.viewing.screenshot import Picture, take_pictures
+from ee_dist.viewing.trial_scene import write_trial_rrd
 
 needs_vulkan = pytest.mark.skipif(
     vulkan_devices() == 0, reason="no Vulkan driver on this machine (Debian: mesa-vulkan-drivers libvulkan1)"
@@ -61,15 +64,24 @@ def test_the_scene_of_a_run_has_no_view_errors_and_moves(rrd: Path) -> None:
 
 
 @needs_vulkan
-def test_the_scene_of_a_comparison_has_no_view_errors(run: RunRecord, tmp_path: Path) -> None:
-    logs = {t.source: t.log for t in run.trials if t.index == 1}
-    path = tmp_path / "comparison.rrd"
-    pairs = [("after the change", logs[HARDWARE], logs[PREDICTION])]
-    write_comparison_rrd(run.robot, pairs, path, [Rung("starting model", 0.3, 0.2), Rung("+ part lost", 0.1, 0.1)])
-    (picture,) = take_pictures(path, [0.5], size=SIZE)
+@pytest.mark.parametrize("write", [write_compare_rrd, write_explain_rrd, write_improve_rrd])
+def test_the_scenes_of_the_verbs_have_no_view_errors(write: Callable[..., None], tmp_path: Path) -> None:
+    robot = {write_compare_rrd: "linear_stage", write_explain_rrd: "arm", write_improve_rrd: "servo_pendulum"}[write]
+    odd = "python -m ee_dist measured='\u6d4b\u8bd5 #1, na\u00efve.mcap'"
+    write(replace(finding(robot), next_command=odd), tmp_path / "scene.rrd")
+    (picture,) = take_pictures(tmp_path / "scene.rrd", [0.5], size=SIZE)
     assert picture.reports == ()
     assert len(picture.png) > 30_000
-    assert "Error of each model, numbered as above" in picture.views
+    assert "Result" in picture.views
+    assert "Robot and model, where the error is largest" in picture.views
+
+
+@needs_vulkan
+def test_the_scene_of_trials_has_no_view_errors(run: RunRecord, tmp_path: Path) -> None:
+    write_trial_rrd(run, tmp_path / "trial.rrd")
+    (picture,) = take_pictures(tmp_path / "trial.rrd", [0.5], size=SIZE)
+    assert picture.reports == ()
+    assert {"Trials", "Robot", "Angle", "Touch", "Commands (rad)"} <= set(picture.views)
 
 
 @needs_vulkan

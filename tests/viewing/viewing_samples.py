@@ -16,8 +16,11 @@ from ee_dist.engines.drivers import Network, weight_count
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.recording.records import (
     DIAGNOSIS,
+    EVOLVED,
     HARDWARE,
+    HINDSIGHT,
     PREDICTION,
+    PRUNED,
     REPAIR,
     GenerationRecord,
     HypothesisRecord,
@@ -34,7 +37,7 @@ BELIEVED: tuple[Hypothesis, ...] = ((), (), LOST_FOOT)
 
 
 def sample_run() -> RunRecord:
-    """Three trials of a robot that loses a leg after the first; the last prediction believes in a lost foot."""
+    """Three trials of a robot that loses a leg after the first; the last prediction and the hindsight believe in a lost foot."""
     rng = np.random.default_rng(7)
     robot = quadruped()
     drivers = [Network(tuple(rng.uniform(-1, 1, weight_count(8, 8)).round(2).tolist())) for _ in range(2)]
@@ -43,18 +46,25 @@ def sample_run() -> RunRecord:
     models = [apply(robot, b) for b in BELIEVED]
     engine = PyBulletEngine()
     logs = engine.rollout(
-        [Rollout(m, d, STEPS, pose=True) for m, d in zip([*bodies, *models], [*drivers, *drivers], strict=True)]
+        [
+            Rollout(m, d, STEPS, pose=True)
+            for m, d in zip([*bodies, *models, models[2]], [*drivers, *drivers, drivers[1]], strict=True)
+        ]
     )
     engine.close()
     run = RunRecord(robot, {"scenario": "3", "seed": "0", "truth": json.dumps([t.as_dict() for t in LOST_LEG])})
     for k, name in enumerate(NAMES):
         run.trials.append(TrialRecord(k, name, HARDWARE, drivers[k], logs[k]))
         run.trials.append(TrialRecord(k, name, PREDICTION, drivers[k], logs[k + 3], BELIEVED[k]))
+    # What the diagnosis made of the trial after the change: its driver on the model of trial 1's prediction.
+    run.trials.append(TrialRecord(1, NAMES[1], HINDSIGHT, drivers[1], logs[6], LOST_FOOT))
     for p in range(3):
         run.generations += [GenerationRecord(REPAIR, p, g, 0.5 * p + 0.1 * g, 0.0, g, 8, 8) for g in range(5)]
     run.generations += [GenerationRecord(DIAGNOSIS, 0, g, 1.0 / (1 + g), 2.0, g, 8, 8) for g in range(5)]
-    run.hypotheses += [HypothesisRecord(0, g, 0, LOST_FOOT if g else (), 1.0 / (1 + g), g == 4) for g in range(5)]
-    run.hypotheses.append(HypothesisRecord(0, 4, 1, (), 0.9, True))
+    run.hypotheses += [HypothesisRecord(0, g, 0, LOST_FOOT if g else (), 1.0 / (1 + g)) for g in range(5)]
+    run.hypotheses.append(HypothesisRecord(0, 4, 0, LOST_FOOT, 0.2, stage=EVOLVED))
+    run.hypotheses.append(HypothesisRecord(0, 4, 1, (), 0.9, stage=EVOLVED))
+    run.hypotheses.append(HypothesisRecord(0, 4, 0, LOST_FOOT, 0.15, final=True, stage=PRUNED))
     run.complete = True
     return run
 

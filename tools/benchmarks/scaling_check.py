@@ -15,7 +15,8 @@ from ray.cluster_utils import Cluster
 
 from benchmarks.scaling_model import Costs, Generation, simulate
 from ee_dist.evaluation.cache import CachedEvaluator
-from ee_dist.evaluation.ray_actors import RayEvaluator, start_ray
+from ee_dist.evaluation.ray_actors import RayEvaluator
+from ee_dist.evaluation.ray_session import start_ray
 from ee_dist.evolution.ga import Budget
 from ee_dist.recording.records import GenerationRecord
 from ee_dist.recovery.observer import Observer

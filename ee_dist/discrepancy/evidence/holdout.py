@@ -1,0 +1,151 @@
+"""What is held out: windows of the same motions, whole motions, or settings; and fits that have not seen it.
+
+Windows of one motion are evidence only where nothing but noise is left: two windows of a motion share whatever else the
+model gets wrong. Where more is left, only another motion, or another setting, tells whether an effect travels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.discrepancy.problem import Index, Mask, Problem
+from ee_dist.discrepancy.search.fit import fit_all
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.trials.log import Array
+
+WINDOWS, MOTIONS, SETTINGS = (
+    "windows of the same motions",
+    "motions that were not fitted",
+    "settings that were not fitted",
+)
+ONE_BY_ONE = 3
+"""Up to so many motions or settings each is held out by itself; more take turns in two groups."""
+PRIOR = 1.0
+"""Energy that a value at its bound costs in a fit that will be judged elsewhere: a value that the fitted part does not
+determine is neutral there, and not what the part held out would like it to be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A way of holding out. ``fold_of`` (segments,): the turn in which a segment is held out; ``unit_of`` (segments,): what
+    counts as one piece of evidence, of ``group_of`` (segments,)."""
+
+    name: str
+    fold_of: Index
+    unit_of: Index
+    group_of: Index
+
+    @property
+    def folds(self) -> int:
+        return int(self.fold_of.max()) + 1
+
+    def seen(self, problem: Problem, fold: int) -> Mask:
+        """(n,) residual values that are fitted in a turn."""
+        return np.asarray(self.fold_of[problem.segment_of] != fold)
+
+    def by_unit(self, energies: Array) -> Array:
+        """(units,) sums of (segments,) energies."""
+        return np.bincount(self.unit_of, weights=energies)
+
+    @property
+    def groups(self) -> Index:
+        """(units,) the group of each unit."""
+        out = np.zeros(int(self.unit_of.max()) + 1, dtype=np.int64)
+        out[self.unit_of] = self.group_of
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """A model judged on what its fits had not seen: ``residual`` (n,) there, ``seen`` mean square where it was fitted,
+    ``fits`` one a turn."""
+
+    cut: Cut
+    residual: Array
+    seen: float
+    fits: tuple[Fit, ...]
+
+
+def windows(problem: Problem) -> Cut:
+    """Windows of a trial alternate in two turns; where a trial is a single segment, the trials do."""
+    trial = problem.trial_of_segment
+    fold = np.zeros(len(trial), dtype=np.int64)
+    single = 0
+    for k in np.unique(trial):
+        members = np.flatnonzero(trial == k)
+        if len(members) == 1:
+            fold[members] = single
+            single = 1 - single
+        else:
+            fold[members] = (np.arange(len(members)) + k) % 2
+    return Cut(WINDOWS, fold, np.arange(len(trial)), trial)
+
+
+def travelling(problem: Problem) -> list[Cut]:
+    """Ways of holding out that a motion or a setting takes part in as a whole; none where there is only one."""
+    trial = np.asarray(problem.trial_of_segment)
+    kinds = _kinds(problem)
+    settings = [t.setup for t in problem.measured]
+    cuts = []
+    for name, of_trial in ((MOTIONS, kinds), (SETTINGS, settings)):
+        different = list(dict.fromkeys(of_trial))
+        if len(different) < 2 or (name == SETTINGS and len(different) == len(settings)):
+            continue
+        turns = len(different) if len(different) <= ONE_BY_ONE else 2
+        number = np.array([different.index(x) % turns for x in of_trial])
+        cuts.append(Cut(name, number[trial], trial, np.zeros_like(trial)))
+    return cuts
+
+
+def _kinds(problem: Problem) -> list[object]:
+    """By trial: what motion it is. Trials of one name, or of the same commands, are repeats."""
+    known: dict[bytes, str] = {}
+    return [known.setdefault(t.log.commands.tobytes(), t.name) for t in problem.measured]
+
+
+def cross_fit(
+    search: Search,
+    starts: Sequence[tuple[Model, Array]],
+    cut: Cut,
+    widths: Sequence[float] = WIDTHS[2:],
+    leading: Array | None = None,
+) -> list[HeldOut]:
+    """Each (model, start) fitted in every turn on what is not held out, and judged on the rest. ``leading`` (n, P0): slopes of
+    the first values, where all models have these in common."""
+    problem = search.problem
+    residuals = [np.zeros(len(problem.segment_of)) for _ in starts]
+    seen, count = np.zeros(len(starts)), 0
+    fits: list[list[Fit]] = [[] for _ in starts]
+    for fold in range(cut.folds):
+        mask = cut.seen(problem, fold)
+        if mask.all():
+            continue
+        count += int(mask.sum())
+        for i, fit in enumerate(fit_all(search, starts, mask, widths, PRIOR, leading)):
+            residuals[i][~mask] = fit.residual[~mask]
+            seen[i] += fit.energy
+            fits[i].append(fit)
+    return [HeldOut(cut, r, float(s) / max(count, 1), tuple(f)) for r, s, f in zip(residuals, seen, fits, strict=True)]
+
+
+def bootstrap(
+    differences: Array, seed: int = 0, draws: int = 1000, level: float = 0.95, groups: Index | None = None
+) -> tuple[float, float]:
+    """Interval of the sum of ``differences`` (units,) under resampling of the units, within each of ``groups``
+    (units,) if they are given: what shows only in some trials does not vanish because none of them was drawn."""
+    d = np.asarray(differences, dtype=float)
+    if not np.isfinite(d).all() or not len(d):
+        return (-np.inf, np.inf)
+    rng = np.random.default_rng([seed, len(d)])
+    of = np.zeros(len(d), dtype=np.int64) if groups is None else groups
+    sums = np.zeros(draws)
+    for g in np.unique(of):
+        mine = d[of == g]
+        sums += mine[rng.integers(0, len(mine), (draws, len(mine)))].sum(axis=1)
+    low, high = np.quantile(sums, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)

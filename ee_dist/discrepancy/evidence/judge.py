@@ -1,0 +1,191 @@
+"""The rule of evidence, the same for every way of comparing: what an effect is worth on data it was not fitted to, and
+which effects cannot be told apart there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.holdout import WINDOWS, HeldOut, bootstrap
+from ee_dist.discrepancy.problem import Problem, error, per_segment
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.trials.log import Array
+
+LEAST_SHARE = 0.002
+"""Share of the starting energy that an effect must take off held-out data to be worth a term."""
+LOST_SHARE = 0.3
+"""An interval that reaches zero counts against an effect only where it makes some pieces of evidence worse by this share of
+its gain: an effect that shows in one window of twenty, and harms none, is no less true for that."""
+CAUTION = 2.0
+"""By how much more an effect must gain than one did on an untouched robot: there the model's own error happened to look
+like an effect, and on the next robot noise adds to it."""
+TIE_ENERGY = 9.0
+"""Two explanations closer than this (3 standard deviations, squared) on held-out data are not told apart."""
+WORTH = 0.1
+"""Share of the squared error above the noise floor that an effect must take off where more than noise is left with it.
+Where a model is wrong in ways that no effect describes (another simulator, resampled records), some effect always takes a
+little of it, surely and wrongly."""
+LUCK = "its gain on held-out data is no more than luck"
+MAY_BE_ZERO = "its gain on held-out data may be zero"
+TOO_LITTLE = "it takes less than a tenth of what is above the noise"
+
+
+@dataclass(eq=False)
+class Judged:
+    """One proposal on top of a model, both fitted together. Errors are root mean squares of residual values; ``gain`` and
+    ``interval`` are shares of the held-out energy that it takes off, ``explained`` the share of what is above the noise;
+    ``held`` (segments,) is the held-out energy, ``residual`` (n,) the held-out residual; ``u`` the values of the whole model."""
+
+    proposal: Proposal
+    model: Model
+    u: Array
+    error_fit: float
+    error_heldout: float
+    gain: float
+    explained: float
+    interval: tuple[float, float]
+    held: Array
+    residual: Array
+    outcome: HeldOut
+    dispersion: float
+    why_not: str = ""
+    rank: int = 0
+    tied_with: list[str] = field(default_factory=list)
+
+    @property
+    def earned(self) -> bool:
+        return not self.why_not
+
+    @property
+    def held_out(self) -> str:
+        """What was held out."""
+        return self.outcome.cut.name
+
+    @property
+    def terms(self) -> Hypothesis:
+        """The proposal with its fitted values."""
+        return self.model.hypothesis(self.u)[len(self.model.parts) - len(self.proposal.parts) :]
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """All free terms of the model, the proposal's last."""
+        return self.model.hypothesis(self.u)
+
+    @property
+    def candidate(self) -> Candidate:
+        return self.proposal.parts[-1]
+
+    @property
+    def own(self) -> Array:
+        """The fitted u of the proposal."""
+        return self.u[len(self.u) - self.proposal.size :]
+
+    @property
+    def name(self) -> str:
+        return self.proposal.name
+
+
+def least_energy(tried: int, parameters: int = 1) -> float:
+    """Energy that the best of ``tried`` useless candidates may take off by luck, with a margin: the largest of that many
+    chi-squared values with one degree of freedom is about 2 ln(tried), and every further parameter adds to it."""
+    return 2.0 * math.log(max(tried, 2)) + 8.0 + 2.0 * parameters
+
+
+def judge(problem: Problem, base: Array, found: HeldOut, proposal: Proposal, model: Model, tried: int) -> Judged:
+    """``base`` (n,): held-out residual of the model without the proposal, under the same cut."""
+    cut = found.cut
+    before, held = per_segment(problem, base), per_segment(problem, found.residual)
+    gained = cut.by_unit(before - held)
+    low, high = bootstrap(gained, groups=cut.groups)
+    total, gain = float(before.sum()), float(gained.sum())
+    floor = float(problem.floor.sum())
+    dispersion = max(1.0, float(held.sum()) / len(base))
+    # Where a model is wrong all over, useless effects take more off it by luck, in proportion.
+    enough = least_energy(tried, max(1, proposal.size)) * dispersion + CAUTION * problem.gained
+    above = max(total - floor, 1e-12)
+    why = ""
+    if not np.isfinite(gain) or gain < enough:
+        why = LUCK
+    elif low <= 0 and lost(gained) > LOST_SHARE * gain:
+        why = MAY_BE_ZERO
+    elif gain < LEAST_SHARE * total or (cut.name != WINDOWS and gain < WORTH * above):
+        why = TOO_LITTLE
+    values = np.mean([f.u for f in found.fits], axis=0) if _agree(found) else _best(found)
+    share = total if total > 0 else 1.0
+    return Judged(
+        proposal=proposal,
+        model=model,
+        u=values,
+        error_fit=math.sqrt(max(found.seen, 0.0)),
+        error_heldout=error(found.residual) if np.isfinite(found.residual).all() else math.inf,
+        gain=gain / share if math.isfinite(gain) else -math.inf,
+        explained=gain / above if math.isfinite(gain) else -math.inf,
+        interval=(low / share, high / share),
+        held=held,
+        residual=found.residual,
+        outcome=found,
+        dispersion=dispersion if math.isfinite(dispersion) else 1.0,
+        why_not=why,
+    )
+
+
+def lost(gained: Array) -> float:
+    """Energy that pieces of evidence lose where the effect makes them worse."""
+    return float(-np.minimum(gained, 0.0).sum())
+
+
+def _agree(found: HeldOut) -> bool:
+    values = np.array([f.u for f in found.fits])
+    return bool(values.size) and float(np.ptp(values, axis=0).max()) < 0.05
+
+
+def _best(found: HeldOut) -> Array:
+    return min(found.fits, key=lambda f: f.energy / max(1, int(f.mask.sum()))).u
+
+
+def ranked(found: Sequence[Judged]) -> list[Judged]:
+    """Best held-out energy first, those that earned their place before the others; ties are named, and of tied laws
+    the one that another contains goes first: a richer law can always mimic a simpler one."""
+    ordered = sorted(found, key=lambda j: (not j.earned, float(j.held.sum())))
+    for k, j in enumerate(ordered):
+        j.tied_with, j.rank = [], k
+    for a, one in enumerate(ordered):
+        for other in ordered[a + 1 :]:
+            if one.earned and other.earned and tied(one, other):
+                one.tied_with.append(other.name)
+                other.tied_with.append(one.name)
+    if ordered:
+        best = ordered[0]
+        simpler = [j for j in ordered[1:] if j.name in best.tied_with and contains(best.proposal, j.proposal)]
+        if simpler:
+            first = min(simpler, key=lambda j: (j.proposal.size, j.rank))
+            ordered.remove(first)
+            ordered.insert(0, first)
+    for k, j in enumerate(ordered):
+        j.rank = k + 1
+    return ordered
+
+
+def contains(richer: Proposal, simpler: Proposal) -> bool:
+    """Whether the richer proposal is to give way to the simpler one where data do not tell them apart: a law with one more
+    term, or a family of values, one for each joint, against anything that does with fewer."""
+    if len(richer.parts) > 1:
+        return simpler.size < richer.size
+    if len(simpler.parts) > 1:
+        return False
+    r, s = richer.parts[0], simpler.parts[0]
+    return r.target == s.target and s.effect.name in r.effect.contains
+
+
+def tied(one: Judged, other: Judged) -> bool:
+    """Whether held-out data cannot tell which is better: the difference is small, or its interval holds zero."""
+    gap = one.outcome.cut.by_unit(other.held - one.held)
+    if not np.isfinite(gap).all():
+        return False
+    low, high = bootstrap(gap, seed=1)
+    return abs(float(gap.sum())) < TIE_ENERGY * max(one.dispersion, 1.0) or low <= 0 <= high

@@ -1,0 +1,84 @@
+"""Whether anything is left in a residual beyond noise, and where it sits: the test behind every verdict."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.trials.log import Array
+
+LIMIT = 5.0
+"""Standard deviations beyond which a group of values (of some hundred) is not noise: one false alarm in 10^4 runs."""
+VARIES = 1.0
+"""By how much of itself what calibration left may vary from one robot to the next, as one standard deviation."""
+EVENT = 170.0
+"""Energy of a few touch values that come a row early or late: a model good to the noise still misses some contacts."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """A place where more is left than noise. ``z``: by how many standard deviations; ``excess``: energy above noise;
+    ``trend``: whether it drifts slowly (True) or scatters (False)."""
+
+    trial: str
+    channel: str
+    z: float
+    excess: float
+    trend: bool
+
+    def __str__(self) -> str:
+        shape = "slow" if self.trend else "quick"
+        return f"{self.channel} during {self.trial} ({shape}, {self.z:.0f} standard deviations above noise)"
+
+
+def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[Leftover]:
+    """Groups (trial and channel) whose residual is not noise, the worst first.
+
+    Two tests a group: its energy against the floor (chi squared), and the energy of its segment means, which finds what
+    is small but does not change sign.
+    """
+    segments, channels = len(problem.segments), len(problem.channels)
+    cell = problem.segment_of * channels + problem.channel_of
+    size = segments * channels
+    shape = (segments, channels)
+    n = np.bincount(cell, minlength=size).reshape(shape).astype(float)
+    e = np.bincount(cell, weights=residual**2, minlength=size).reshape(shape)
+    f = np.bincount(cell, weights=problem.floor, minlength=size).reshape(shape)
+    s = np.bincount(cell, weights=residual, minlength=size).reshape(shape)
+    b = np.bincount(cell, weights=problem.layout.known, minlength=size).reshape(shape)
+    found = []
+    for k, trial in enumerate(problem.trials):
+        mine = problem.trial_of_segment == k
+        count, energy, floor = n[mine].sum(0), e[mine].sum(0), f[mine].sum(0)
+        slow = np.divide(s[mine] ** 2, n[mine], out=np.zeros_like(s[mine]), where=n[mine] > 0)
+        bias = b[mine].sum(0)
+        mean_floor = np.divide(f[mine] - b[mine], n[mine], out=np.zeros_like(s[mine]), where=n[mine] > 0)
+        for c in np.flatnonzero(count):
+            events = EVENT if floor[c] < 0.3 * count[c] else 0.0
+            quick_z = (energy[c] - floor[c]) / (math.sqrt(2.0 * max(floor[c], 1.0)) + events + VARIES * bias[c])
+            windows = float((n[mine][:, c] > 0).sum())
+            sd = math.sqrt(2.0) * math.sqrt(max(float((mean_floor[:, c] ** 2).sum()), 1.0)) + events
+            sd += VARIES * bias[c]
+            slow_z = (slow[:, c].sum() - mean_floor[:, c].sum() - bias[c]) / sd if windows else 0.0
+            if max(quick_z, slow_z) <= limit:
+                continue
+            # A sum of few squares is far from normal: two windows exceed six of its standard deviations once in 500 times.
+            quick_z = min(quick_z, _rarity(energy[c], floor[c] / count[c], count[c]))
+            slow_z = min(slow_z, _rarity(slow[:, c].sum(), mean_floor[:, c].sum() / max(windows, 1.0), windows))
+            z = max(quick_z, slow_z)
+            if z > limit:
+                found.append(
+                    Leftover(trial, problem.channels[c], float(z), float(energy[c] - floor[c]), bool(slow_z >= quick_z))
+                )
+    return sorted(found, key=lambda g: -g.z)
+
+
+def _rarity(total: float, each: float, count: float) -> float:
+    """How rare a sum of ``count`` squares of noise of mean ``each`` is: the normal deviate that is as rare."""
+    if each <= 0 or count < 1:
+        return math.inf
+    return float(norm.isf(chi2.sf(total / each, count)))

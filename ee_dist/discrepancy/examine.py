@@ -1,0 +1,270 @@
+"""One step of the search, the same for explain and improve: which effect, on top of the model so far, explains most.
+
+Screen all candidates, scan the promising over their range, fit the best of them quickly, then fit these together with what
+the model has already and judge them on data that the fits had not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
+from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, ranked
+from ee_dist.discrepancy.evidence.left import Leftover, leftovers
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal
+from ee_dist.discrepancy.search.fit import fit_all
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.scan import Scanned, scan
+from ee_dist.discrepancy.search.screen import Screened, screen
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import WIDTHS, slopes_at
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.effects.groups import ALL_JOINTS
+from ee_dist.trials.log import Array
+
+CALM = 0.8
+"""Share of the most predictable trial's trust from which a trial counts as calm."""
+FAR = 2.0
+"""Error over the noise floor of the best quick fit from which windows of the same motions need not even be looked at."""
+NEAR = 1.1
+"""Error over the noise floor up to which windows of the same motions are evidence enough: no more than noise is left."""
+FAMILIES_TRIED = 3
+"""Effects whose members at all joints, each with a value of its own, are tried together."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is tried. ``shares``: sizes of the probes; ``first``: candidates that are scanned over their range;
+    ``second``: those of them that get a quick fit, from ``starts`` points each; ``final``: those fitted out and judged."""
+
+    shares: tuple[float, ...] = (0.1, 0.6)
+    first: int = 20
+    second: int = 9
+    starts: int = 2
+    final: int = 6
+
+
+STANDARD_EFFORT = Effort()
+
+
+@dataclass(frozen=True, eq=False)
+class Current:
+    """The model so far: free parts and their values u on top of what the search has fixed."""
+
+    parts: tuple[Candidate, ...] = ()
+    u: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        return Model(self.parts).hypothesis(self.u)
+
+
+@dataclass(eq=False)
+class Examined:
+    """``judged``: ranked, best first. ``base`` (n,): residual of the model as it is; ``left``: what the best, or the model as
+    it is, leaves unexplained."""
+
+    judged: list[Judged]
+    screened: list[Screened]
+    base: Array
+    left: list[Leftover]
+    tried: int
+
+    @property
+    def best(self) -> Judged | None:
+        return self.judged[0] if self.judged and self.judged[0].earned else None
+
+    @property
+    def tied(self) -> list[Judged]:
+        """The best and all that are tied with it."""
+        best = self.best
+        return [] if best is None else [best, *(c for c in self.judged if c.name in best.tied_with)]
+
+
+def examine(search: Search, current: Current, pool: Sequence[Candidate], effort: Effort = STANDARD_EFFORT) -> Examined:
+    """Judge what of ``pool`` explains the residual of the current model. Raises ValueError for one that cannot be simulated."""
+    problem, now = search.problem, search.on(current.hypothesis)
+    base = now.base()
+    if not np.isfinite(base).all():
+        raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
+    calm = calm_trials(problem, base)
+    screened = screen(now.among(busiest(problem, base, calm)), pool, effort.shares)
+    least = least_energy(len(pool))
+    promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)[: effort.first]
+    scanned = sorted(scan(now.among(busiest(problem, base, calm)), promising), key=lambda s: s.energy)[: effort.second]
+    quick = sorted(_quick(now.among(calm), scanned, effort.starts), key=lambda f: f.energy)[: effort.final]
+    starts = [(Proposal((f.model.parts[0],)), f.u) for f in quick]
+    starts += _families(screened, quick, least)
+    nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
+    judged = _judged(search, current, starts, base, len(pool), far=nearest > FAR**2)
+    if judged and not judged[0].earned and leftovers(problem, base):
+        pairs = _pairs(screened, now)
+        if pairs:
+            judged = ranked([*judged, *_judged(search, current, pairs, base, len(pool))])
+    best = judged[0] if judged and judged[0].earned else None
+    left = leftovers(problem, base if best is None else best.residual)
+    return Examined(judged, screened, base, left, len(pool))
+
+
+def _judged(
+    search: Search,
+    current: Current,
+    starts: Sequence[tuple[Proposal, Array]],
+    base: Array,
+    tried: int,
+    far: bool = False,
+) -> list[Judged]:
+    """On windows; where more than noise is left with the best of them (``far``: where that is known beforehand), on whole
+    motions and settings."""
+    if not starts:
+        return []
+    problem, cuts = search.problem, travelling(search.problem)
+    found: list[Judged] = []
+    if not (far and cuts):
+        found = under(search, current, starts, windows(problem), base, tried)
+        if not cuts or (found[0].earned and float(found[0].held.sum()) <= NEAR**2 * float(problem.floor.sum())):
+            return found
+        found = []
+    for cut in cuts:
+        again = under(search, current, starts, cut, base, tried)
+        found = strictest(found, again) if found else again
+    return found
+
+
+def _floor_of(problem: Problem, trials: Sequence[int]) -> float:
+    """Energy that noise leaves in some trials."""
+    return float(problem.floor[np.isin(problem.trial_of, list(trials))].sum())
+
+
+def under(
+    search: Search, current: Current, starts: Sequence[tuple[Proposal, Array]], cut: Cut, base: Array, tried: int
+) -> list[Judged]:
+    """Proposals fitted together with the current model and judged under one cut, ranked."""
+    models = [(Model((*current.parts, *p.parts)), np.concatenate([current.u, u])) for p, u in starts]
+    without, leading = base, None
+    if len(current.u):
+        own = Model(current.parts)
+        without = cross_fit(search, [(own, current.u)], cut)[0].residual
+        # What the model has already moves little when one effect is added: its slopes are taken once for all proposals.
+        leading = None if search.problem.rugged else slopes_at(search, own, current.u)
+    outcomes = cross_fit(search, models, cut, leading=leading)
+    return ranked(
+        [
+            judge(search.problem, without, outcome, p, model, tried)
+            for outcome, (p, _), (model, _) in zip(outcomes, starts, models, strict=True)
+        ]
+    )
+
+
+def strictest(first: Sequence[Judged], second: Sequence[Judged]) -> list[Judged]:
+    """Under two cuts an effect must earn its place under both; the one under which it did worse speaks for it."""
+    other = {j.name: j for j in second}
+    out = []
+    for j in first:
+        k = other[j.name]
+        out.append(k if (not k.earned and j.earned) or (k.earned == j.earned and k.explained < j.explained) else j)
+    return ranked(out)
+
+
+def calm_trials(problem: Problem, base: Array) -> list[int]:
+    """Trials to search on: those that can be predicted, where the residual follows a parameter smoothly. One trial in
+    which a controller was in the loop is always among them: only there does wiring show. All, where the calm ones have
+    nothing to explain."""
+    count, trust = len(problem.trials), problem.trust
+    chosen = [k for k in range(count) if trust[k] >= CALM * max(trust)]
+    if problem.looped and not set(problem.looped) & set(chosen):
+        chosen.append(problem.looped[0])
+    own = np.isin(problem.trial_of, chosen)
+    excess = float((base[own] ** 2 - problem.floor[own]).sum())
+    if excess < 6.0 * float(np.sqrt(2.0 * problem.floor[own].sum())):
+        return list(range(count))
+    return sorted(chosen)
+
+
+def busiest(problem: Problem, base: Array, among: Sequence[int], share: float = 0.5) -> list[int]:
+    """Of some trials those with most to explain for their length, up to a share of all their values; a trial with a
+    controller in the loop is always among them."""
+    count = len(problem.trials)
+    size = np.bincount(problem.trial_of, minlength=count).astype(float)
+    excess = np.bincount(problem.trial_of, weights=base**2 - problem.floor, minlength=count)
+    chosen: list[int] = []
+    for k in sorted(among, key=lambda k: -float(excess[k]) / max(float(size[k]), 1.0)):
+        if not chosen or size[chosen].sum() < share * size[list(among)].sum():
+            chosen.append(k)
+    looped = [k for k in problem.looped if k in among]
+    if looped and not set(looped) & set(chosen):
+        chosen.append(looped[0])
+    return sorted(chosen)
+
+
+def _quick(search: Search, scanned: Sequence[Scanned], starts: int) -> list[Fit]:
+    """The better of a few quick fits of each candidate, on all data: it only chooses who is judged."""
+    tasks = [(i, Model((s.candidate,)), u) for i, s in enumerate(scanned) for u in s.starts[:starts]]
+    fits = fit_all(search, [(m, u) for _, m, u in tasks], None, WIDTHS[1:3])
+    best: dict[int, Fit] = {}
+    for (i, _, _), fit in zip(tasks, fits, strict=True):
+        if i not in best or fit.energy < best[i].energy:
+            best[i] = fit
+    return [best[i] for i in sorted(best)]
+
+
+def _families(screened: Sequence[Screened], quick: Sequence[Fit], least: float) -> list[tuple[Proposal, Array]]:
+    """Effects at all joints, each joint with a value of its own, where several joints promise something: one number for
+    all of them may be too few. And friction by load, linear and quadratic, which pay together."""
+    out: list[tuple[float, Proposal, Array]] = []
+    by_effect: dict[str, list[Screened]] = {}
+    whole = {s.candidate.effect.name for s in screened if s.candidate.target == ALL_JOINTS}
+    for s in screened:
+        if s.candidate.effect.name in whole and s.candidate.target in _joints(screened, s.candidate.effect.name):
+            by_effect.setdefault(s.candidate.effect.name, []).append(s)
+    for name, members in by_effect.items():
+        visible = [s for s in members if s.starts and s.promise > least]
+        if len(visible) < 2:
+            continue
+        promise = sum(s.promise for s in visible)
+        if promise > 1.3 * max(s.promise for s in visible):
+            label = f"{name}@each of {len(visible)} joints"
+            parts = Proposal(tuple(s.candidate for s in visible), label)
+            out.append((promise / parts.size, parts, np.concatenate([s.starts[0] for s in visible])))
+    out = sorted(out, key=lambda f: -f[0])[:FAMILIES_TRIED]
+    found = [(p, u) for _, p, u in out]
+    by_name = {s.candidate.name: s for s in screened}
+    for f in quick:
+        c = f.model.parts[0]
+        other = by_name.get(f"quadratic_friction@{c.target}")
+        if c.effect.name == "load_friction" and other is not None and other.reach > 0:
+            start = np.where(other.candidate.upper > 0, 0.05, -0.05)
+            found.append((Proposal((c, other.candidate)), np.concatenate([f.u, start])))
+    return found
+
+
+def _joints(screened: Sequence[Screened], effect: str) -> set[str]:
+    """Targets of an effect that are single joints."""
+    return {
+        s.candidate.target
+        for s in screened
+        if s.candidate.effect.name == effect and s.candidate.target != ALL_JOINTS and "+" not in s.candidate.target
+    }
+
+
+def _pairs(screened: Sequence[Screened], now: Search) -> list[tuple[Proposal, Array]]:
+    """Pairs of effects at the place that promises most: some pay only together."""
+    hopeful = sorted((s for s in screened if s.promise > 0), key=lambda s: -s.promise)
+    if not hopeful:
+        return []
+    place = hopeful[0].candidate.target
+    there = [s for s in hopeful if s.candidate.target == place and s.candidate.size][:4]
+    best = {s.candidate.name: s.starts[0] for s in scan(now, there)}
+    pairs = [p for p in combinations(there, 2) if all(s.candidate.name in best for s in p)][:4]
+    return [
+        (
+            Proposal((a.candidate, b.candidate)),
+            0.5 * np.concatenate([best[a.candidate.name], best[b.candidate.name]]),
+        )
+        for a, b in pairs
+    ]

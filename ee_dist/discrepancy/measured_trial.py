@@ -1,0 +1,75 @@
+"""A measured trial: what drove the robot, and the sensor log that came back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.engines.drivers import Commands, Driver, Network
+from ee_dist.robots.model import Robot
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.log import Array, SensorLog, State
+
+SMOOTHED = 15
+"""Rows that a parabola is laid through to smooth a noisy speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTrial:
+    """``driver`` is what the experimenter sent; None where only the log's own commands are known.
+
+    Trials of one ``name`` are repeats of one another: the noise floor is measured from them. ``setup`` is what is known
+    to be special about the trial (a gain, a payload); it is applied to the model as well as any hypothesis.
+    """
+
+    name: str
+    log: SensorLog
+    driver: Driver | None = None
+    setup: Hypothesis = ()
+
+
+def driver_of(excitation: Excitation, robot: Robot) -> Commands | Network:
+    """What makes the robot do it."""
+    weights = excitation.weights(robot)
+    return Commands(excitation.commands(robot)) if weights is None else Network(weights)
+
+
+def setup_of(excitation: Excitation) -> Hypothesis:
+    """How the robot is held."""
+    return (term("on_stand"),) if excitation.fixture == "stand" else ()
+
+
+def released(commands: Array) -> tuple[Array, Array | None]:
+    """Commands (T, M) with numbers everywhere, and (T,) 0 where the drives were released, if they were.
+
+    A released drive obeys no command: its command is NaN in the log.
+    """
+    gone = ~np.isfinite(commands).all(axis=1)
+    if not gone.any():
+        return commands, None
+    rows = np.where(gone, 0, np.arange(len(commands)))
+    first = int(np.argmin(gone))
+    return np.nan_to_num(commands[np.maximum(np.maximum.accumulate(rows), first)]), (~gone).astype(float)
+
+
+def start_of(log: SensorLog, robot: Robot) -> State | None:
+    """Where a measured robot on a fixed base began; None where it stood at position zero, or that is not known."""
+    if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
+        return None
+    return State(log.joints[0].copy(), speeds_of(log, robot)[0])
+
+
+def speeds_of(log: SensorLog, robot: Robot) -> Array:
+    """Measured speeds (T, M); differences of the positions where a joint has no sensor for it. Of a sensor that is known to
+    be noisy, a smooth course: a start that is off by the noise of one row goes on for seconds."""
+    assert log.joints is not None
+    out = np.gradient(log.joints, float(np.median(np.diff(log.times_s))), axis=0)
+    for k, motor in enumerate(robot.motor_names):
+        for c, sensor in enumerate(robot.sensors):
+            if sensor.kind == "velocity" and sensor.target == motor:
+                seen = log.sensors[:, c]
+                out[:, k] = savgol_filter(seen, SMOOTHED, 2) if sensor.noise and len(seen) > SMOOTHED else seen
+    return out

@@ -1,0 +1,196 @@
+"""Every effect at every place where it could act, as one list to search; and points of its range to look from."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.effects.catalogue import CATALOGUE, FAMILIES, Effect, EffectError, Hypothesis, Term, apply, find
+from ee_dist.effects.groups import groups, members_of
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+SHAREABLE = ("drive", "sensing", "body")
+"""Families whose effects many joints or sensors may share."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at a target. Its values are searched as shares ``u`` (P,) of the way from neutral to a bound.
+
+    ``bounds`` (lower, upper) of each parameter are those worth trying on this robot; ``inert`` are parameters that do
+    nothing while the others are neutral (the speed at which a friction falls off).
+    """
+
+    effect: Effect
+    target: str
+    bounds: tuple[tuple[float, float], ...]
+    inert: tuple[int, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return f"{self.effect.name}@{self.target}" if self.target else self.effect.name
+
+    @property
+    def size(self) -> int:
+        """How many parameters are free."""
+        return len(self.effect.parameters)
+
+    @property
+    def lower(self) -> Array:
+        """Smallest u: -1 where the parameter has room below neutral, else 0."""
+        pairs = zip(self.effect.parameters, self.bounds, strict=True)
+        return np.array([-1.0 if low < p.neutral else 0.0 for p, (low, _) in pairs])
+
+    @property
+    def upper(self) -> Array:
+        pairs = zip(self.effect.parameters, self.bounds, strict=True)
+        return np.array([1.0 if high > p.neutral else 0.0 for p, (_, high) in pairs])
+
+    def values(self, u: Sequence[float] | Array) -> dict[str, float]:
+        """Parameters by name, in their own units, within bounds."""
+        found = {}
+        for p, (low, high), share in zip(self.effect.parameters, self.bounds, u, strict=True):
+            room = high - p.neutral if share >= 0 else p.neutral - low
+            found[p.name] = float(min(max(p.neutral + float(share) * room, low), high))
+        return found
+
+    def shares(self, values: Mapping[str, float]) -> Array:
+        """The inverse of ``values``."""
+        out = []
+        for p, (low, high) in zip(self.effect.parameters, self.bounds, strict=True):
+            gap = values[p.name] - p.neutral
+            room = high - p.neutral if gap >= 0 else p.neutral - low
+            out.append(gap / room if room else 0.0)
+        return np.array(out)
+
+    def rooms(self, u: Sequence[float] | Array) -> Array:
+        """(P,) what a unit of u is in the parameters' own units, at u."""
+        sides = zip(self.effect.parameters, self.bounds, u, strict=True)
+        return np.array([high - p.neutral if share >= 0 else p.neutral - low for p, (low, high), share in sides])
+
+    def term(self, u: Sequence[float] | Array) -> Term:
+        return Term(self.effect.name, self.target, tuple(self.values(u).items()))
+
+    def probes(self, shares: Sequence[float]) -> list[Array]:
+        """Points to look at first: each parameter alone, to both sides where it has two; the only one if it has none."""
+        if not self.size:
+            return [np.zeros(0)]
+        points = []
+        for k in range(self.size):
+            for side in (self.upper[k], self.lower[k]):
+                if side and k not in self.inert:
+                    points += [side * share * np.eye(self.size)[k] for share in shares]
+        # What an inert parameter does shows only beside another: the time at which a sensor sticks decides at which value.
+        beside = [u for u in points if np.abs(u).max() == max(shares)]
+        for k in self.inert:
+            side = self.upper[k] or self.lower[k]
+            points += [u + side * share * np.eye(self.size)[k] for u in beside for share in shares]
+        return points
+
+
+def candidate(robot: Robot, effect: Effect | str, target: str) -> Candidate:
+    """An effect at a target or a group, with the range worth trying. Raises EffectError for an unknown effect or target."""
+    entry = find(effect) if isinstance(effect, str) else effect
+    allowed = entry.targets(robot)
+    if target not in allowed and not members_of(robot, target, allowed):
+        names = [*allowed, *entry.shared(robot)]
+        near = difflib.get_close_matches(target, names, n=3, cutoff=0.4) or names[:8]
+        raise EffectError(f"{entry.name} cannot act on {target!r} of {robot.name}; it can act on: {', '.join(near)}")
+    worth = entry.bounds(robot, target)
+    bounds = tuple(worth[p.name] for p in entry.parameters)
+    plain = Candidate(entry, target, bounds)
+    inert = []
+    if plain.size > 1:
+        for k in range(plain.size):
+            u = (plain.upper if plain.upper[k] else plain.lower) * 0.5 * np.eye(plain.size)[k]
+            if apply(robot, (plain.term(u),)) == robot:
+                inert.append(k)
+    return Candidate(entry, target, bounds, tuple(inert))
+
+
+def candidates(
+    robot: Robot,
+    without: Iterable[str] = (),
+    only: Iterable[str] | None = None,
+    families: Iterable[str] = FAMILIES,
+    sharing: bool = True,
+) -> list[Candidate]:
+    """All searchable effects of some families at all their targets, in the order of the catalogue, and (``sharing``) on
+    groups of joints and sensors that share one set of values.
+
+    ``without`` leaves out effects or places (``effect`` or ``effect@target``); ``only`` leaves out all others. Raises
+    EffectError for a name that is neither.
+    """
+    banned, wanted, seen = set(without), None if only is None else set(only), set(families)
+    for name in (*banned, *(wanted or ())):
+        effect, _, target = name.partition("@")
+        if target:
+            parse(robot, name)
+        else:
+            find(effect)
+    found = []
+    for entry in CATALOGUE.values():
+        if entry.name in banned or entry.family not in seen:
+            continue
+        places = entry.proposed(robot)
+        if sharing and places and entry.parameters and entry.family in SHAREABLE:
+            places = (*places, *entry.shared(robot))
+        for target in places:
+            name = f"{entry.name}@{target}" if target else entry.name
+            if name in banned or (wanted is not None and not {entry.name, name} & wanted):
+                continue
+            found.append(candidate(robot, entry, target))
+    return found
+
+
+def shared(pool: Iterable[Candidate], robot: Robot) -> list[Candidate]:
+    """Those that no single joint or sensor can be blamed for: the surroundings, the supply, the body, what all joints have
+    in common. They are what a model is calibrated with on an untouched robot."""
+    common = {"", "supply", robot.root.name, *groups(robot)}
+    return [c for c in pool if c.effect.family == "world" or c.target in common]
+
+
+def parse(robot: Robot, text: str) -> Candidate:
+    """A candidate as typed: ``coulomb_friction@knee_front_left``. Raises EffectError with the nearest names."""
+    name, _, target = text.partition("@")
+    entry = find(name)
+    targets = entry.targets(robot)
+    if not target and len(targets) == 1:
+        target = targets[0]
+    return candidate(robot, entry, target)
+
+
+def known(robot: Robot, term: Term) -> Candidate:
+    """The candidate of a term of a model file, its range widened to hold the term's own values."""
+    plain = candidate(robot, term.effect, term.target)
+    values = dict(term.values)
+    bounds = tuple(
+        (min(low, values[p.name]), max(high, values[p.name]))
+        for p, (low, high) in zip(plain.effect.parameters, plain.bounds, strict=True)
+    )
+    return Candidate(plain.effect, plain.target, bounds, plain.inert)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What is added to a model in one go: mostly one candidate; or a family whose members work together."""
+
+    parts: tuple[Candidate, ...]
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        return self.label or " + ".join(c.name for c in self.parts)
+
+    @property
+    def size(self) -> int:
+        return sum(c.size for c in self.parts)
+
+
+def values_of(parts: Sequence[Candidate], terms: Hypothesis) -> Array:
+    """The u (P,) of terms of these candidates."""
+    return np.concatenate([c.shares(dict(t.values)) for c, t in zip(parts, terms, strict=True)] or [np.zeros(0)])

@@ -1,0 +1,60 @@
+"""What is fitted, and what comes of it: a model with free values, and the values that suit the measurements best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.discrepancy.problem import Mask
+from ee_dist.discrepancy.search.candidates import Candidate
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.trials.log import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Candidates whose values are free, in order."""
+
+    parts: tuple[Candidate, ...]
+
+    @property
+    def lower(self) -> Array:
+        return np.concatenate([c.lower for c in self.parts] or [np.zeros(0)])
+
+    @property
+    def upper(self) -> Array:
+        return np.concatenate([c.upper for c in self.parts] or [np.zeros(0)])
+
+    def hypothesis(self, u: Array) -> Hypothesis:
+        terms, at = [], 0
+        for c in self.parts:
+            terms.append(c.term(u[at : at + c.size]))
+            at += c.size
+        return tuple(terms)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """``energy``: sum of squares of the residual values that were fitted. ``slopes`` (n, P): the last derivatives."""
+
+    model: Model
+    u: Array
+    energy: float
+    residual: Array
+    slopes: Array
+    mask: Mask
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        return self.model.hypothesis(self.u)
+
+    def spread(self) -> Array:
+        """Standard deviation of each u from the curvature at the optimum; infinite where the data say nothing."""
+        if not len(self.u):
+            return np.zeros(0)
+        normal = self.slopes.T @ self.slopes
+        excess = max(1.0, self.energy / max(1, int(self.mask.sum()) - len(self.u)))
+        weak = np.diag(normal) < 1e-9
+        cov = np.linalg.pinv(normal + np.diag(np.where(weak, 1e-9, 0.0)))
+        return np.where(weak, np.inf, np.sqrt(np.maximum(np.diag(cov), 0.0) * excess))

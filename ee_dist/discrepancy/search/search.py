@@ -1,0 +1,53 @@
+"""What every stage of a search shares, bound once: the problem, what the model has already, on which trials, who watches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ee_dist.discrepancy.problem import Mask, Problem
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.trials.log import Array
+
+Progress = Callable[[str, float], None]
+"""Told (what is being done, share done in [0, 1])."""
+BATCH = 240
+"""Hypotheses that are asked for in one call while many are probed."""
+
+
+def quiet(what: str, share: float) -> None:
+    """Progress that nobody watches."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """``fixed``: terms that every hypothesis has, with values that are not searched; ``trials``: those that are
+    simulated (None: all); residual values of the others are zero."""
+
+    problem: Problem
+    fixed: Hypothesis = ()
+    trials: tuple[int, ...] | None = None
+    progress: Progress = quiet
+
+    def residuals(self, hypotheses: Sequence[Hypothesis]) -> Array:
+        """(H, n) of the fixed terms followed by each hypothesis; none are simulated where none are asked for."""
+        if not hypotheses:
+            return np.zeros((0, len(self.problem.segment_of)))
+        return self.problem.residuals([(*self.fixed, *h) for h in hypotheses], self.trials)
+
+    def base(self) -> Array:
+        """(n,) with the fixed terms alone."""
+        return np.asarray(self.residuals([()])[0])
+
+    def on(self, terms: Hypothesis) -> Search:
+        """The same on top of more fixed terms."""
+        return replace(self, fixed=(*self.fixed, *terms))
+
+    def among(self, trials: Sequence[int] | None) -> Search:
+        return replace(self, trials=None if trials is None else tuple(trials))
+
+    @property
+    def everything(self) -> Mask:
+        return np.ones(len(self.problem.segment_of), dtype=bool)

@@ -1,0 +1,151 @@
+"""Fitting: bounded Gauss-Newton for many candidates at once, one evaluator call per step for all of them.
+
+A residual over seconds of contact is rugged in its parameters, so that a derivative at a point says little. Slopes are
+taken over a finite step, which begins wide and shrinks, and every step is tried at several lengths at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.discrepancy.problem import Mask
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.trials.log import Array
+
+LENGTHS = (1.0, 0.5, 0.2)
+"""How far along the Gauss-Newton step to look."""
+WIDTHS = (0.12, 0.06, 0.03, 0.012)
+"""Finite differences of the iterations, as shares of a parameter's room."""
+
+
+@dataclass(eq=False)
+class _Run:
+    model: Model
+    u: Array
+    energy: float = np.inf
+    residual: Array | None = None
+    slopes: Array | None = None
+    origin: tuple[Array, Array] | None = None
+    """Where the slopes were taken: values and residual."""
+
+
+Evaluate = Callable[[Sequence[tuple[_Run, Array]]], list[tuple[float, Array]]]
+
+
+def follow_slopes(
+    search: Search,
+    starts: Sequence[tuple[Model, Array]],
+    mask: Mask,
+    widths: Sequence[float] = WIDTHS,
+    prior: float = 0.0,
+    leading: Array | None = None,
+) -> list[Fit]:
+    """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given.
+
+    ``prior``: energy that a value at its bound costs beside one at neutral, so that a value which these data do not
+    determine says nothing about others. ``leading`` (n, P0): slopes of the first P0 values, where they are known for all
+    models alike. Only trials with values in the mask are simulated on the way.
+    """
+    whole, needed = search, np.unique(search.problem.trial_of[mask]).tolist()
+    search = search.among(needed if search.trials is None else [k for k in search.trials if k in set(needed)])
+    known = None if leading is None else leading[mask]
+    runs = [_Run(m, np.clip(np.asarray(u, float), m.lower, m.upper)) for m, u in starts]
+
+    def evaluate(points: Sequence[tuple[_Run, Array]]) -> list[tuple[float, Array]]:
+        if not points:
+            return []
+        found = search.residuals([run.model.hypothesis(u) for run, u in points])
+        return [
+            (float(r[mask] @ r[mask]) + prior * float(u @ u) if np.isfinite(r).all() else np.inf, r)
+            for (_, u), r in zip(points, found, strict=True)
+        ]
+
+    for run, (value, r) in zip(runs, evaluate([(run, run.u) for run in runs]), strict=True):
+        run.energy, run.residual = value, r
+    moving = [run for run in runs if len(run.u)]
+    for step, width in enumerate(widths):
+        _slopes(moving, width, mask, evaluate, known)
+        _steps(moving, mask, evaluate, prior)
+        search.progress("fitting", (step + 1) / len(widths))
+    out = []
+    if len(needed) < len(search.problem.trials):
+        for run, r in zip(runs, whole.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
+            run.residual = r
+    for run in runs:
+        assert run.residual is not None
+        slopes = run.slopes if run.slopes is not None else np.zeros((int(mask.sum()), len(run.u)))
+        energy = run.energy - prior * float(run.u @ run.u)
+        out.append(Fit(run.model, run.u, energy, run.residual, slopes, mask))
+    return out
+
+
+def _slopes(runs: Sequence[_Run], width: float, mask: Mask, evaluate: Evaluate, leading: Array | None = None) -> None:
+    """Derivatives over ``width`` (narrower for a small value), towards the inside; a better point found is taken. Those of
+    the first values may be known (``leading``)."""
+    points = []
+    first = 0 if leading is None else leading.shape[1]
+    for run in runs:
+        for k in range(first, len(run.u)):
+            h = min(width, 0.3 * abs(run.u[k]) + 0.2 * width)
+            u = run.u.copy()
+            u[k] += h if u[k] + h <= run.model.upper[k] else -h
+            points.append((run, np.clip(u, run.model.lower, run.model.upper)))
+    found = evaluate(points)
+    at = 0
+    for run in runs:
+        assert run.residual is not None
+        columns = [] if leading is None else list(leading.T)
+        best = (run.energy, run.u, run.residual)
+        for k in range(first, len(run.u)):
+            (value, r), (_, u) = found[at], points[at]
+            at += 1
+            gap = u[k] - run.u[k]
+            usable = np.isfinite(value) and np.isfinite(run.energy) and abs(gap) > 1e-12
+            columns.append((r - run.residual)[mask] / gap if usable else np.zeros(int(mask.sum())))
+            if value < best[0]:
+                best = (value, u, r)
+        run.slopes = np.stack(columns, axis=1)
+        run.origin = (run.u, run.residual)
+        run.energy, run.u, run.residual = best
+
+
+def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, prior: float) -> None:
+    points = []
+    for run in runs:
+        assert run.origin is not None and run.slopes is not None
+        origin, residual = run.origin
+        if not np.isfinite(residual).all():
+            # No slope where nothing can be simulated: nearer to neutral.
+            points += [(run, run.u * 0.5)]
+            continue
+        normal = run.slopes.T @ run.slopes + prior * np.eye(len(run.u))
+        right = -run.slopes.T @ residual[mask] - prior * origin
+        damp = 1e-6 * np.trace(normal) / len(run.u) + 1e-12
+        step = np.linalg.solve(normal + damp * np.eye(len(run.u)), right)
+        step = np.clip(step, -0.5, 0.5)
+        for length in LENGTHS:
+            u = np.clip(origin + length * step, run.model.lower, run.model.upper)
+            if not np.allclose(u, run.u, atol=1e-6):
+                points.append((run, u))
+    for (run, u), (value, r) in zip(points, evaluate(points), strict=True):
+        if value < run.energy:
+            run.energy, run.u, run.residual = value, u, r
+
+
+def slopes_at(search: Search, model: Model, u: Array, width: float = WIDTHS[2]) -> Array:
+    """(n, P) derivatives of the residual of a model at u, over ``width``."""
+    points = [u]
+    for k in range(len(u)):
+        moved = u.copy()
+        moved[k] += width if u[k] + width <= model.upper[k] else -width
+        points.append(moved)
+    rows = search.residuals([model.hypothesis(v) for v in points])
+    columns = [
+        (r - rows[0]) / (v[k] - u[k]) if np.isfinite(r).all() else np.zeros(len(r))
+        for k, (v, r) in enumerate(zip(points[1:], rows[1:], strict=True))
+    ]
+    return np.stack(columns, axis=1) if columns else np.zeros((rows.shape[1], 0))

@@ -1,0 +1,129 @@
+"""What a balance of forces leaves over: when, in which direction, whether it repeats with position and at what wavelength.
+
+A friction that is missing shows by speed and direction; a part that is not straight (a screw, a gear, magnets) shows as a
+ripple over position that every pass repeats; what a filter could not follow sits at reversals and where the motion is
+jerky.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ee_dist.trials.log import Array
+
+SLOW_SHARE, CALM_SHARE = 0.15, 0.1
+"""Of the largest speed and acceleration of a record: below the first a joint reverses, below the second it cruises."""
+BINS = 120
+
+
+@dataclass(frozen=True)
+class Regime:
+    """A part of the time: its share of it, its share of the residual's energy, root mean square and mean (N or N.m)."""
+
+    name: str
+    time_share: float
+    energy_share: float
+    rms: float
+    mean: float
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """The residual over position in one direction: ``repeats`` is the share of its variance that every pass shows again,
+    over ``passes``; ``wavelength`` (m or rad) the one that explains most, ``share`` how much of the variance."""
+
+    direction: str
+    passes: int
+    repeats: float
+    wavelength: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Remains:
+    motor: str
+    rms: float
+    largest: float
+    regimes: tuple[Regime, ...]
+    ripples: tuple[Ripple, ...]
+
+
+def remains(motor: str, left: Array, x: Array, v: Array, a: Array) -> Remains:
+    """What is left over at a drive: forces (T,) with position, speed and acceleration at the same instants."""
+    slow = np.abs(v) < SLOW_SHARE * np.abs(v).max()
+    calm = np.abs(a) < CALM_SHARE * np.abs(a).max()
+    groups = (
+        ("near a reversal", slow),
+        ("speeding up or slowing down", ~slow & ~calm),
+        ("cruising up", ~slow & calm & (v > 0)),
+        ("cruising down", ~slow & calm & (v < 0)),
+    )
+    regimes = tuple(_regime(name, left, m) for name, m in groups if m.any())
+    ripples = tuple(r for name, m in (("up", v > 0), ("down", v < 0)) if (r := _ripple(name, x, left, m & ~slow)))
+    return Remains(motor, _rms(left), float(np.abs(left).max()), regimes, ripples)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _regime(name: str, left: Array, mask: NDArray[np.bool_]) -> Regime:
+    share = float(np.sum(left[mask] ** 2) / np.sum(left**2))
+    return Regime(name, float(mask.mean()), share, _rms(left[mask]), float(left[mask].mean()))
+
+
+def _ripple(name: str, x: Array, left: Array, mask: NDArray[np.bool_]) -> Ripple | None:
+    at = np.flatnonzero(mask)
+    if len(at) < 100:
+        return None
+    span = float(np.ptp(x[at]))
+    passes = [p for p in np.split(at, np.flatnonzero(np.diff(at) > 3) + 1) if np.ptp(x[p]) > 0.2 * span]
+    where = np.linspace(x[at].min(), x[at].max(), BINS)
+    profiles = np.array([_profile(where, x[p], left[p]) for p in passes]) if passes else np.zeros((0, BINS))
+    wavelengths = np.geomspace(span / 150, span / 2, 400)
+    shares = [_explained(x[at], left[at], w) for w in wavelengths]
+    best = int(np.argmax(shares))
+    return Ripple(name, len(passes), _repeats(profiles), float(wavelengths[best]), float(shares[best]))
+
+
+def _profile(where: Array, x: Array, left: Array) -> Array:
+    order = np.argsort(x)
+    return np.interp(where, x[order], left[order], left=np.nan, right=np.nan)
+
+
+def _repeats(profiles: Array) -> float:
+    """Share of the variance of the profiles (passes, bins) that is in their mean, over bins that several passes cover."""
+    covered = np.isfinite(profiles).sum(axis=0) >= 2
+    if not covered.any():
+        return float("nan")
+    some = profiles[:, covered]
+    return float(np.nanmean(np.nanmean(some, axis=0) ** 2) / np.nanmean(some**2))
+
+
+def _explained(x: Array, left: Array, wavelength: float) -> float:
+    """Share of the variance that a sine of this wavelength over position takes."""
+    angle = 2 * np.pi * x / wavelength
+    basis = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    z = left - left.mean()
+    fit = np.linalg.lstsq(basis, z, rcond=None)[0]
+    return float(1 - np.sum((z - basis @ fit) ** 2) / np.sum(z**2))
+
+
+def describe(found: Remains, unit: str, length: str) -> Sequence[str]:
+    """The account in words, a line each."""
+    lines = [f"{found.motor}: {found.rms:.2f} {unit} root mean square, {found.largest:.1f} {unit} at most"]
+    lines += [
+        f"  {r.name}: {r.time_share:.0%} of the time, {r.energy_share:.0%} of the residual's energy, {r.rms:.2f} {unit} "
+        f"(mean {r.mean:+.2f})"
+        for r in found.regimes
+    ]
+    lines += [
+        f"  going {r.direction}: {r.repeats:.0%} of it repeats on each of {r.passes} passes; a ripple of "
+        f"{r.wavelength:.4g} {length} takes {r.share:.0%}"
+        for r in found.ripples
+    ]
+    return lines

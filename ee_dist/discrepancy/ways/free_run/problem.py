@@ -1,0 +1,261 @@
+"""The problem of a whole record simulated freely: from the measured first state, in the loop of the robot's own controller.
+
+The model gets what the robot got (commands, supply voltage, when its drives were released) and nothing else, for the
+whole record; what counts is how far its joints are from where they were measured. That is what a user of the model will
+do with it, and the strictest test: an error once made goes on. It suits robots that are held by their controller.
+
+A residual value is sign(e) * sqrt(|e|), so that squares add up to absolute errors: the mean square is the mean absolute
+position error. A stick that lasts too long moves a joint far away for a while; squares of that would outweigh the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, released, speeds_of
+from ee_dist.discrepancy.problem import Layout, Problem, Series, error, joints_of
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
+from ee_dist.evaluation.jobs import Evaluator, Job, Whole
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array, SensorLog, State
+
+
+@dataclass(frozen=True)
+class ToPositions:
+    """The reduction that keeps every n-th of the first ``rows`` of some channels, (rows // n, C)."""
+
+    columns: tuple[int, ...]
+    every: int
+    rows: int
+
+    @property
+    def key(self) -> str:
+        return f"positions:{self.columns}:{self.every}:{self.rows}"
+
+    def __call__(self, log: SensorLog) -> Array:
+        return log.sensors[: self.rows : self.every, list(self.columns)].copy()
+
+
+RESTART_S = 0.5
+"""Length of the windows that remarks re-start from the measured state."""
+BLOCKS = 6
+"""Segments that a record run through in one go is cut into."""
+
+
+class FreeRun(Problem):
+    """Free runs: whole records simulated from their measured first state. Channels are the joint positions.
+
+    ``every``: rows of a log from one residual value to the next. ``windows_s`` starts the model anew from the measured
+    state so often, and makes segments of the windows; None runs each trial through, in BLOCKS segments. ``effort``
+    scales the length of a search.
+    """
+
+    way = "free_run"
+    families = frozenset({"body", "drive", "world"})
+    switches = False
+    rugged = True
+    """Errors jump where a joint sticks or slips: fits search rather than follow a slope."""
+    natural_name = "mean absolute position error"
+
+    def __init__(
+        self,
+        trials: Sequence[MeasuredTrial],
+        robot: Robot,
+        evaluator: Evaluator,
+        every: int = 3,
+        windows_s: float | None = None,
+        effort: float = 1.0,
+    ) -> None:
+        self.effort = effort
+        self.robot, self.measured, self.evaluator, self.every = robot, tuple(trials), evaluator, every
+        columns = [k for k, s in enumerate(robot.sensors) if s.kind == "position"]
+        if not columns:
+            raise MeasurementError(f"{robot.name}: no sensor of kind 'position', which a free run is compared by")
+        self.columns = tuple(columns)
+        self.setups = [apply(robot, t.setup) for t in trials]
+        self.pieces = [p for k, t in enumerate(trials) for p in _pieces(k, t, robot, windows_s)]
+        self.noise = max(float(np.mean([_noise(p.log.sensors[::every, columns]) for p in self.pieces])), 1e-9)
+        self._lay_out(BLOCKS if windows_s is None else 1)
+        self.unit = robot.sensors[columns[0]].unit
+        self.natural_unit = self.unit
+        how = "free runs of the whole record" if windows_s is None else f"windows of {windows_s:g} s"
+        self.error_definition = (
+            f"square root of the mean absolute position error over {how}, every trial counting the same, in units of the "
+            f"noise of the readings ({self.noise:.2g} {self.unit})"
+        )
+
+    def _lay_out(self, blocks: int) -> None:
+        """Segments and places of all residual values. A trial's values carry equal weight in sum, whatever its length."""
+        width = len(self.columns)
+        rows = [len(p.log.sensors[:: self.every]) for p in self.pieces]
+        starts = np.concatenate([[0], np.cumsum(rows)]) * width
+        self.slices = [slice(int(a), int(b)) for a, b in pairwise(starts)]
+        names: list[str] = []
+        of_trial: list[int] = []
+        seg: list[Array] = []
+        time: list[Array] = []
+        for p, count in zip(self.pieces, rows, strict=True):
+            cut = min(blocks, max(1, count // 10))
+            block = np.arange(count) * cut // count
+            at = p.start_s + (p.log.times_s[:: self.every] - p.log.times_s[0])
+            seg.append(np.repeat(len(names) + block, width))
+            time.append(np.repeat(at, width))
+            names += [f"{self.measured[p.trial].name}@{at[np.argmax(block == b)]:.1f}s" for b in range(cut)]
+            of_trial += [p.trial] * cut
+        segment_of, size = np.concatenate(seg), sum(rows) * width
+        trial_of = np.array(of_trial)[segment_of]
+        values = np.bincount(trial_of)
+        self.weight = (values[values > 0].mean() / np.maximum(values, 1))[trial_of]
+        sensors = [self.robot.sensors[k] for k in self.columns]
+        self.layout = Layout(
+            segments=tuple(names),
+            trial_of_segment=np.array(of_trial),
+            segment_of=segment_of,
+            channel_of=np.tile(np.arange(width), sum(rows)),
+            time_s=np.concatenate(time),
+            reading=np.ones(size, dtype=bool),
+            floor=np.ones(size),
+            known=np.zeros(size),
+            channels=tuple(s.name for s in sensors),
+            units=tuple(s.unit for s in sensors),
+            joint_of_channel=joints_of(self.robot, [s.target for s in sensors]),
+        )
+
+    def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+        """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
+        chosen = [i for i, p in enumerate(self.pieces) if trials is None or p.trial in set(trials)]
+        models = {k: [apply(self.setups[k], h) for h in hypotheses] for k in {self.pieces[i].trial for i in chosen}}
+        # Rollouts of one length with the same inputs share a batch, so all run as long as the longest.
+        steps, switched = max(len(p.log) for p in self.pieces), any(p.enabled is not None for p in self.pieces)
+        jobs = [
+            Job(p.rollout(m, steps, switched), ToPositions(self.columns, self.every, len(p.log)))
+            for p in (self.pieces[i] for i in chosen)
+            for m in models[p.trial]
+        ]
+        found = self.evaluator.evaluate(jobs)
+        out = np.zeros((len(hypotheses), len(self.segment_of)))
+        for place, i in enumerate(chosen):
+            measured = self.pieces[i].log.sensors[:: self.every, list(self.columns)]
+            gap = measured[None] - np.stack(found[place * len(hypotheses) : (place + 1) * len(hypotheses)])
+            with np.errstate(invalid="ignore"):
+                value = np.sign(gap) * np.sqrt(np.abs(gap) * (self.weight[self.slices[i].start] / self.noise))
+            out[:, self.slices[i]] = np.where(np.isfinite(value), value, np.inf).reshape(len(hypotheses), -1)
+        return out
+
+    def noise_floor(self) -> tuple[float, str]:
+        return 1.0, "estimated: second differences of the measured positions"
+
+    def natural(self, value: float) -> float:
+        """Mean absolute position error, rad or m."""
+        return value**2 * self.noise
+
+    def told(self, error: float) -> str:
+        value = self.natural(error)
+        return f"{1e3 * value:.3g} {'mrad' if self.unit == 'rad' else 'mm'}"
+
+    def raw(self, residual: Array) -> Array:
+        return np.asarray(np.sign(residual) * residual**2 * self.noise / self.weight)
+
+    def series(self, hypothesis: Hypothesis) -> list[Series]:
+        """Every stretch, as far as residuals were taken."""
+        gap = self.raw(self.residuals([hypothesis])[0])
+        out = []
+        for i, p in enumerate(self.pieces):
+            off = gap[self.slices[i]].reshape(-1, len(self.columns))
+            measured = p.log.sensors[:: self.every, list(self.columns)]
+            times = p.start_s + p.log.times_s[:: self.every] - p.log.times_s[0]
+            for c in range(len(self.columns)):
+                out.append(Series(p.trial, c, self.layout.units[c], times, measured[:, c], measured[:, c] - off[:, c]))
+        return out
+
+    def remarks(self, hypothesis: Hypothesis) -> list[str]:
+        again = FreeRun(self.measured, self.robot, self.evaluator, self.every, RESTART_S)
+        return [
+            f"Re-started from the measured state every {RESTART_S:g} s: "
+            f"{again.told(error(again.residuals([hypothesis])[0]))}."
+        ]
+
+    def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
+        """Of the first stretch of each trial, which is the whole trial where it is run through."""
+        first = {p.trial: p for p in reversed(self.pieces)}
+        jobs = []
+        for k, p in sorted(first.items()):
+            rollout = p.rollout(apply(self.setups[k], hypothesis), len(p.log), False)
+            jobs.append(Job(replace(rollout, pose=True), Whole()))
+        return list(self.evaluator.evaluate(jobs))
+
+    def mean_absolute(self, hypothesis: Hypothesis) -> Array:
+        """(trials,) mean absolute position error of each trial, rad or m."""
+        off = np.abs(self.raw(self.residuals([hypothesis])[0]))
+        return np.bincount(self.trial_of, weights=off) / np.bincount(self.trial_of)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A stretch of a trial that is simulated in one go. ``log`` is what was measured of it."""
+
+    trial: int
+    start_s: float
+    log: SensorLog
+    commands: Array
+    enabled: Array | None
+    start: State
+
+    def rollout(self, model: Robot, steps: int, switched: bool) -> Rollout:
+        """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
+        enabled = np.ones(len(self.log)) if self.enabled is None and switched else self.enabled
+        return Rollout(
+            model, Commands(self.commands), steps, start=self.start, supply_v=self.log.supply_v, enabled=enabled
+        )
+
+
+def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None) -> list[Piece]:
+    log = trial.log
+    if log.joints is None:
+        raise MeasurementError(
+            f"trial {trial.name!r}: no joint positions in its log: nothing to start a simulation from"
+        )
+    if log.motor_names != robot.motor_names or log.sensor_names != robot.sensor_names:
+        raise MeasurementError(
+            f"trial {trial.name!r} is of another robot: its channels are {', '.join(log.sensor_names)}; "
+            f"{robot.name} has {', '.join(robot.sensor_names)}"
+        )
+    dt = float(np.median(np.diff(log.times_s)))
+    if abs(dt / robot.time_step_s - 1) > 1e-3:
+        raise MeasurementError(
+            f"trial {trial.name!r} has a row every {dt:g} s, {robot.name} a time step of {robot.time_step_s:g} s; import it at "
+            f"{1 / robot.time_step_s:g} Hz"
+        )
+    speeds = speeds_of(log, robot)
+    commands, enabled = released(log.commands)
+    length = len(log) if windows_s is None else max(2, round(windows_s / dt))
+    found = []
+    for first in range(0, len(log), length):
+        last = min(first + length, len(log))
+        if last - first < min(length, len(log)) // 2:
+            break
+        found.append(
+            Piece(
+                index,
+                first * dt,
+                log.part(first, last),
+                commands[first:last],
+                None if enabled is None else enabled[first:last],
+                State(log.joints[first].copy(), speeds[first].copy()),
+            )
+        )
+    return found
+
+
+def _noise(positions: Array) -> float:
+    """Mean absolute error that the noise of the readings (T, C) alone would leave."""
+    if len(positions) < 3:
+        return 0.0
+    return float(np.median(np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2])) / np.sqrt(6.0))

@@ -1,0 +1,236 @@
+"""What a hypothesis predicts for a measured trial, on the commands that were recorded (open loop).
+
+Sensors do not act back on a robot whose commands are given, so the physics of a hypothesis is simulated with clean
+sensors and what its sensors would report is computed afterwards: hypotheses about sensors share one rollout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, released, start_of
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands, Controllers, Network, scaling
+from ee_dist.engines.sensing import SensingPath
+from ee_dist.evaluation.jobs import Evaluator, Job
+from ee_dist.robots.model import Robot, Sensor, Wiring
+from ee_dist.trials.log import Array, SensorLog
+
+_SENSOR_FAULTS: dict[str, Any] = {
+    f.name: f.default for f in fields(Sensor) if f.name not in ("name", "kind", "target", "unit")
+}
+
+
+DRAWS = 8
+"""Draws of the noise of a faulty channel, whose mean roughness is compared with the measured one."""
+
+
+def roughness(values: Array) -> Array:
+    """(T, S) -> (T, S): squared second difference / 6, whose mean is the variance of white noise on a smooth signal."""
+    out = np.zeros_like(values)
+    if len(values) > 2:
+        out[1:-1] = (values[2:] - 2.0 * values[1:-1] + values[:-2]) ** 2 / 6.0
+    return out
+
+
+def repeats(values: Array) -> Array:
+    """(T, S) -> (T, S): 1 where a value is exactly the one before it."""
+    out = np.zeros_like(values)
+    out[1:] = values[1:] == values[:-1]
+    return out
+
+
+def block_sums(values: Array, size: int) -> Array:
+    """(T, S) -> (T // size, S): sums over blocks of rows; rows beyond the last whole block are left out."""
+    rows = len(values) // size
+    return values[: rows * size].reshape(rows, size, values.shape[1]).sum(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Digest:
+    """What is kept of a predicted log: block means (T // block, S); noise and repeats per window (T // window, S)."""
+
+    means: Array
+    rough: Array
+    repeated: Array
+    finite: bool
+
+
+@dataclass(frozen=True)
+class ToDigest:
+    """The reduction that makes one."""
+
+    block: int
+    window: int
+
+    @property
+    def key(self) -> str:
+        return f"digest:{self.block}:{self.window}"
+
+    def __call__(self, log: SensorLog) -> Digest:
+        return digest(log.sensors, self.block, self.window)
+
+
+@dataclass(frozen=True)
+class ToSensors:
+    """The reduction that keeps the channels (T, S)."""
+
+    key: str = "sensors"
+
+    def __call__(self, log: SensorLog) -> Array:
+        return np.array(log.sensors)
+
+
+def digest(sensors: Array, block: int, window: int) -> Digest:
+    """The digest of channels (T, S)."""
+    return Digest(
+        (block_sums(sensors, block) / block).astype(np.float32),
+        (block_sums(roughness(sensors), window) / window).astype(np.float32),
+        (block_sums(repeats(sensors), window) / window).astype(np.float32),
+        bool(np.isfinite(sensors).all()),
+    )
+
+
+@lru_cache(4096)
+def _faultless(sensor: Sensor) -> Sensor:
+    return replace(sensor, **_SENSOR_FAULTS)
+
+
+def clean(robot: Robot) -> Robot:
+    """The robot with perfect sensors and straight wiring: what is left for the engine once commands are given."""
+    sensors = tuple(map(_faultless, robot.sensors))
+    wiring = Wiring(tuple(range(len(robot.drives))), robot.wiring.hidden_gain)
+    neutral = replace(wiring, hidden_gain=tuple(1.0 for _ in wiring.hidden_gain))
+    return replace(robot, sensors=sensors, wiring=neutral)
+
+
+def wired_commands(trial: MeasuredTrial, model: Robot) -> Commands:
+    """What the drives obey. Planned commands pass through the model's wiring; those of a network were recorded behind it."""
+    if isinstance(trial.driver, Network):
+        return Commands(trial.log.commands)
+    planned = trial.driver.values if isinstance(trial.driver, Commands) else trial.log.commands
+    return Commands(np.ascontiguousarray(planned[: len(trial.log)][:, list(model.wiring.source)]))
+
+
+def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) -> Rollout:
+    """The physics of a model on the trial's own commands, with clean sensors (``bare``, if it is at hand already)."""
+    commands, enabled = released(wired_commands(trial, model).values)
+    start = start_of(trial.log, model)
+    return Rollout(
+        bare or clean(model),
+        Commands(commands),
+        len(trial.log),
+        start=start,
+        supply_v=trial.log.supply_v,
+        enabled=enabled,
+    )
+
+
+class Predictor:
+    """Predictions for many models at once. ``block``, ``window``: rows a mean and a window span."""
+
+    def __init__(
+        self, trials: Sequence[MeasuredTrial], base: Robot, evaluator: Evaluator, block: int, window: int
+    ) -> None:
+        self.trials, self.base, self.evaluator = trials, base, evaluator
+        self.block, self.window = block, window
+        self._only_noisy = [replace(s, noise=0.0) == _faultless(s) for s in base.sensors]
+
+    def digests(self, pairs: Sequence[tuple[int, Robot]]) -> list[Digest]:
+        """Digests for (trial, model) pairs, simulated in one call."""
+        changed = {id(m): self._changed(m) for _, m in pairs}
+        jobs = []
+        bare: dict[int, Robot] = {}
+        for k, model in pairs:
+            if id(model) not in bare:
+                bare[id(model)] = clean(model)
+            reduction = ToSensors() if changed[id(model)] else ToDigest(self.block, self.window)
+            jobs.append(Job(rollout_of(self.trials[k], model, bare[id(model)]), reduction))
+        found = self.evaluator.evaluate(jobs)
+        out: list[Digest] = list(found)
+        alike: dict[tuple[int, ...], list[int]] = {}
+        for i, (k, model) in enumerate(pairs):
+            if channels := changed[id(model)]:
+                alike.setdefault((k, *(int(model.sensors[c].kind == "touch") for c in channels)), []).append(i)
+            else:
+                out[i] = self._with_declared_noise(found[i])
+        for (k, *_), members in alike.items():
+            faulty = [(pairs[i][1], found[i], changed[id(pairs[i][1])]) for i in members]
+            for i, seen in zip(members, self._reported(k, faulty), strict=True):
+                out[i] = seen
+        return out
+
+    def _changed(self, model: Robot) -> list[int]:
+        """The channels whose report takes more than adding the noise that the base model declares."""
+        return [
+            i
+            for i, (s, declared) in enumerate(zip(model.sensors, self.base.sensors, strict=True))
+            if s != declared or not self._only_noisy[i]
+        ]
+
+    def _with_declared_noise(self, found: Digest) -> Digest:
+        noise = np.array([s.noise for s in self.base.sensors])
+        return replace(found, rough=found.rough + noise**2, repeated=np.where(noise > 0, 0.0, found.repeated))
+
+    def _reported(self, trial: int, members: Sequence[Faulty]) -> list[Digest]:
+        """Digests of what members report, whose faulty channels are of the same kinds.
+
+        Noise is the expected one wherever that is known: a draw of it would count against every hypothesis that has a
+        faulty sensor. How a faulty channel looks under noise is the mean of some draws.
+        """
+        steady = reports(members)[:, :, 0]
+        drawn = reports(members, [1000 * (d + 1) + trial for d in range(DRAWS)])
+        out = []
+        for i, (_, true, channels) in enumerate(members):
+            clear = true.copy()
+            clear[:, channels] = steady[i]
+            shape = self._with_declared_noise(digest(clear, self.block, self.window))
+            rough, repeated = shape.rough.copy(), shape.repeated.copy()
+            grain = digest(drawn[i].reshape(len(true), -1), self.block, self.window)
+            rough[:, channels] = grain.rough.reshape(-1, DRAWS, len(channels)).mean(axis=1)
+            repeated[:, channels] = grain.repeated.reshape(-1, DRAWS, len(channels)).mean(axis=1)
+            out.append(replace(shape, rough=rough, repeated=repeated))
+        return out
+
+
+Faulty = tuple[Robot, Array, Sequence[int]]
+"""A model, the true values of its channels (T, S), and some of its channels."""
+
+
+def reports(members: Sequence[Faulty], seeds: Sequence[int] = ()) -> Array:
+    """What some sensors of each member report: (B, T, D, C), one D a seed; without random errors, D = 1, if there is none.
+
+    The members' channels are as many, of the same kinds, and their trials as long.
+    """
+    draws = max(1, len(seeds))
+    robots = []
+    for model, _, channels in members:
+        sensors = tuple(model.sensors[c] for c in channels)
+        if not seeds:
+            sensors = tuple(replace(s, noise=0.0, dropout=0.0) for s in sensors)
+        robots += [replace(model, sensors=sensors)] * draws
+    seen = np.stack([true[:, list(channels)] for _, true, channels in members], axis=1)
+    each: list[int | None] = [*seeds] if seeds else [None]
+    path = SensingPath(robots, robots[0].time_step_s, len(seen), each * len(members))
+    found = np.stack([path.step(i, v) for i, v in enumerate(np.repeat(seen, draws, axis=1))])
+    return np.moveaxis(found.reshape(len(seen), len(members), draws, -1), 0, 1)
+
+
+def report(model: Robot, true: Array) -> Array:
+    """What the sensors report of true channels (T, S) when they make no random errors."""
+    return np.asarray(reports([(model, true, range(len(model.sensors)))])[0, :, 0])
+
+
+def predicted_commands(trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
+    """(T, B, M): what a trial's network would have commanded through the wiring of each model, given what the sensors
+    did report. Exact: the network saw the very numbers in the log."""
+    assert isinstance(trial.driver, Network)
+    control = Controllers(models, [trial.driver] * len(models), [scaling(m) for m in models], len(trial.log))
+    dt = models[0].time_step_s
+    rows = [control.step(i, i * dt, np.repeat(s[None], len(models), axis=0)) for i, s in enumerate(trial.log.sensors)]
+    return np.stack(rows)

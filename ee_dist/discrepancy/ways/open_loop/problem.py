@@ -1,0 +1,307 @@
+"""The problem of a whole simulated robot: predictions on the recorded commands, compared channel by channel.
+
+A residual value is the mean over a block of rows of (measured - predicted), in units of what that difference would be
+from noise and from the spread of equally good models (see predictability.py), softened beyond six of them so that one
+missed contact does not outweigh a minute of agreement. Two values a window and channel
+compare how noisy and how frozen the channel is, which is all that a noisy or dropping sensor changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.problem import Layout, Problem, Series, joints_of
+from ee_dist.discrepancy.ways.open_loop.predictability import MEMBERS, ensemble
+from ee_dist.discrepancy.ways.open_loop.prediction import (
+    Digest,
+    Predictor,
+    ToSensors,
+    digest,
+    predicted_commands,
+    report,
+    rollout_of,
+)
+from ee_dist.discrepancy.ways.open_loop.scale import channel_scale
+from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.engines.drivers import Network
+from ee_dist.evaluation.jobs import Evaluator, Job, Whole
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array, SensorLog
+
+SOFT = 6.0
+"""Residuals beyond this many standard deviations count by their logarithm."""
+COMMAND_SHARE = 0.005
+"""Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
+_SOFT_FLOOR = 0.974
+"""Mean square of SOFT * asinh(x / SOFT) for standard normal x."""
+_ROUGH_FLOOR = 0.93
+"""Mean square of the comparison of roughness, for white noise."""
+
+
+def soften(values: Array) -> Array:
+    """Nearly the identity up to SOFT, logarithmic beyond."""
+    return SOFT * np.arcsinh(values / SOFT)
+
+
+def _held_up(spread: Array) -> Array:
+    """(T, C): mean squares that vary from row to row by luck, each at least the mean of its neighbours."""
+    padded = np.pad(spread, ((1, 1), (0, 0)), mode="edge")
+    return np.asarray(np.maximum(spread, (padded[:-2] + spread + padded[2:]) / 3.0))
+
+
+class OpenLoop(Problem):
+    """Open loop: the model gets the recorded commands and nothing else.
+
+    ``block`` rows are averaged into a value, ``window`` rows (a multiple) are a segment. ``unmodelled`` widens the
+    scales by what a calibrated model is known to leave; ``gained``: energy that an effect took off an untouched robot.
+    ``before``: what the model is believed to have; the spread of ``members`` neighbours of that model weighs the
+    residuals.
+    """
+
+    way = "open_loop"
+
+    def __init__(
+        self,
+        trials: Sequence[MeasuredTrial],
+        robot: Robot,
+        evaluator: Evaluator,
+        block: int = 4,
+        window: int = 60,
+        unmodelled: Unmodelled | None = None,
+        gained: float = 0.0,
+        before: Hypothesis = (),
+        members: int = MEMBERS,
+    ) -> None:
+        self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
+        self.block, self.window = block, window
+        self._members = members
+        self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}
+        self.scale = channel_scale(robot, trials)
+        self._unmodelled, self.gained, self.calibrated = unmodelled or {}, gained, unmodelled is not None
+        self.predictor = Predictor(self.measured, robot, evaluator, block, window)
+        self._looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
+        self._data = [digest(t.log.sensors, block, window) for t in trials]
+        self._weigh(before)
+        self._lay_out()
+        self.error_definition = (
+            "root mean square over channels and time of the residual in standard deviations of its noise "
+            f"and of equally good models (means over {block * robot.time_step_s:g} s, softened beyond {SOFT:g})"
+        )
+
+    @property
+    def looped(self) -> tuple[int, ...]:
+        return self._looped
+
+    @property
+    def trust(self) -> tuple[float, ...]:
+        return self._trust
+
+    def _weigh(self, before: Hypothesis) -> None:
+        """Standard deviations of block means (blocks, S) and of the log of roughness (windows, S), trial by trial."""
+        models = [apply(self.robot, before)]
+        models += ensemble(models[0], self._members)
+        pairs = [(k, m) for k in range(len(self.measured)) for m in self._held(models, k)]
+        found = self.predictor.digests(pairs)
+        tiny = (0.25 * self.scale.scale) ** 2
+        self.deviation: list[Array] = []
+        self.grain_deviation: list[Array] = []
+        for k in range(len(self.measured)):
+            mine = found[k * len(models) : (k + 1) * len(models)]
+            base, others = mine[0], [d for d in mine[1:] if d.finite]
+            noise = self.scale.scale**2 / self.block + self._known(k)[0]
+            spread = np.zeros_like(base.means, dtype=float)
+            grain = np.zeros_like(base.rough, dtype=float)
+            if others and base.finite:
+                spread = np.mean([(d.means.astype(float) - base.means) ** 2 for d in others], axis=0)
+                grain = np.mean([np.log((d.rough + tiny) / (base.rough + tiny)) ** 2 for d in others], axis=0)
+            self.deviation.append(np.sqrt(noise + _held_up(spread)))
+            self.grain_deviation.append(np.sqrt(2 * 1.95 / self.window + 0.01 + self._known(k)[1] + _held_up(grain)))
+
+        quiet = np.array([s.kind != "touch" for s in self.robot.sensors])
+        alone = self.scale.scale**2 / self.block
+        self._trust = tuple(float(1.0 / np.mean((d**2 / alone)[:, quiet])) for d in self.deviation)
+
+    def _known(self, trial: int) -> Array:
+        """(2, S) mean squares that calibration left in a trial: of block means, and of the log of roughness."""
+        return of_trial(self._unmodelled, self.measured[trial].name, len(self.robot.sensors)) ** 2
+
+    def _lay_out(self) -> None:
+        """Segments, channels and floors of all residual values, trial after trial."""
+        names: list[str] = []
+        seg: list[Array] = []
+        chan: list[Array] = []
+        floor: list[Array] = []
+        known: list[Array] = []
+        time: list[Array] = []
+        reading: list[Array] = []
+        trial_of_segment: list[int] = []
+        self.slices: list[slice] = []
+        s, per = len(self.robot.sensors), self.window // self.block
+        dt, at = self.robot.time_step_s, 0
+        noisy = (self.scale.noise / self.scale.scale) ** 2
+        pure = 2 * 1.95 / self.window + 0.01
+        for k, trial in enumerate(self.measured):
+            blocks, windows = len(trial.log) // self.block, len(trial.log) // self.window
+            first = len(names)
+            count = max(1, windows)
+            names += [f"{trial.name}@{w * self.window * dt:.1f}s" for w in range(count)]
+            trial_of_segment += [k] * count
+            of_block = first + np.minimum(np.arange(blocks) // per, count - 1)
+            seg += [np.repeat(of_block, s), np.repeat(first + np.arange(windows), 2 * s)]
+            chan += [np.tile(np.arange(s), blocks), np.tile(np.arange(s), 2 * windows)]
+            middle = (np.arange(blocks) + 0.5) * self.block * dt
+            time += [np.repeat(middle, s), np.repeat((np.arange(windows) + 0.5) * self.window * dt, 2 * s)]
+            reading += [np.ones(blocks * s, dtype=bool), np.zeros(2 * windows * s, dtype=bool)]
+            left = self._known(k)[0] / self.deviation[k] ** 2
+            share = self.scale.noise**2 / self.block / self.deviation[k] ** 2 + left
+            rough = _ROUGH_FLOOR * self._known(k)[1] / self.grain_deviation[k] ** 2
+            grain = _ROUGH_FLOOR * noisy * pure / self.grain_deviation[k] ** 2 + rough
+            texture = np.stack([grain, np.zeros_like(grain)], axis=1)
+            floor += [share.ravel() * _SOFT_FLOOR, texture.ravel()]
+            known += [left.ravel() * _SOFT_FLOOR, np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
+            if isinstance(trial.driver, Network):
+                m = len(self.robot.drives)
+                seg.append(np.repeat(of_block, m))
+                chan.append(np.tile(s + np.arange(m), blocks))
+                time.append(np.repeat(middle, m))
+                reading.append(np.zeros(m * blocks, dtype=bool))
+                floor.append(np.zeros(m * blocks))
+                known.append(np.zeros(m * blocks))
+            size = sum(map(len, seg)) - at
+            self.slices.append(slice(at, at + size))
+            at += size
+        robot, computed = self.robot, self.robot.motor_names if self.looped else ()
+        self.layout = Layout(
+            segments=tuple(names),
+            trial_of_segment=np.array(trial_of_segment),
+            segment_of=np.concatenate(seg).astype(np.int64),
+            channel_of=np.concatenate(chan).astype(np.int64),
+            time_s=np.concatenate(time),
+            reading=np.concatenate(reading).astype(bool),
+            floor=np.concatenate(floor),
+            known=np.concatenate(known),
+            channels=(*robot.sensor_names, *(f"command_{m}" for m in computed)),
+            units=(*(x.unit for x in robot.sensors), *(joint_unit(robot, m) for m in computed)),
+            joint_of_channel=joints_of(robot, [*(x.target for x in robot.sensors), *computed]),
+        )
+
+    def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+        """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
+        models = [apply(self.robot, h) for h in hypotheses]
+        chosen = list(range(len(self.measured))) if trials is None else list(trials)
+        pairs = [(k, m) for k in chosen for m in self._held(models, k)]
+        digests = self.predictor.digests(pairs)
+        out = np.zeros((len(models), len(self.segment_of)))
+        for place, k in enumerate(chosen):
+            mine = digests[place * len(models) : (place + 1) * len(models)]
+            parts = [np.stack([self._compare(k, d) for d in mine])]
+            trial = self.measured[k]
+            if isinstance(trial.driver, Network):
+                parts.append(self._command_residuals(trial, models))
+            out[:, self.slices[k]] = np.concatenate(parts, axis=1)
+        return out
+
+    def _held(self, models: Sequence[Robot], trial: int) -> list[Robot]:
+        """The models as they are held in a trial; trials held alike share them, for a robot's digest is not free."""
+        setup = self.measured[trial].setup
+        if not setup:
+            return list(models)
+        known = self._setups.setdefault(setup, {})
+        for m in models:
+            if id(m) not in known:
+                known[id(m)] = (m, apply(m, setup))
+        held = [known[id(m)][1] for m in models]
+        if len(known) > 2000:
+            known.clear()
+        return held
+
+    def _compare(self, trial: int, predicted: Digest) -> Array:
+        measured = self._data[trial]
+        if not predicted.finite:
+            return np.full(measured.means.size + 2 * measured.rough.size, np.inf)
+        shape = (measured.means.astype(float) - predicted.means) / self.deviation[trial]
+        w, tiny = self.window, (0.25 * self.scale.scale) ** 2
+        grain = np.log((measured.rough + tiny) / (predicted.rough + tiny)) / self.grain_deviation[trial]
+        p = 0.5 * (predicted.repeated + 1 / w)
+        frozen = (measured.repeated - predicted.repeated) / np.sqrt(np.maximum(p * (1 - p), 1 / w) / w + 0.0004)
+        texture = np.stack([grain, frozen], axis=1)
+        return np.concatenate([soften(shape).ravel(), soften(texture).ravel()])
+
+    def _command_residuals(self, trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
+        spans = _spans(self.robot)
+        sent = predicted_commands(trial, models)
+        rows = len(trial.log) // self.block * self.block
+        gap = (trial.log.commands[:, None] - sent)[:rows].reshape(-1, self.block, *sent.shape[1:]).mean(axis=1)
+        values = soften(gap / (COMMAND_SHARE * spans))
+        return np.ascontiguousarray(np.moveaxis(values, 1, 0)).reshape(len(models), -1)
+
+    def noise_floor(self) -> tuple[float, str]:
+        source = self.scale.source
+        return float(np.sqrt(self.floor.mean())), f"{source}, and what calibration left" if self._unmodelled else source
+
+    # -- views of a residual -----------------------------------------------------------------------------------------
+
+    def blocks(self, trial: int, residual: Array) -> Array:
+        """(T // block, S): the part of a residual (n,) that compares means, of one trial."""
+        rows, s = len(self.measured[trial].log) // self.block, len(self.robot.sensors)
+        return residual[self.slices[trial]][: rows * s].reshape(rows, s)
+
+    def raw_blocks(self, trial: int, residual: Array) -> Array:
+        """The same before softening, in the units of the channels."""
+        return np.asarray(SOFT * np.sinh(self.blocks(trial, residual) / SOFT) * self.deviation[trial])
+
+    def raw_grain(self, trial: int, residual: Array) -> Array:
+        """(T // window, S): differences of the log of roughness, before softening."""
+        rows, s = len(self.measured[trial].log), len(self.robot.sensors)
+        first, windows = rows // self.block * s, rows // self.window
+        texture = residual[self.slices[trial]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
+        return np.asarray(SOFT * np.sinh(texture / SOFT) * self.grain_deviation[trial])
+
+    def raw(self, residual: Array) -> Array:
+        """(n,) in the units of the channels; NaN where the texture of a channel is compared."""
+        out = np.full(len(residual), np.nan)
+        for k, part in enumerate(self.slices):
+            values = self.raw_blocks(k, residual).ravel()
+            out[part.start : part.start + len(values)] = values
+            if isinstance(self.measured[k].driver, Network):
+                spans = COMMAND_SHARE * _spans(self.robot)
+                sent = residual[part][-len(self._data[k].means) * len(spans) :].reshape(-1, len(spans))
+                out[part.stop - sent.size : part.stop] = (SOFT * np.sinh(sent / SOFT) * spans).ravel()
+        return out
+
+    def series(self, hypothesis: Hypothesis) -> list[Series]:
+        """What every channel of every trial reported, and should have reported without noise."""
+        out = []
+        for k, values in enumerate(self.predicted(hypothesis)):
+            log = self.measured[k].log
+            for c, sensor in enumerate(self.robot.sensors):
+                out.append(Series(k, c, sensor.unit, log.times_s, log.sensors[:, c], values[:, c]))
+        return out
+
+    def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
+        believed = apply(self.robot, hypothesis)
+        rollouts = [replace(rollout_of(t, apply(believed, t.setup)), pose=True) for t in self.measured]
+        return list(self.evaluator.evaluate([Job(r, Whole()) for r in rollouts]))
+
+    def predicted(self, hypothesis: Hypothesis) -> list[Array]:
+        """What the channels of each trial should have reported, without noise: (T, S) by trial."""
+        model = apply(self.robot, hypothesis)
+        models = [apply(model, t.setup) for t in self.measured]
+        rollouts = [rollout_of(t, m) for t, m in zip(self.measured, models, strict=True)]
+        true = self.evaluator.evaluate([Job(r, ToSensors()) for r in rollouts])
+        return [report(m, v) for m, v in zip(models, true, strict=True)]
+
+
+def _spans(robot: Robot) -> Array:
+    """(M,) ranges of the driven joints."""
+    joints = [robot.joint(d.joint) for d in robot.drives]
+    return np.array([j.upper - j.lower for j in joints])
+
+
+def joint_unit(robot: Robot, joint: str) -> str:
+    return "m" if robot.joint(joint).kind == "slide" else "rad"

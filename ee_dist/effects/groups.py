@@ -1,0 +1,55 @@
+"""Shared effects: one effect on a group of joints or sensors with one set of values.
+
+What is wrong with one joint of a robot is often wrong with all of them: the same motors, the same grease, the same
+controller. One number for all of them is a simpler explanation than one number each, and the one an engineer would give.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ee_dist.robots.model import Drive, Robot
+
+ALL_JOINTS = "all_joints"
+JOIN = "+"
+_SETTINGS = tuple(f for f in Drive.__dataclass_fields__ if f != "joint")
+
+
+def groups(robot: Robot) -> dict[str, tuple[str, ...]]:
+    """Names of groups and their members (two or more): all driven joints, joints of equal drives where these differ (named
+    by their members, ``a+b+c``), all parts, all sensors of a kind."""
+    found: dict[str, tuple[str, ...]] = {}
+    joints = robot.motor_names
+    if len(joints) > 1:
+        found[ALL_JOINTS] = joints
+        alike: dict[tuple[object, ...], list[str]] = {}
+        for drive in robot.drives:
+            alike.setdefault(tuple(getattr(drive, f) for f in _SETTINGS), []).append(drive.joint)
+        classes = [tuple(names) for names in alike.values() if 1 < len(names) < len(joints)]
+        found |= {JOIN.join(names): names for names in classes}
+    parts = tuple(p.name for p in robot.parts[0 if robot.free_base else 1 :])
+    if len(parts) > 1:
+        found["all_parts"] = parts
+    for kind in dict.fromkeys(s.kind for s in robot.sensors):
+        names = tuple(s.name for s in robot.sensors if s.kind == kind)
+        if len(names) > 1:
+            found[f"all_{kind}_sensors"] = names
+    taken = {n for names in found.values() for n in names}
+    return {name: members for name, members in found.items() if name not in taken}
+
+
+def members_of(robot: Robot, target: str, allowed: tuple[str, ...]) -> tuple[str, ...]:
+    """The members of a group, or of any list ``a+b+c``, if an effect can act on each of them; empty otherwise."""
+    found = tuple(target.split(JOIN)) if JOIN in target else groups(robot).get(target, ())
+    return found if set(found) <= set(allowed) else ()
+
+
+def shared_targets(robot: Robot, allowed: tuple[str, ...]) -> tuple[str, ...]:
+    """Groups on which an effect can act that acts on ``allowed`` one by one."""
+    able = set(allowed)
+    return tuple(name for name, members in groups(robot).items() if set(members) <= able)
+
+
+def common(ranges: list[Mapping[str, tuple[float, float]]]) -> dict[str, tuple[float, float]]:
+    """The range of each parameter that is worth trying at every member."""
+    return {name: (max(r[name][0] for r in ranges), min(r[name][1] for r in ranges)) for name in ranges[0]}

@@ -1,0 +1,200 @@
+"""Ray as a run has it: started here with a guard beside it, or a cluster that is there already."""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import uuid
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import ray
+
+
+class EvaluatorError(RuntimeError):
+    """Ray could not be started or reached, or was lost on the way; said in one line."""
+
+
+class RayLostError(EvaluatorError):
+    """Ray was there and is gone: its libraries in this process are of no use any more, not even to end it."""
+
+
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Workers are one process a core: numerical libraries must not start threads of their own in them."""
+MARK = "EE_DIST_RAY"
+"""Variable in the environment of all processes of a Ray that we started, by which its guard knows them."""
+PER_CORE = 8
+"""More workers than this on each core only take memory."""
+LOOK_S = 0.5
+"""How often to look whether Ray is still there while it starts."""
+_SOCKET_PATH = 40
+"""Longest name of Ray's folder, characters: sockets lie in it, and the system takes 107 for the name of one."""
+_LEAVE_S = 10.0
+
+
+class _Guard:
+    """The process that ends what is left of Ray when this one is gone, and the folder that it removes."""
+
+    def __init__(self) -> None:
+        self.mark = f"{MARK}={uuid.uuid4().hex}"
+        place = tempfile.gettempdir()
+        self.folder = tempfile.mkdtemp(prefix="ee_dist_", dir=place if len(place) < _SOCKET_PATH - 16 else "/tmp")
+        script = str(Path(__file__).with_name("ray_guard.py"))
+        command = [sys.executable, "-I", "-S", script, self.mark, self.folder]
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    @property
+    def environment(self) -> dict[str, str]:
+        name, _, value = self.mark.partition("=")
+        return {name: value}
+
+    def release(self) -> None:
+        """Let it do its work, and wait until it has."""
+        with suppress(OSError, subprocess.TimeoutExpired):
+            if self.process.stdin:
+                self.process.stdin.close()
+            self.process.wait(_LEAVE_S)
+
+
+_guard: _Guard | None = None
+_address: str | None = None
+
+
+def start_ray(address: str | None, workers: int) -> None:
+    """Connect to the cluster at ``address``, or start Ray on this machine. Raises EvaluatorError."""
+    global _guard, _address
+    if ray.is_initialized():
+        return
+    options: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.CRITICAL}
+    if address:
+        _knock(address)
+        options |= {"address": address, "runtime_env": {"env_vars": ONE_THREAD}}
+        environment: dict[str, str] = {}
+    else:
+        cores = os.cpu_count() or 1
+        if workers > PER_CORE * cores:
+            raise EvaluatorError(
+                f"evaluator.workers={workers}: this machine has {cores} cores, and more than {PER_CORE * cores} workers "
+                "only take memory; choose fewer, or evaluator.workers=0 for one a core"
+            )
+        _guard = _Guard()
+        options |= {
+            "address": "local",
+            "include_dashboard": False,
+            "num_cpus": max(workers, cores),
+            "_temp_dir": _guard.folder,
+        }
+        # Inherited by the workers that Ray has ready: with a runtime_env it would start others, and a second later.
+        environment = {**ONE_THREAD, **_guard.environment}
+    starter = _Starter(options)
+    with _environment(environment):
+        starter.start()
+        while not starter.over.wait(LOOK_S):
+            if not address and (gone := lost()):
+                abandon_ray()
+                raise RayLostError(f"Ray did not start: {gone}; evaluator=serial does without it")
+    error = starter.error
+    if isinstance(error, Exception):
+        first = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        abandon_ray()
+        if address:
+            raise _unreachable(address, first)
+        raise RayLostError(f"Ray did not start ({first}); evaluator=serial does without it")
+    _address = address
+
+
+class _Starter(threading.Thread):
+    """Starts Ray beside the main thread, which so stays free for signals, and keeps Ray from setting handlers for them.
+
+    Ray's processes end with the thread that started them: it stays.
+    """
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        super().__init__(daemon=True, name="ray")
+        self.options, self.over = options, threading.Event()
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            ray.init(**self.options)
+        except BaseException as error:
+            self.error = error
+        self.over.set()
+        threading.Event().wait()
+
+
+def stop_ray() -> None:
+    """Stop what ``start_ray`` started, or leave the cluster. Ray's own way at the end of a process begins with a nap."""
+    if ray.is_initialized():
+        ray.shutdown()
+    abandon_ray()
+
+
+def abandon_ray() -> None:
+    """End the processes of a Ray that we started, without a word to them. Does nothing for a cluster of others."""
+    global _guard
+    if _guard is not None:
+        _guard.release()
+        _guard = None
+
+
+def lost() -> str | None:
+    """What of Ray is gone, if anything: a process that we started, or the cluster."""
+    if _guard is not None:
+        node = getattr(ray._private.worker, "_global_node", None)
+        dead = node.dead_processes() if node is not None else []
+        return f"its process {dead[0][0]} has ended" if dead else None
+    if _address:
+        try:
+            _knock(_address)
+        except EvaluatorError as error:
+            return str(error)
+    return None
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Set environment variables for a while."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _knock(address: str) -> None:
+    """Ray waits for minutes where nobody answers: see first whether somebody does."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host:
+        if address in ("auto", "local"):
+            return
+        raise EvaluatorError(f"ray.address={address}: neither 'auto' nor host:port, such as 127.0.0.1:6379")
+    try:
+        socket.create_connection((host, int(port)), timeout=5).close()
+    except (OSError, ValueError, OverflowError) as error:
+        raise _unreachable(address, str(error)) from None
+
+
+def _unreachable(address: str, why: str) -> EvaluatorError:
+    return EvaluatorError(
+        f"ray.address={address}: no Ray cluster answers there ({why}); "
+        "start one with 'ray start --head', or leave ray.address empty to use this machine"
+    )

@@ -1,0 +1,107 @@
+"""The clocks of a trial's tables: when each row was, on one clock, and the even grid that the log is brought to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.mapping import Column, Even
+from ee_dist.measurements.sampling import Timing, check_times
+from ee_dist.measurements.table import Table
+from ee_dist.measurements.units import UNITS, factor
+from ee_dist.trials.log import Array
+
+MOST_ROWS = 5_000_000
+"""On the grid: an hour at 1 kHz."""
+SLOW_S = 1.0
+FASTEST_S, SLOWEST_S = 2e-4, 0.2
+"""Steps of a robot's log. A factor of 1000 lies between them, so the size of a step tells the unit."""
+KEPT = 0.05
+TORN = 0.5
+"""A single gap of more than this share of the record, or a record stretched by it, is a wrong time stamp."""
+
+
+@dataclass
+class Clocked:
+    """A table with the seconds of its rows on the trial's clock, (T,)."""
+
+    table: Table
+    times_s: Array
+    timing: Timing
+
+
+def times_of(table: Table, time: Column | Even | None, where: str) -> tuple[Array, str]:
+    """Seconds (T,) of the rows of a table, and the name of what says so. Raises MeasurementError."""
+    if isinstance(time, Even):
+        return np.arange(len(table)) / time.rate_hz, "row"
+    if time is None:
+        if table.clock is not None:
+            return table.numbers(table.clock), table.clock
+        if table.rate_hz:
+            return np.arange(len(table)) / table.rate_hz, "row"
+        raise MeasurementError(
+            f"{where}: missing key 'time': {table} does not say itself when its rows were; name the column, "
+            "or 'time: {rate_hz: 100}'"
+        )
+    raw = table.numbers(time.column)
+    return raw * factor(time.unit, "s", f"{where}: time") * time.scale, time.column
+
+
+def clocked(table: Table, time: Column | Even | None, where: str) -> Clocked:
+    """The main table's clock. Raises MeasurementError for times that stand still, run backwards, or jump beyond reason."""
+    times_s, name = times_of(table, time, where)
+    timing = check_times(times_s, table, name)
+    length, steps = float(times_s[-1] - times_s[0]), np.diff(times_s)
+    worst = int(np.argmax(steps))
+    if len(steps) > 10 and steps[worst] > TORN * length and steps[worst] > max(60.0, 1000 * timing.median_s):
+        raise MeasurementError(
+            f"{table}: row {table.line(worst + 1)}, column {name!r}: time jumps by {steps[worst]:.4g} s, the other rows are "
+            f"{timing.median_s:.4g} s apart; a wrong time stamp? drop the rows on one side of it"
+        )
+    return Clocked(table, times_s, timing)
+
+
+def loosely_clocked(table: Table, time: Column | Even | None, where: str) -> Clocked:
+    """The clock of a table beside the main one, which may have few rows; of rows with one stamp the last counts.
+
+    Raises MeasurementError for times that run backwards.
+    """
+    times_s, name = times_of(table, time, where)
+    last = np.r_[np.diff(times_s) != 0, True]
+    if not last.all():
+        table, times_s = table.part(np.flatnonzero(last)), times_s[last]
+    if len(times_s) == 1:
+        return Clocked(table, times_s, Timing(0.0, 0.0, 0.0, ()))
+    return Clocked(table, times_s, check_times(times_s, table, name))
+
+
+def check_grid(found: Clocked, step_s: float, rate_stated: bool, unit: str) -> None:
+    """Raises MeasurementError where a step of ``step_s`` would lose nearly all rows, or make more than memory holds: most
+    often the unit of the time is another one."""
+    table, length = found.table, float(found.times_s[-1] - found.times_s[0])
+    rows, median = length / step_s, found.timing.median_s
+    if length < step_s or (rows < KEPT * len(table) and median < FASTEST_S and not rate_stated):
+        raise MeasurementError(
+            f"{table}: the times of {len(table)} rows cover {length:.4g} s, {1e6 * median:.4g} us a row, so that steps of "
+            f"{step_s:g} s would keep {int(rows) + 1}; if the times are not in {unit!r}{_cure(median, unit)}; "
+            "if they are, set rate_hz"
+        )
+    if median >= SLOW_S:
+        raise MeasurementError(
+            f"{table}: a row every {median:.4g} s; if the times are not in {unit!r}{_cure(median, unit)}; "
+            "slower than one row a second tells nothing about a robot's motion"
+        )
+    if rows > MOST_ROWS:
+        raise MeasurementError(
+            f"{table}: {length:.4g} s in steps of {step_s:g} s are {rows:.3g} rows; at most {MOST_ROWS}: "
+            "a wrong unit of the time, or a lower rate_hz"
+        )
+
+
+def _cure(median_s: float, unit: str) -> str:
+    """The unit in which such steps would be those of a robot's log, as advice."""
+    raw = median_s / UNITS[unit][1]
+    fits = [u for u in ("s", "ms", "us", "ns") if FASTEST_S <= raw * UNITS[u][1] <= SLOWEST_S and u != unit]
+    return f", say unit: {fits[0]!r}" if fits else ""

@@ -1,0 +1,175 @@
+"""Columns gathered into blocks: one quantity for every joint of the robot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ee_dist.measurements.proposal.words import OTHER, TIME, Reading, read_name, tokens, unit_word
+from ee_dist.measurements.table import Recorded, Table
+from ee_dist.trials.log import Array
+
+BY_NAME, BY_NUMBER, BY_PLACE, ONLY = "by name", "by number", "by place", "only one"
+_GENERAL = frozenset(["joint", "link", "motor", "axis", "drive", "servo", "arm", "robot", "j"])
+
+
+@dataclass
+class Block:
+    """Columns of one quantity, one for each joint. ``how`` says how the joints were found; ``values`` (T, J) are raw."""
+
+    table: Table
+    columns: tuple[str, ...]
+    reading: Reading
+    how: str
+    values: Array
+    units: tuple[str | None, ...] = ()
+    used: bool = field(default=False)
+
+    @property
+    def name(self) -> str:
+        first, last = self.columns[0], self.columns[-1]
+        short = (
+            first if len(self.columns) == 1 else f"{first} to {last}" if len(self.columns) > 2 else f"{first}, {last}"
+        )
+        return f"{self.table.name}: {short}" if self.table.name else short
+
+    @property
+    def unit(self) -> str | None:
+        return self.units[0] if len(set(self.units)) == 1 else None
+
+
+def joint_words(joints: Sequence[str]) -> dict[str, frozenset[str]]:
+    """The words that tell each joint from the others."""
+    all_words = {j: frozenset(tokens(j)) for j in joints}
+    shared = frozenset.intersection(*all_words.values()) if len(joints) > 1 else frozenset()
+    return {j: (w - shared - _GENERAL) or (w - shared) or w for j, w in all_words.items()}
+
+
+def series_of(table: Table) -> dict[str, Array]:
+    """Every column of finite numbers, by address."""
+    from ee_dist.measurements.errors import MeasurementError
+
+    found: dict[str, Array] = {}
+    for address in table.addresses():
+        try:
+            found[address] = table.numbers(address)
+        except MeasurementError:
+            continue
+    return found
+
+
+def blocks_of(
+    recorded: Recorded, joints: Sequence[str], order: Sequence[str] | None, times: dict[str, str]
+) -> list[Block]:
+    """All blocks of a recording. ``order`` is the joints in the order of the columns where the user said it; ``times`` is
+    the column of the time by table."""
+    found: list[Block] = []
+    for table in recorded.tables:
+        series = {a: v for a, v in series_of(table).items() if a != times.get(table.name)}
+        words = joint_words(joints)
+        families: dict[str, list[tuple[str, Reading, str | None]]] = {}
+        for address in series:
+            joint = _joint_in(address, words)
+            stem = _stem(address)
+            reading = read_name(
+                stem if joint is None or _joint_in(stem, words) else address, words[joint] if joint else frozenset()
+            )
+            if reading.kind == TIME:
+                continue
+            families.setdefault(reading.family, []).append((address, reading, joint))
+        mute: list[str] = []
+        for members in families.values():
+            block = _block(table, members, series, joints, order)
+            if block is not None:
+                found.append(block)
+            elif all(m[1].kind is None for m in members):
+                mute += [m[0] for m in members]
+        found += _by_place(table, [a for a in series if a in mute], series, joints, order)
+    return [b for b in found if b.reading.kind != OTHER]
+
+
+def _stem(address: str) -> str:
+    """``observation.state[2]`` is called observation.state."""
+    return re.sub(r"\[[^\[\]]*\]$", "", address)
+
+
+def _joint_in(address: str, words: dict[str, frozenset[str]]) -> str | None:
+    """The joint whose words all stand in a name, if it is one alone; the longest of several wins."""
+    have = set(tokens(address))
+    hits = [j for j, w in words.items() if w and w <= have and any(not x.isdigit() for x in w)]
+    if len(hits) > 1:
+        longest = max(len(words[j]) for j in hits)
+        hits = [j for j in hits if len(words[j]) == longest]
+    return hits[0] if len(hits) == 1 else None
+
+
+def _block(
+    table: Table, members: list[tuple[str, Reading, str | None]], series: dict[str, Array], joints: Sequence[str],
+    order: Sequence[str] | None,
+) -> Block | None:  # fmt: skip
+    by_joint = {j: a for a, _, j in members if j is not None}
+    named = [m for m in members if m[2] is not None]
+    if len(by_joint) == len(joints) == len(named):
+        columns, how = tuple(by_joint[j] for j in joints), BY_NAME
+    elif len(joints) == 1 and len(members) == 1:
+        columns, how = (members[0][0],), ONLY
+    elif len(members) == len(order or joints) and len(joints) > 1:
+        numbers = [_number(a, r) for a, r, _ in members]
+        if any(n is None for n in numbers) or len(set(numbers)) < len(numbers):
+            return None
+        ranked = [a for _, a in sorted(zip(numbers, (m[0] for m in members), strict=True))]
+        placed = dict(zip(order or joints, ranked, strict=True))
+        if any(j not in placed for j in joints):
+            return None
+        columns, how = tuple(placed[j] for j in joints), BY_NUMBER
+    else:
+        return None
+    return _made(table, columns, {m[0]: m[1] for m in members}[columns[0]], how, series)
+
+
+def _number(address: str, reading: Reading) -> int | None:
+    inside = re.search(r"\[(\d+)\]$", address)
+    return int(inside[1]) if inside else reading.number
+
+
+def _made(table: Table, columns: tuple[str, ...], reading: Reading, how: str, series: dict[str, Array]) -> Block:
+    units = tuple(
+        (unit_word(table.units[c]) if table.units.get(c) else None) or read_name(_stem(c)).unit or reading.unit
+        for c in columns
+    )
+    return Block(table, columns, reading, how, np.stack([series[c] for c in columns], axis=1), units)
+
+
+def _by_place(
+    table: Table, mute: list[str], series: dict[str, Array], joints: Sequence[str], order: Sequence[str] | None
+) -> list[Block]:
+    """Blocks of columns whose names say nothing: runs of one column a joint, or joint after joint, whichever hangs together."""
+    size = len(order or joints)
+    if size < 2:
+        silent = Reading(None, None, None, None, "", False, False)
+        return [_made(table, (a,), silent, ONLY, series) for a in mute]
+    if not mute or len(mute) % size:
+        return []
+    count = len(mute) // size
+    runs = [mute[k * size : (k + 1) * size] for k in range(count)]
+    strides = [mute[k::count] for k in range(count)]
+    chosen = max((runs, strides), key=lambda split: _ties(split, series)) if count > 1 else runs
+    silent = Reading(None, None, None, None, "", False, False)
+    places = [list(order or joints).index(j) for j in joints] if order is None or set(joints) <= set(order) else []
+    return [_made(table, tuple(part[p] for p in places), silent, BY_PLACE, series) for part in chosen if places]
+
+
+def _ties(split: list[list[str]], series: dict[str, Array]) -> float:
+    """How well each column of a block hangs together with the column at its place in another block."""
+    from ee_dist.measurements.proposal.signals import relation
+
+    total = 0.0
+    for k, one in enumerate(split):
+        for other in split[k + 1 :]:
+            a, b = (np.stack([series[c] for c in part], axis=1) for part in (one, other))
+            total += max(abs(relation(a, b).correlation), abs(relation(b, np.gradient(a, axis=0)).correlation),
+                         abs(relation(a, np.gradient(b, axis=0)).correlation))  # fmt: skip
+    return total

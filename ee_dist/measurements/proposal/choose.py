@@ -1,0 +1,84 @@
+"""The proposal itself, step by step: time, positions, speeds, torques, commands, the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.measurements.proposal.blocks import blocks_of
+from ee_dist.measurements.proposal.commands import add_commands
+from ee_dist.measurements.proposal.model import UNKNOWN, Choice, Hints, Proposal
+from ee_dist.measurements.proposal.positions import add_positions, ask_for_positions, ranked_positions
+from ee_dist.measurements.proposal.rest import add_rest, add_switches
+from ee_dist.measurements.proposal.speeds import add_speeds
+from ee_dist.measurements.proposal.time import time_of
+from ee_dist.measurements.proposal.torques import add_torques
+from ee_dist.measurements.proposal.units import position_units
+from ee_dist.measurements.proposal.view import View
+from ee_dist.measurements.table import Recorded
+from ee_dist.robots.model import Robot
+
+
+def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
+    """A mapping for a trial and a robot. Raises MeasurementError for hints that are not the robot's."""
+    _check_hints(robot, hints)
+    v = View(recorded, robot, hints)
+    for table in v.recorded.tables:
+        found = time_of(table, v.hints)
+        if found is not None:
+            v.times[table.name] = found
+    known = {n: t.column for n, t in v.times.items() if t.column is not None}
+    known |= {t.name: t.clock for t in v.recorded.tables if t.clock is not None}
+    timed = replace(v.recorded, tables=tuple(t for t in v.recorded.tables if t.name in v.times))
+    if not timed.tables:
+        v.out.ask("no column rises like a time; say task.rate_hz=ROWS_A_SECOND")
+        return v.out
+    order = v.hints.joints
+    v.blocks = [v.even(b) for b in blocks_of(timed, v.robot.motor_names, order, known) if len(b.values) > 20]
+    position = v.pick(ranked_positions(v))
+    if position is None:
+        ask_for_positions(v)
+        return v.out
+    v.position = position
+    v.position.block.used = True
+    _time_choice(v, v.position.block.table.name)
+    v.units = position_units(v.position.block, v.joints, v.hints)
+    add_positions(v)
+    add_speeds(v)
+    add_torques(v)
+    add_commands(v)
+    add_rest(v)
+    add_switches(v)
+    return v.out
+
+
+def _time_choice(v: View, table: str) -> None:
+    t = v.times[table]
+    if t.column is not None:
+        entry: dict[str, Any] | None = {"column": t.column, "unit": t.unit}
+    else:
+        entry = {"rate_hz": v.hints.rate_hz} if v.hints.rate_hz else None
+    v.out.choices.append(Choice("time", "", entry, t.sure, t.why))
+    if t.sure == UNKNOWN:
+        v.out.ask(f"time: {t.why}; write the column and its unit into the mapping")
+
+
+def _check_hints(robot: Robot, hints: Hints) -> None:
+    if hints.joints is not None:
+        for j in hints.joints:
+            if j not in robot.motor_names and j not in ("-", "_"):
+                raise MeasurementError(
+                    f"task.joints: {robot.name} has no driven joint {j!r}; {nearest(j, robot.motor_names)}"
+                )
+        missing = [m for m in robot.motor_names if m not in hints.joints]
+        if missing or len({j for j in hints.joints if j in robot.motor_names}) < len(robot.motor_names):
+            which = missing[0] if missing else "a joint"
+            raise MeasurementError(
+                f"task.joints: {which} is missing or named twice; expected all of {', '.join(robot.motor_names)}"
+            )
+    if hints.gains is not None and len(hints.gains) != len(hints.joints or robot.motor_names):
+        wanted = len(hints.joints or robot.motor_names)
+        raise MeasurementError(
+            f"task.gains: {len(hints.gains)} gains for {wanted} joints; expected one each, in N.m per A"
+        )

@@ -1,0 +1,117 @@
+"""Files beside one another: whether each is a trial, or trials are spread over several files, and how they are called."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.proposal.model import Hints, Proposal
+from ee_dist.measurements.proposal.time import time_of
+from ee_dist.measurements.proposal.words import TIME, read_name
+from ee_dist.measurements.readers import read
+from ee_dist.measurements.table import Recorded, Table
+
+_CUT = re.compile(r"[_\-. ]+")
+_TRIALS = frozenset(["episode", "episodes", "trial", "trials", "run", "runs", "demo", "traj", "trajectory", "rollout"])
+
+
+def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints) -> Recorded:
+    """One trial to look at, and into ``proposal_head`` what the mapping must say to get all: ``tables`` for trials of several
+    files, ``split`` for several trials of one. Raises MeasurementError."""
+    first = read(files[0])[0]
+    if len(files) > 1 and len(first.tables) == 1:
+        spread = _spread(files, first)
+        if spread is not None:
+            tables = []
+            for name, (pattern, table) in spread.items():
+                tables.append(replace(table, name=name))
+                found = time_of(table, hints)
+                clock: dict[str, Any] = {"file": pattern}
+                if found is not None and found.column is not None:
+                    clock["time"] = {"column": found.column, "unit": found.unit}
+                proposal_head.setdefault("tables", {})[name] = clock
+            return Recorded(first.name, tuple(tables))
+    if len(first.tables) == 1:
+        return _first_of_split(first, proposal_head)
+    return first
+
+
+def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Table]] | None:
+    """Files of two or more kinds, equally many, with a word of its own in each kind's names: (pattern, table) by word."""
+    kinds: dict[tuple[str, ...], list[tuple[Path, Table]]] = {}
+    for k, file in enumerate(files):
+        found = [first] if not k else list(read(file))
+        if len(found) != 1 or len(found[0].tables) != 1:
+            return None
+        table = found[0].tables[0]
+        kinds.setdefault(tuple(table.columns), []).append((file, table))
+    if len(kinds) < 2 or len({len(v) for v in kinds.values()}) != 1:
+        return None
+    words = [set.intersection(*({w.lower() for w in _CUT.split(f.stem)} for f, _ in v)) for v in kinds.values()]
+    out: dict[str, tuple[str, Table]] = {}
+    for k, members in enumerate(kinds.values()):
+        own = words[k] - set().union(*(w for j, w in enumerate(words) if j != k))
+        pattern = next((p for w in sorted(own) if (p := _pattern(members[0][0], w)) is not None), None)
+        if pattern is None:
+            raise MeasurementError(
+                f"{members[0][0]}: the files differ in their columns; name the trials alike, such as run1_states.csv and "
+                "run1_commands.csv, or import each kind by itself"
+            )
+        word, shape = pattern
+        out[word] = (shape, members[0][1])
+    return out
+
+
+def _pattern(file: Path, word: str) -> tuple[str, str] | None:
+    """The word and the name of the file with {trial} for the rest; None where the word stands in the middle."""
+    name, low = file.name, file.name.lower()
+    if low.startswith(word):
+        return word, f"{name[: len(word)]}{{trial}}{file.suffix}"
+    if low.endswith(word + file.suffix.lower()):
+        return word, f"{{trial}}{name[len(name) - len(file.suffix) - len(word) :]}"
+    return None
+
+
+def _first_of_split(recorded: Recorded, head: dict[str, Any]) -> Recorded:
+    """The first trial of a file that holds several: by a column that counts them, or by a time that starts again."""
+    table = recorded.tables[0]
+    for name in table.columns:
+        words = set(read_name(name).family.split())
+        if words & _TRIALS and words <= _TRIALS | {"index", "id", "number", "no", "nr"}:
+            cells = table.texts(name)
+            starts = [i for i, c in enumerate(cells) if i == 0 or c != cells[i - 1]]
+            if 1 < len(starts) < len(cells) / 20 and len({cells[i] for i in starts}) == len(starts):
+                head["split"] = {"column": name}
+                return Recorded(recorded.name, (table.part(slice(0, starts[1])),))
+    for name in table.addresses():
+        if read_name(name).kind != TIME:
+            continue
+        try:
+            steps = np.diff(table.numbers(name))
+        except MeasurementError:
+            continue
+        back = np.flatnonzero(steps < 0)
+        if 0 < len(back) < len(steps) / 20 and (np.delete(steps, back) > 0).all():
+            head["split"] = "restarts"
+            return Recorded(recorded.name, (table.part(slice(0, int(back[0]) + 1)),))
+    return recorded
+
+
+def proposal_for(files: Sequence[Path], robot: Any, hints: Hints) -> Proposal:
+    """A mapping for files and a robot. Raises MeasurementError."""
+    from ee_dist.measurements.proposal.choose import propose
+
+    head: dict[str, Any] = {}
+    recorded = gathered(files, head, hints)
+    if len(recorded.tables) > 1:
+        shown = [t for t in recorded.tables if len(t) > 20]
+        recorded = replace(recorded, tables=tuple(shown) or recorded.tables)
+    proposal = propose(recorded, robot, hints)
+    proposal.head = head | proposal.head
+    return proposal

@@ -1,0 +1,56 @@
+"""What a proposal is made of: choices with their reasons, questions for a person, and hints that a person gave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+SURE, LIKELY, UNKNOWN = "sure", "likely", "unknown"
+SHARE = "percent"
+UNITS_TO_ASK = ("rad", "deg", "m", "mm", SHARE)
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What a person said because no file can: ``joints`` in the order of the columns, the ``gains`` of the motors (N.m/A, in
+    the same order), the ``unit`` of positions (or "percent" of each joint's range), ``rate_hz`` of rows without a time."""
+
+    joints: Sequence[str] | None = None
+    gains: Sequence[float] | None = None
+    unit: str | None = None
+    rate_hz: float | None = None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One channel: ``entry`` is its line in the mapping (None: left out), ``sure`` how sure, ``why`` the evidence."""
+
+    group: str
+    name: str
+    entry: dict[str, Any] | None
+    sure: str
+    why: str
+
+    @property
+    def column(self) -> str:
+        if self.entry is None:
+            return "-"
+        place = self.entry.get("table")
+        column = str(self.entry.get("column", self.entry.get("speed_of", self.entry.get("rate_hz", ""))))
+        return f"{place}: {column}" if place else column
+
+
+@dataclass
+class Proposal:
+    """All choices, what was assumed for all, and what only a person can know."""
+
+    choices: list[Choice] = field(default_factory=list)
+    questions: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    head: dict[str, Any] = field(default_factory=dict)
+    """Keys of the mapping besides the channels: robot, tables, split."""
+
+    def ask(self, question: str) -> None:
+        if question not in self.questions:
+            self.questions.append(question)

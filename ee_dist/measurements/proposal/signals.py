@@ -1,0 +1,115 @@
+"""What two signals have to do with one another: one is the change of the other, or runs ahead of it, or is a multiple."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.trials.log import Array
+
+LONGEST_LAG_S = 0.5
+MOST_ROWS = 20_000
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Correlation, and by how much the second is to be multiplied to be the first (median over what moves)."""
+
+    correlation: float
+    slope: float
+
+
+@dataclass(frozen=True)
+class Lead:
+    """By how long (s) the first runs ahead of the second where they fit best, the correlation there and at no shift, and
+    the slope of the first over the second."""
+
+    lead_s: float
+    correlation: float
+    at_zero: float
+    slope: float
+
+
+def moves(values: Array) -> bool:
+    """Whether a series does anything."""
+    return bool(np.isfinite(values).all() and np.ptp(values) > 1e-12 * max(1.0, float(np.abs(values).max())))
+
+
+def smooth(values: Array, width: int) -> Array:
+    """Centred mean over an odd number of rows, along the first axis."""
+    width |= 1
+    if width <= 1 or len(values) <= width:
+        return values
+    total = np.cumsum(np.concatenate([np.zeros((1, *values.shape[1:])), values]), axis=0)
+    middle = (total[width:] - total[:-width]) / width
+    half = width // 2
+    return np.concatenate([np.repeat(middle[:1], half, axis=0), middle, np.repeat(middle[-1:], half, axis=0)])
+
+
+def change(values: Array, step_s: float, window_s: float = 0.04) -> Array:
+    """The derivative (T, J) of a series behind a mean over ``window_s``, twice, so that noise does not drown it."""
+    width = max(3, round(window_s / step_s))
+    return np.gradient(smooth(smooth(values, width), width), step_s, axis=0)
+
+
+def relation(a: Array, b: Array) -> Relation:
+    """How far ``b`` (T, J) times a number is ``a`` (T, J): the joint that fits worst decides the correlation."""
+    found = []
+    for x, y in zip(a.T, b.T, strict=True):
+        if moves(x) and moves(y):
+            x, y = x - x.mean(), y - y.mean()
+            found.append((float(x @ y / np.sqrt((x @ x) * (y @ y))), float(x @ y / (y @ y))))
+    if not found:
+        return Relation(0.0, 0.0)
+    worst = min(found, key=lambda f: abs(f[0]))
+    return Relation(worst[0], float(np.median([f[1] for f in found])))
+
+
+def each(a: Array, b: Array) -> list[Relation]:
+    """The relation joint by joint."""
+    return [relation(a[:, [k]], b[:, [k]]) for k in range(a.shape[1])]
+
+
+def derivative(position: Array, speed: Array, step_s: float) -> Relation:
+    """How far ``speed`` is the change of ``position``, both smoothed alike; slope in units of speed per unit of change."""
+    width = max(3, round(0.04 / step_s))
+    return relation(smooth(smooth(speed, width), width), change(position, step_s))
+
+
+def lead(a: Array, b: Array, step_s: float) -> Lead:
+    """By how much ``a`` (T, J) runs ahead of ``b`` (T, J), over shifts of half a second either way."""
+    most = min(round(LONGEST_LAG_S / step_s), len(a) // 3)
+    columns = [k for k in range(a.shape[1]) if moves(a[:, k]) and moves(b[:, k])]
+    if not columns or most < 1:
+        return Lead(0.0, 0.0, 0.0, 0.0)
+    x, y = a[:, columns], b[:, columns]
+    stride = max(1, most // 100)
+    shifts = sorted({*range(-most, most + 1, stride), 0})
+    scores = [_shifted(x, y, k) for k in shifts]
+    best = int(np.argmax(np.abs(scores)))
+    k = shifts[best]
+    p, q = (x[: len(x) - k], y[k:]) if k >= 0 else (x[-k:], y[:k])
+    return Lead(k * step_s, scores[best], _shifted(x, y, 0), relation(p, q).slope)
+
+
+def _shifted(x: Array, y: Array, k: int) -> float:
+    """Mean correlation over columns with ``y`` read ``k`` rows later."""
+    p, q = (x[: len(x) - k], y[k:]) if k >= 0 else (x[-k:], y[:k])
+    p, q = p - p.mean(axis=0), q - q.mean(axis=0)
+    size = np.sqrt((p * p).sum(axis=0) * (q * q).sum(axis=0))
+    return float(np.mean((p * q).sum(axis=0) / np.where(size > 0, size, np.inf)))
+
+
+def beside(a: Array, b: Array, rest: Array) -> Relation:
+    """The relation of ``a`` (T,) to ``b`` (T,) once what ``rest`` (T, K) explains is taken out of both."""
+    basis = np.concatenate([rest, np.ones((len(a), 1))], axis=1)
+    both = np.stack([a, b], axis=1)
+    left = both - basis @ np.linalg.lstsq(basis, both, rcond=None)[0]
+    return relation(left[:, [0]], left[:, [1]])
+
+
+def roughness(values: Array) -> float:
+    """How much of a series (T, J) changes from row to row, beside how much it changes at all; median over what moves."""
+    found = [float(np.std(np.diff(c, 2)) / np.std(c)) for c in values.T if moves(c)]
+    return float(np.median(found)) if found else 0.0

@@ -1,0 +1,84 @@
+"""Which column is the time, and in which unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.measurements.clocks import FASTEST_S, SLOWEST_S
+from ee_dist.measurements.proposal.blocks import series_of
+from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Hints
+from ee_dist.measurements.proposal.words import TIME, Reading, read_name, unit_word
+from ee_dist.measurements.table import Table
+from ee_dist.measurements.units import UNITS
+from ee_dist.trials.log import Array
+
+TIMES = tuple(u for u, (kind, _) in UNITS.items() if kind == "time" and u in ("s", "ms", "us", "ns"))
+
+
+@dataclass(frozen=True)
+class TimeChoice:
+    """The time of a table: a column with its unit, or (None) the clock or the rate that the format states."""
+
+    column: str | None
+    unit: str
+    seconds: Array
+    sure: str
+    why: str
+
+
+def time_of(table: Table, hints: Hints) -> TimeChoice | None:
+    """None where nothing in the table can be the time."""
+    if table.clock is not None:
+        return TimeChoice(None, "s", table.numbers(table.clock), SURE, "the format states it")
+    rows = np.arange(len(table))
+    if hints.rate_hz:
+        return TimeChoice(None, "s", rows / hints.rate_hz, SURE, f"{hints.rate_hz:g} rows a second, as you said")
+    rising = {a: v for a, v in series_of(table).items() if len(v) > 2 and (np.diff(v) > 0).all()}
+    named = [a for a in rising if _reading(a).kind == TIME]
+    counters = [a for a in rising if np.array_equal(np.diff(rising[a]), np.ones(len(table) - 1)) and a not in named]
+    open_ = [a for a in rising if a not in counters]
+    candidates = named or ([a for a in open_ if _reading(a).kind is None] if len(open_) else [])
+    if not candidates:
+        if table.rate_hz:
+            return TimeChoice(None, "s", rows / table.rate_hz, LIKELY, "the file's own rate")
+        return None
+    return _chosen(table, candidates, rising, bool(named))
+
+
+def _chosen(table: Table, candidates: list[str], rising: dict[str, Array], named: bool) -> TimeChoice:
+    column = candidates[0]
+    seconds = rising[column]
+    step = float(np.median(np.diff(seconds)))
+    fits = [u for u in TIMES if FASTEST_S <= step * UNITS[u][1] <= SLOWEST_S]
+    stated = (unit_word(table.units[column]) if column in table.units else None) or _reading(column).unit
+    stated = stated if stated in TIMES else None
+    what = "is called a time and rises" if named else "is the only one that always rises"
+    if stated and stated not in fits:
+        better = f", in {fits[0]} {step * UNITS[fits[0]][1]:.4g} s" if fits else ""
+        return TimeChoice(column, stated, seconds * UNITS[stated][1], UNKNOWN,
+                          f"it says {stated}, but rows would be {step * UNITS[stated][1]:.4g} s apart{better}")  # fmt: skip
+    if not fits:
+        return TimeChoice(
+            column, "s", seconds, UNKNOWN, f"{column!r} rises by {step:.4g} a row, which fits no unit of time"
+        )
+    others = [a for a in candidates[1:] if not _same(rising[a], seconds)]
+    if others and not named:
+        return TimeChoice(column, fits[0], seconds * UNITS[fits[0]][1], UNKNOWN,
+                          f"several columns always rise: {', '.join(candidates[:4])}")  # fmt: skip
+    unit = stated or fits[0]
+    why = f"{what}; {'it says' if stated else 'steps are those of'} {unit}: {1 / (step * UNITS[unit][1]):.4g} Hz"
+    if others:
+        why += f"; {others[0]!r} is another clock, not used"
+    return TimeChoice(column, unit, seconds * UNITS[unit][1], SURE if stated or (named and not others) else LIKELY, why)
+
+
+def _reading(address: str) -> Reading:
+    return read_name(address)
+
+
+def _same(a: Array, b: Array) -> bool:
+    """Whether two clocks tick alike, whatever their unit and start."""
+    x, y = a - a[0], b - b[0]
+    return bool(np.allclose(x / x[-1], y / y[-1], atol=1e-3))

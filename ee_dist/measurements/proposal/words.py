@@ -1,0 +1,192 @@
+"""What the name of a column says: the quantity, whether it is a command, its number, its unit. A name can be mute."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+POSITION, SPEED, TORQUE, CURRENT, OTHER, TIME = "position", "speed", "torque", "current", "other", "time"
+
+_QUANTITY = {
+    POSITION: "q pos position positions angle angles ang theta th phi qpos jpos enc encoder winkel pose lage stroke angular "
+    "rotation configuration",
+    SPEED: "dq qvel vel velocity velocities speed speeds omega qdot dtheta thetadot jvel spd rate geschwindigkeit drehzahl "
+    "qp thetap dphi",
+    TORQUE: "tau torque torques effort efforts trq moment drehmoment force kraft jtau frc",
+    CURRENT: "cur curr current currents amps ampere strom iq amperage",
+    OTHER: "acc accel acceleration qdd ddq volt voltage volts temp temperature pwm err error fric friction duty status flag "
+    "mode supply battery load enable counter seq id ticks cycle wrench imu",
+    TIME: "t time times timestamp timestamps stamp zeit clock sec secs seconds elapsed uptime tstamp",
+}
+_KIND = {w: k for k, words in _QUANTITY.items() for w in words.split()}
+_COMMAND = frozenset(
+    [
+        "cmd",
+        "command",
+        "commands",
+        "commanded",
+        "cmds",
+        "goal",
+        "goals",
+        "target",
+        "targets",
+        "tgt",
+        "des",
+        "desired",
+        "ref",
+        "reference",
+        "setpoint",
+        "setpoints",
+        "sp",
+        "soll",
+        "action",
+        "actions",
+        "con",
+        "ctrl",
+        "control",
+        "set",
+        "demand",
+        "dem",
+        "req",
+        "requested",
+        "sollwert",
+    ]
+)
+_MEASURED = frozenset(
+    [
+        "meas",
+        "measured",
+        "actual",
+        "act",
+        "present",
+        "state",
+        "states",
+        "fb",
+        "feedback",
+        "ist",
+        "obs",
+        "observation",
+        "observations",
+        "real",
+        "istwert",
+        "msr",
+        "sensed",
+    ]
+)
+_SECOND = frozenset(
+    [
+        "filt",
+        "filtered",
+        "smooth",
+        "smoothed",
+        "est",
+        "estimated",
+        "kalman",
+        "fric",
+        "friction",
+        "raw",
+        "prev",
+        "last",
+        "next",
+    ]
+)
+_UNIT = {
+    "deg": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "grad": "deg", "°": "deg", "rad": "rad", "rads": "rad",
+    "radian": "rad", "radians": "rad", "mrad": "mrad", "nm": "N.m", "n.m": "N.m", "mnm": "mN.m", "rpm": "rpm", "dps": "deg/s",
+    "radps": "rad/s", "degps": "deg/s", "ms": "ms", "msec": "ms", "millis": "ms", "us": "us", "usec": "us", "µs": "us",
+    "μs": "us", "micros": "us", "ns": "ns", "nsec": "ns", "nanos": "ns", "mm": "mm", "cm": "cm", "ma": "mA", "rev": "turn",
+    "turns": "turn", "rad/s": "rad/s", "deg/s": "deg/s", "°/s": "deg/s", "m/s": "m/s", "mm/s": "mm/s", "amp": "A", "amps": "A",
+    "1/min": "rpm", "u/min": "rpm", "n": "N", "mn": "mN", "nmm": "mN.m",
+}  # fmt: skip
+_LETTERS = {"s": "s", "m": "m", "a": "A", "v": "V", "n": "N"}
+"""Units of one letter count only behind a word that says the quantity."""
+_SHORT = {"v": SPEED, "w": SPEED, "i": CURRENT, "p": POSITION, "u": OTHER, "f": TORQUE, "x": POSITION}
+"""Letters that stand for a quantity where nothing else does; what the signals say goes before them."""
+_PER_SECOND = re.compile(r"(rad|deg|m|mm|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg)_s$", re.I)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a name says. ``kind`` and ``unit`` may be None, ``command`` too; ``number`` is what counts the joint; ``family``
+    is the name without the joint, shared by the columns of one quantity; ``weak``: the kind is a guess from a letter."""
+
+    kind: str | None
+    command: bool | None
+    unit: str | None
+    number: int | None
+    family: str
+    second: bool
+    weak: bool
+
+
+def tokens(name: str) -> list[str]:
+    """Words and numbers of a name, in lower case: ``jointPos2_deg`` is joint, pos, 2, deg."""
+    spaced = re.sub(r"(?<=[a-zäöü])(?=[A-Z][a-zäöü])", " ", name)
+    return [w.lower() for w in re.findall(r"[^\W\d_]+|\d+", spaced.replace("°", " deg "))]
+
+
+def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
+    """What a column's name says; ``joint_words`` are the words that name its joint, which say nothing else."""
+    bare, unit = _unit_of(name)
+    words = [w for w in tokens(bare) if w not in joint_words]
+    numbers = [int(w) for w in words if w.isdigit()]
+    texts = [w for w in words if not w.isdigit()]
+    kinds = [_KIND[w] for w in texts if w in _KIND]
+    if unit is None and len(texts) > 1 and texts[-1] in _UNIT:
+        unit = _UNIT[texts[-1]]
+        texts = texts[:-1]
+    elif unit is None and len(texts) > 1 and texts[-1] in _LETTERS and kinds:
+        unit = _LETTERS[texts[-1]]
+        texts = texts[:-1]
+    command = True if any(w in _COMMAND for w in texts) else False if any(w in _MEASURED for w in texts) else None
+    kind, weak = _kind(kinds, texts, unit)
+    return Reading(
+        kind, command, unit, numbers[-1] if numbers else None, " ".join(texts), any(w in _SECOND for w in texts), weak
+    )
+
+
+def _kind(kinds: list[str], texts: list[str], unit: str | None) -> tuple[str | None, bool]:
+    if OTHER in kinds:
+        return OTHER, False
+    for kind in (SPEED, CURRENT, TORQUE, POSITION):
+        if kind in kinds:
+            return kind, False
+    if unit is not None:
+        by_unit = {
+            "rad/s": SPEED,
+            "deg/s": SPEED,
+            "m/s": SPEED,
+            "mm/s": SPEED,
+            "rpm": SPEED,
+            "N.m": TORQUE,
+            "mN.m": TORQUE,
+        }
+        by_unit |= {"A": CURRENT, "mA": CURRENT, "rad": POSITION, "deg": POSITION, "mrad": POSITION, "turn": POSITION}
+        by_unit |= {"V": OTHER, "ms": TIME, "us": TIME, "ns": TIME, "N": TORQUE, "mm": POSITION, "cm": POSITION}
+        if unit in by_unit:
+            return by_unit[unit], False
+    if TIME in kinds:
+        return TIME, False
+    letters = [w for w in texts if w in _SHORT]
+    return (_SHORT[letters[0]], True) if letters else (None, False)
+
+
+def _unit_of(name: str) -> tuple[str, str | None]:
+    """A unit in brackets or a speed's at the end, and the name without it."""
+    found = re.search(r"[(\[]\s*([^\d()\[\]]+?)\s*[)\]]\s*$", name)
+    if found:
+        text = found[1].lower().replace("·", ".").replace("*", ".").replace(" ", "").replace("_", "/")
+        unit = _UNIT.get(text) or _LETTERS.get(text)
+        if unit:
+            return name[: found.start()], unit
+    found = _PER_SECOND.search(name)
+    if found:
+        size = (found[1] or found[2]).lower()
+        return name[: found.start()], {"rev": "turn/s", "turn": "turn/s"}.get(size, f"{size}/s")
+    return name, None
+
+
+def unit_word(text: str) -> str | None:
+    """A unit as a file states it, as one of ours."""
+    bare = text.strip().lower().replace("·", ".").replace("*", ".").replace(" ", "")
+    return _UNIT.get(bare) or _LETTERS.get(bare)

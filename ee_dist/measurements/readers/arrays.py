@@ -1,0 +1,180 @@
+"""Arrays by name as tables: what NumPy's archives, MATLAB's files and HDF5 have in common, and the first two themselves."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.readers.options import Options, bounded
+from ee_dist.measurements.table import WIDEST, Recorded, Table
+
+FEW = 16
+"""Arrays shorter than this beside long ones are settings, not series."""
+TRIAL = re.compile(
+    r"^(\d+|.*(trial|episode|ep|demo|run|rec|record|recording|exp|test|traj|rollout|meas)s?[ _.-]?\d+)$", re.I
+)
+"""What groups are called that hold a trial each."""
+
+
+def recorded(file: Path, name: str, arrays: Mapping[str, Any], notes: tuple[str, ...] = ()) -> Recorded:
+    """A trial of arrays: those of one length are one table, numbers and texts its header.
+
+    Arrays are (T,), (T, n) or (n, T). Raises MeasurementError where none is a series.
+    """
+    series: dict[str, Any] = {}
+    header: dict[str, Any] = {}
+    said = list(notes)
+    for key, value in arrays.items():
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiub":
+            if array.ndim == 0 and array.dtype.kind in "US":
+                header[key] = str(array)
+            continue
+        array = np.squeeze(array)
+        if array.ndim == 0:
+            header[key] = array.item()
+        elif array.ndim <= 2:
+            series[key] = array
+        else:
+            said.append(f"{key}: left out, its shape is {array.shape}; expected (T,) or (T, n)")
+    lengths = Counter(len(a) for a in series.values() if a.ndim == 1)
+    longest = max((max(a.shape) for a in series.values()), default=0)
+    groups: dict[int, dict[str, Any]] = {}
+    for key, array in series.items():
+        rows = _rows(array, lengths)
+        if rows < FEW <= longest:
+            header[key] = array.tolist()
+        elif array.ndim == 2 and min(array.shape) > WIDEST:
+            said.append(f"{key}: left out, its shape is {array.shape}")
+        else:
+            groups.setdefault(rows, {})[key] = array.T if array.ndim == 2 and array.shape[0] != rows else array
+    if not groups:
+        raise MeasurementError(f"{file}: no array of numbers in it that is a series; there are: {_shapes(arrays)}")
+    tables = tuple(
+        Table(
+            file,
+            columns,
+            header,
+            name="" if len(groups) == 1 else next(iter(columns)),
+            notes=tuple(said) if not k else (),
+        )
+        for k, columns in enumerate(groups.values())
+    )
+    return Recorded(name, tables)
+
+
+def _rows(array: Any, lengths: Counter[int]) -> int:
+    """Which side of an array is time: the one that other series have, or else the longer."""
+    if array.ndim == 1:
+        return len(array)
+    a, b = array.shape
+    known = [n for n in (a, b) if n in lengths]
+    return known[0] if len(known) == 1 else max(a, b)
+
+
+def _shapes(arrays: Mapping[str, Any]) -> str:
+    return ", ".join(f"{k} {np.shape(v)}" for k, v in list(arrays.items())[:8]) or "none"
+
+
+def read_npz(file: Path, options: Options) -> tuple[Recorded, ...]:
+    """NumPy's .npz and .npy. Pickled objects are never loaded: they could run code. Raises MeasurementError."""
+    try:
+        if zipfile.is_zipfile(file):
+            with zipfile.ZipFile(file) as archive:
+                bounded(file, sum(i.file_size for i in archive.infolist()))
+        else:
+            bounded(file, file.stat().st_size)
+        found = np.load(file, allow_pickle=False)
+        if isinstance(found, np.ndarray):
+            return (recorded(file, "", {file.stem: found}),)
+        arrays: dict[str, Any] = {}
+        notes: list[str] = []
+        with found:
+            for key in found.files:
+                try:
+                    arrays[key] = found[key]
+                except ValueError as error:
+                    if "pickle" not in str(error).lower():
+                        raise
+                    notes.append(f"{key}: left out, it holds Python objects, which are not loaded: they could run code")
+        if not arrays and notes:
+            raise MeasurementError(f"{file}: {notes[0]}; save arrays of numbers")
+        return (recorded(file, "", arrays, tuple(notes)),)
+    except MeasurementError:
+        raise
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+        if "pickle" in str(error).lower() or "object" in str(error).lower():
+            raise MeasurementError(
+                f"{file}: holds Python objects (a pickle), which are not loaded: they could run code; save arrays of numbers"
+            ) from None
+        raise MeasurementError(f"{file}: not an archive of NumPy, or cut short: {_one(error)}") from None
+
+
+def read_mat(file: Path, options: Options) -> tuple[Recorded, ...]:
+    """MATLAB's files to version 7 by SciPy, 7.3 by h5py. Structs are columns ``run.q``, arrays of structs trials.
+
+    Raises MeasurementError.
+    """
+    from scipy import io
+
+    try:
+        sizes = [float(np.prod(shape, dtype=float)) for _, shape, _ in io.whosmat(str(file))]
+        bounded(file, 8 * sum(sizes))
+        content = io.loadmat(str(file), simplify_cells=True, verify_compressed_data_integrity=True)
+    except NotImplementedError:
+        from ee_dist.measurements.readers.hdf5 import read_hdf5
+
+        return read_hdf5(file, options)
+    except MeasurementError:
+        raise
+    except OSError as error:
+        if error.errno:
+            raise
+        raise MeasurementError(f"{file}: not a MATLAB file, or cut short: {_one(error)}") from None
+    except Exception as error:  # The parser raises what it stumbles upon.
+        raise MeasurementError(f"{file}: not a MATLAB file, or cut short: {_one(error)}") from None
+    flat: dict[str, Any] = {}
+    trials: dict[str, list[dict[str, Any]]] = {}
+    _flatten({k: v for k, v in content.items() if not k.startswith("__")}, "", flat, trials, 0)
+    if trials:
+        name, runs = max(trials.items(), key=lambda item: len(item[1]))
+        found = []
+        for k, run in enumerate(runs):
+            inner: dict[str, Any] = {}
+            _flatten(run, "", inner, {}, 0)
+            found.append(recorded(file, f"{name} {k + 1}", inner))
+        return tuple(found)
+    if not any(np.asarray(v).dtype.kind in "fiub" for v in flat.values()):
+        raise MeasurementError(
+            f"{file}: no arrays of numbers in it (timeseries, tables and objects are not read): save arrays or structs of arrays"
+        )
+    return (recorded(file, "", flat),)
+
+
+def _flatten(data: Mapping[str, Any], before: str, into: dict[str, Any], trials: dict[str, Any], depth: int) -> None:
+    for key, value in data.items():
+        name = f"{before}{key}"
+        if isinstance(value, Mapping) and depth < 6:
+            _flatten(value, f"{name}.", into, trials, depth + 1)
+        elif (
+            isinstance(value, (list, np.ndarray))
+            and len(np.shape(value)) == 1
+            and len(value)
+            and isinstance(value[0], Mapping)
+        ):
+            trials[name] = list(value)
+        elif isinstance(value, (str, int, float, bool)) or (
+            isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+        ):
+            into[name] = value
+
+
+def _one(error: BaseException) -> str:
+    return " ".join(f"{error or type(error).__name__}".split())[:120]

@@ -1,0 +1,97 @@
+"""JSON: a header and a list of rows, a list of rows alone, columns by name, or one row a line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.measurements.readers.options import Options, bounded
+from ee_dist.measurements.table import Recorded, Table
+
+DEEPEST = 6
+"""Mappings inside a row are columns of their own, ``state.q``, down to this depth."""
+TEXT_BYTES = 8
+"""What a byte of JSON takes in memory once it is read, at most."""
+
+
+def read_json(file: Path, options: Options) -> tuple[Recorded, ...]:
+    """One trial with one table. Raises MeasurementError."""
+    bounded(file, file.stat().st_size * TEXT_BYTES, "convert it to Parquet")
+    data = _parsed(file)
+    header: dict[str, Any] = {}
+    rows: Any = data
+    if isinstance(data, Mapping):
+        name = _rows_of(data, options.records)
+        if name is None:
+            columns = {
+                str(k): v for k, v in data.items() if isinstance(v, list) and v and not isinstance(v[0], Mapping)
+            }
+            lengths = {len(v) for v in columns.values()}
+            if len(columns) < 2 or len(lengths) != 1:
+                raise MeasurementError(
+                    f"{file}: no list named {options.records!r} in it; {nearest(options.records, data)}"
+                )
+            rest = {str(k): v for k, v in data.items() if str(k) not in columns}
+            return (Recorded("", (Table(file, columns, rest),)),)
+        rows = data[name]
+        header = {str(k): v for k, v in data.items() if k != name}
+    elif not (isinstance(data, list) and data and isinstance(data[0], Mapping)):
+        raise MeasurementError(f"{file}: no list named {options.records!r} in it; the file is not a mapping")
+    return (Recorded("", (Table(file, _columns(file, rows), header),)),)
+
+
+def _parsed(file: Path) -> Any:
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise MeasurementError(f"{file}: not a text file; is it really json?") from None
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise MeasurementError(f"{file}: nested too deeply; expected a list of rows") from None
+    except ValueError as error:
+        lines = [s for s in text.splitlines() if s.strip()]
+        if len(lines) > 1 and lines[0].lstrip().startswith("{") and lines[0].rstrip().endswith("}"):
+            return _lines(file, lines)
+        raise MeasurementError(f"{file}: not JSON: {str(error)[:120]}") from None
+
+
+def _lines(file: Path, lines: list[str]) -> list[Any]:
+    rows = []
+    for i, line in enumerate(lines):
+        try:
+            rows.append(json.loads(line))
+        except (ValueError, RecursionError) as error:
+            raise MeasurementError(f"{file}: line {i + 1}: not JSON: {str(error)[:120]}") from None
+    return rows
+
+
+def _rows_of(data: Mapping[str, Any], records: str) -> str | None:
+    """The entry that holds the rows: the named one, or the only list of mappings."""
+    if isinstance(data.get(records), list):
+        return records
+    lists = [k for k, v in data.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)]
+    return lists[0] if len(lists) == 1 else None
+
+
+def _columns(file: Path, rows: list[Any]) -> dict[str, Any]:
+    columns: dict[str, list[Any]] = {}
+    for i, row in enumerate(rows):
+        if not isinstance(row, Mapping):
+            raise MeasurementError(f"{file}: row {i + 1}: expected a mapping of columns, not {str(row)[:40]!r}")
+        flat: dict[str, Any] = {}
+        _flatten(row, "", flat, 0)
+        for name, value in flat.items():
+            columns.setdefault(name, [None] * len(rows))[i] = value
+    return columns
+
+
+def _flatten(row: Mapping[str, Any], before: str, into: dict[str, Any], depth: int) -> None:
+    for key, value in row.items():
+        if isinstance(value, Mapping) and depth < DEEPEST:
+            _flatten(value, f"{before}{key}.", into, depth + 1)
+        elif not isinstance(value, Mapping):
+            into[f"{before}{key}"] = value

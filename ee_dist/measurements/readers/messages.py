@@ -1,0 +1,208 @@
+"""Messages of a bag as tables: one a topic, a row a message, fields as columns, joints by their names.
+
+Whatever names its joints (``name`` or ``joint_names`` beside lists of that length) gets columns such as
+``position[elbow]``; a trajectory gets a row for each of its points.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.readers.options import bounded
+from ee_dist.measurements.table import WIDEST, Recorded, Table
+
+TIME = "time"
+_NO_SERIES = re.compile(
+    r"Image|PointCloud|Log$|TFMessage|CameraInfo|String$|Diagnostic|MarkerArray|OccupancyGrid|PlotJuggler"
+)
+_LEFT_OUT = re.compile(r"covariance|(^|\.)(layout|header\.seq)")
+STAMP_APART_S = 10.0
+"""A stamp this far from when the message was logged counts from something else (since boot, say): the log time is taken."""
+
+
+def is_series(kind: str) -> bool:
+    """Whether messages of a type can hold a robot's channels."""
+    return not _NO_SERIES.search(kind)
+
+
+@dataclass
+class _Rows:
+    """One topic while it is read: (stamp or None, log time) in ns, and the fields, of messages with the same fields."""
+
+    at_ns: list[tuple[int | None, int]] = field(default_factory=list)
+    fields: dict[str, list[Any]] = field(default_factory=dict)
+    parts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+class Gatherer:
+    """Takes messages one by one and gives a trial."""
+
+    def __init__(self, file: Path) -> None:
+        self.file, self.numbers = file, 0
+        self.topics: dict[str, dict[tuple[Any, ...], _Rows]] = {}
+        self.notes: list[str] = []
+
+    def add(self, topic: str, log_ns: int, message: Any) -> None:
+        """A message: a mapping, or an object with annotated fields. Raises MeasurementError where memory would not do."""
+        for stamp_ns, flat, parts in _rows(message, log_ns):
+            if not flat:
+                continue
+            key = tuple((k, len(v) if isinstance(v, np.ndarray) else 0, parts.get(k)) for k, v in flat.items())
+            kinds = self.topics.setdefault(topic, {})
+            rows = kinds.setdefault(key, _Rows(parts=parts))
+            if len(kinds) > 64:
+                raise MeasurementError(
+                    f"{self.file}: {topic}: its messages differ in their fields; nothing to compare in it"
+                )
+            rows.at_ns.append((stamp_ns, log_ns))
+            for name, v in flat.items():
+                rows.fields.setdefault(name, []).append(v)
+                self.numbers += len(v) if isinstance(v, np.ndarray) else 1
+        bounded(self.file, 40.0 * self.numbers)
+
+    def trial(self) -> Recorded:
+        """All topics as tables on one clock, which starts at 0. Raises MeasurementError where there are none."""
+        made: list[tuple[str, _Rows, Any]] = []
+        for topic, kinds in self.topics.items():
+            for k, rows in enumerate(sorted(kinds.values(), key=lambda r: -len(r.at_ns))):
+                made.append((topic if not k else f"{topic} #{k + 1}", rows, self._clock(topic, rows)))
+        if not made:
+            raise MeasurementError(
+                f"{self.file}: no messages with numbers in it (JointState, Imu, Wrench, trajectories, ...)"
+            )
+        start = min(int(at.min()) for _, _, at in made)
+        tables = []
+        for name, rows, at in made:
+            order = np.argsort(at, kind="stable")
+            columns: dict[str, Any] = {TIME: (at[order] - start) / 1e9}
+            for field_name, values in rows.fields.items():
+                columns[field_name] = np.array(values)[order]
+            tables.append(Table(self.file, columns, name=name, clock=TIME, parts=rows.parts))
+        # The topic that tells most about joints first.
+        tables.sort(key=lambda t: (not any("position" in c and p for c, p in t.parts.items()), -len(t)))
+        if self.notes:
+            tables[0].notes = tuple(self.notes)
+        return Recorded("", tuple(tables))
+
+    def _clock(self, topic: str, rows: _Rows) -> Any:
+        logged = np.array([log for _, log in rows.at_ns], dtype=np.int64)
+        if any(stamp is None for stamp, _ in rows.at_ns):
+            return logged
+        stamped = np.array([stamp for stamp, _ in rows.at_ns], dtype=np.int64)
+        apart = float(np.median((stamped - logged) / 1e9))
+        if abs(apart) > STAMP_APART_S:
+            self.notes.append(f"{topic}: its stamps are {apart:.4g} s off the time of logging, which is taken instead")
+            return logged
+        return stamped
+
+
+def _rows(message: Any, log_ns: int) -> Iterator[tuple[int | None, dict[str, Any], dict[str, tuple[str, ...]]]]:
+    """(stamp, fields, names of list fields) of a message; a trajectory gives one for each point."""
+    stamp = _stamp(message)
+    flat: dict[str, Any] = {}
+    parts: dict[str, tuple[str, ...]] = {}
+    points = _get(message, "points")
+    if _joints(message) and isinstance(points, Sequence) and points and _get(points[0], "time_from_start") is not None:
+        for point in points:
+            flat, parts = {}, {}
+            _flatten(point, "", _joints(message), flat, parts, 0)
+            after = _nanoseconds(_get(point, "time_from_start")) or 0
+            flat = {k: v for k, v in flat.items() if not k.startswith("time_from_start")}
+            yield (stamp or log_ns) + after, flat, parts
+        return
+    _flatten(message, "", (), flat, parts, 0)
+    yield stamp, flat, parts
+
+
+def _fields(value: Any) -> Mapping[str, Any] | None:
+    if isinstance(value, Mapping):
+        return {str(k): v for k, v in value.items()}
+    named = getattr(value, "__dataclass_fields__", None)
+    return None if named is None else {n: getattr(value, n) for n in named if not n.startswith("_")}
+
+
+def _get(value: Any, name: str) -> Any:
+    inner = _fields(value)
+    return None if inner is None else inner.get(name)
+
+
+def _joints(message: Any) -> tuple[str, ...]:
+    for key in ("joint_names", "name", "names"):
+        found = _get(message, key)
+        if isinstance(found, (list, tuple)) and found and all(isinstance(n, str) for n in found):
+            return tuple(found)
+    return ()
+
+
+def _stamp(message: Any) -> int | None:
+    """The stamp of a message in ns, where it has one that was set."""
+    for holder in (_get(message, "header"), message):
+        for key in ("stamp", "timestamp", "time"):
+            found = _nanoseconds(_get(holder, key))
+            if found:
+                return found
+    return None
+
+
+def _nanoseconds(value: Any) -> int | None:
+    """ns of a time or a duration: seconds and nanoseconds by any of their names."""
+    inner = _fields(value)
+    if inner is None:
+        return None
+    whole = next((inner[k] for k in ("sec", "secs", "seconds") if k in inner), None)
+    part = next((inner[k] for k in ("nanosec", "nsecs", "nsec", "nanos") if k in inner), None)
+    if not isinstance(whole, (int, float)) or not isinstance(part, (int, float)):
+        return None
+    return int(whole) * 10**9 + int(part)
+
+
+def _flatten(
+    value: Any,
+    before: str,
+    joints: tuple[str, ...],
+    into: dict[str, Any],
+    parts: dict[str, tuple[str, ...]],
+    depth: int,
+) -> None:
+    inner = _fields(value) or {}
+    joints = _joints(value) or joints
+    for key, entry in inner.items():
+        name = f"{before}{key}"
+        if _LEFT_OUT.search(name) or (key in ("stamp", "timestamp") and _nanoseconds(entry) is not None):
+            continue
+        if isinstance(entry, (bool, int, float, np.integer, np.floating, np.bool_)):
+            into[name] = float(entry)
+        elif _fields(entry) is not None:
+            if depth < 6 and key != "header":
+                _flatten(entry, f"{name}.", joints, into, parts, depth + 1)
+        elif isinstance(entry, (list, tuple, np.ndarray)) and 0 < len(entry) <= WIDEST:
+            _list(entry, name, joints, into, parts, depth)
+
+
+def _list(
+    entry: Any, name: str, joints: tuple[str, ...], into: dict[str, Any], parts: dict[str, tuple[str, ...]], depth: int
+) -> None:
+    first = entry[0]
+    if _fields(first) is not None:
+        # A list of things with a name each: joints {name, position, ...}.
+        label = _get(first, "name") or _get(first, "joint") or _get(first, "id")
+        if depth >= 6 or label is None:
+            return
+        labels = tuple(str(_get(e, "name") or _get(e, "joint") or _get(e, "id")) for e in entry)
+        for key, sample in (_fields(first) or {}).items():
+            if isinstance(sample, (int, float)) and not isinstance(sample, bool):
+                into[f"{name}.{key}"] = np.array([float(_get(e, key) or 0.0) for e in entry])
+                parts[f"{name}.{key}"] = labels
+        return
+    if isinstance(first, (str, bytes)):
+        return
+    into[name] = np.asarray(entry, dtype=np.float64)
+    if len(entry) == len(joints):
+        parts[name] = joints

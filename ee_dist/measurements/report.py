@@ -1,0 +1,45 @@
+"""What the import of a trial did and saw, for the terminal, a file and the summary."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+
+@dataclass
+class Report:
+    """What the import of one trial did and saw. Rates in Hz, gaps as (row, seconds), ranges as (lowest, highest)."""
+
+    file: str
+    trial: str
+    rows_read: int = 0
+    rows: int = 0
+    seconds: float = 0.0
+    rate_read_hz: float = 0.0
+    rate_hz: float = 0.0
+    even: bool = True
+    resampled: bool = False
+    gaps: list[tuple[int, float]] = field(default_factory=list)
+    ranges: dict[str, tuple[float, float, str]] = field(default_factory=dict)
+    done: list[str] = field(default_factory=list)
+    suspicious: list[str] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def describe(reports: Sequence[Report]) -> str:
+    """The reports as text, for the terminal and a file."""
+    lines: list[str] = []
+    for r in reports:
+        lines.append(f"{r.file}: trial {r.trial!r}")
+        lines.append(
+            f"  {r.rows_read} rows over {r.seconds:.4g} s, {r.rate_read_hz:.4g} Hz"
+            + ("" if r.even else " (median; uneven)")
+            + f" -> {r.rows} rows at {r.rate_hz:.4g} Hz; gaps: {len(r.gaps)}"
+        )
+        lines += [f"  {name}: {low:.5g} to {high:.5g} {unit}" for name, (low, high, unit) in r.ranges.items()]
+        lines += [f"  done: {d}" for d in r.done]
+        lines += [f"  suspicious: {s}" for s in r.suspicious]
+    return "\n".join(lines)

@@ -1,0 +1,62 @@
+"""What a robot has that a log can fill: its sensors, and for each drive a command of its kind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.measurements.mapping import Mapping
+from ee_dist.robots.model import Robot
+
+UNITS = {
+    "position": {"hinge": "rad", "slide": "m"},
+    "speed": {"hinge": "rad/s", "slide": "m/s"},
+    "torque": {"hinge": "N.m", "slide": "N"},
+}
+
+
+def command_kind(drive: Any) -> str:
+    """What a drive obeys: position, speed or torque."""
+    return str(getattr(drive, "command", "position"))
+
+
+def command_units(robot: Robot) -> dict[str, str]:
+    """The unit of the command of each driven joint."""
+    kinds = {j.name: j.kind for j in robot.joints}
+    return {d.joint: UNITS[command_kind(d)][kinds[d.joint]] for d in robot.drives}
+
+
+def torque_units(robot: Robot) -> dict[str, str]:
+    """The unit of the torque (force) of each driven joint."""
+    kinds = {j.name: j.kind for j in robot.joints}
+    return {d.joint: UNITS["torque"][kinds[d.joint]] for d in robot.drives}
+
+
+def check_names(mapping: Mapping, robot: Robot) -> None:
+    """Raises MeasurementError where the mapping names sensors or joints that the robot does not have, or leaves some out."""
+    where, motors = str(mapping.source), robot.motor_names
+    named = {*mapping.sensors, *mapping.commands}
+    if named and not named & {*robot.sensor_names, *motors}:
+        raise MeasurementError(
+            f"{where}: is for another robot: none of its names ({', '.join(sorted(named))}) is one of {robot.name}'s: "
+            f"{', '.join((*robot.sensor_names, *motors))}"
+        )
+    for group, names, allowed in (
+        ("sensors", mapping.sensors, robot.sensor_names),
+        ("commands", mapping.commands, motors),
+        ("torques", mapping.torques, motors),
+    ):
+        for name in names:
+            if name not in allowed:
+                raise MeasurementError(f"{where}: {group}: {robot.name} has no {name!r}; {nearest(name, allowed)}")
+    for group, names in (("commands", mapping.commands), ("torques", mapping.torques)):
+        missing = [m for m in motors if m not in names]
+        # A log without any command is of use to a balance of forces, which needs the torques.
+        if missing and (names or (group == "commands" and not mapping.torques)):
+            raise MeasurementError(f"{where}: {group}: no column for joint {missing[0]!r} of {robot.name}")
+    absent = [s for s in robot.sensor_names if s not in mapping.sensors]
+    if absent:
+        raise MeasurementError(
+            f"{where}: sensors: no column for {absent[0]!r} of {robot.name}; add one, or for a speed 'speed_of: <position>', "
+            "or take the sensor out of the robot's description"
+        )

@@ -1,0 +1,115 @@
+"""Files into trials: one file is one or several, several files may be one, and rows are shared out where one file holds all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.mapping import Clock, Mapping
+from ee_dist.measurements.readers import read
+from ee_dist.measurements.table import Recorded, Table
+
+FEWEST_ROWS = 2
+MOST_TRIALS = 2000
+
+
+def trials_of(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
+    """All trials of the files, each with a name of its own. Raises MeasurementError."""
+    if any(c.file for c in mapping.tables.values()):
+        found = _joined(files, mapping)
+    else:
+        found = []
+        for file in files:
+            several = read(file, mapping.reading)
+            for r in several:
+                found += _split(_named(r, file, len(files) > 1 and bool(r.name)), mapping)
+    if len(found) > MOST_TRIALS:
+        raise MeasurementError(f"{files[0]}: {len(found)} trials; at most {MOST_TRIALS} at once: name fewer files")
+    return found
+
+
+def _named(recorded: Recorded, file: Path, both: bool) -> Recorded:
+    own = file.stem if file.suffix else file.name
+    return replace(recorded, name=f"{own} {recorded.name}" if both else recorded.name or own)
+
+
+def _split(recorded: Recorded, mapping: Mapping) -> list[Recorded]:
+    if mapping.split is None:
+        return [recorded]
+    if len(recorded.tables) > 1:
+        raise MeasurementError(
+            f"{mapping.source}: split: {recorded.tables[0].path} has several tables; split needs one"
+        )
+    table = recorded.tables[0]
+    if mapping.split.restarts:
+        from ee_dist.measurements.clocks import times_of
+
+        times = times_of(table, mapping.time, str(mapping.source))[0]
+        first = np.flatnonzero(np.r_[True, np.diff(times) < 0])
+        labels = [str(k + 1) for k in range(len(first))]
+    else:
+        cells = table.texts(mapping.split.column)
+        first = np.array([i for i, c in enumerate(cells) if i == 0 or c != cells[i - 1]])
+        labels = [_short(cells[i]) for i in first]
+        if len(set(labels)) < len(labels):
+            again = next(v for k, v in enumerate(labels) if v in labels[:k])
+            raise MeasurementError(
+                f"{table}: column {mapping.split.column!r} comes back to {again!r}; the rows of a trial must stand together"
+            )
+    if len(first) > len(table) / FEWEST_ROWS:
+        raise MeasurementError(
+            f"{mapping.source}: split: makes {len(first)} trials of {len(table)} rows; expected a column that stays the "
+            "same all through a trial"
+        )
+    ends = [*first[1:], len(table)]
+    return [
+        Recorded(f"{recorded.name} {label}", (table.part(slice(int(a), int(b))),))
+        for a, b, label in zip(first, ends, labels, strict=True)
+    ]
+
+
+def _short(cell: str) -> str:
+    """3.0 is trial 3."""
+    try:
+        return f"{float(cell):g}"
+    except ValueError:
+        return cell
+
+
+def _joined(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
+    """Trials whose tables are files of their own, matched by what stands at {trial} in their names."""
+    tables: dict[str, dict[str, Table]] = {}
+    for file in files:
+        for name, clock in mapping.tables.items():
+            found = _pattern(clock).fullmatch(file.name)
+            if found:
+                several = read(file, mapping.reading)
+                if len(several) > 1 or len(several[0].tables) > 1:
+                    raise MeasurementError(f"{file}: holds several tables or trials; expected one for {name!r}")
+                trial = found["trial"]
+                tables.setdefault(trial, {})[name] = replace(several[0].tables[0], name=name)
+                break
+    if not tables:
+        shapes = ", ".join(c.file for c in mapping.tables.values())
+        raise MeasurementError(f"{mapping.source}: tables: none of the {len(files)} files is named like {shapes}")
+    out = []
+    for trial, parts in tables.items():
+        for name, clock in mapping.tables.items():
+            if name not in parts:
+                there = next(iter(parts.values())).path
+                raise MeasurementError(
+                    f"{there}: its other half is missing: no {clock.file.replace('{trial}', trial)} beside it for {name!r}; "
+                    "name the folder, or both files"
+                )
+        out.append(Recorded(trial.strip("_- .") or trial or "trial", tuple(parts[n] for n in mapping.tables)))
+    return out
+
+
+def _pattern(clock: Clock) -> re.Pattern[str]:
+    before, _, after = clock.file.partition("{trial}")
+    return re.compile(f"{re.escape(before)}(?P<trial>.*){re.escape(after)}", re.IGNORECASE)

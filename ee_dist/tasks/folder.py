@@ -1,0 +1,209 @@
+"""The folder of a run: its alone while it runs, not overwritten unasked, and left as it was found by a mistake.
+
+What a run did not make it does not delete: only files that were written here by name, and folders that were not there
+before and are empty.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from hydra.experimental.callback import Callback
+from omegaconf import DictConfig, OmegaConf
+
+from ee_dist.tasks.config import ConfigError
+
+LOCK = ".running"
+"""Locked by the run that writes into the folder, and gone at its end; the system unlocks it if the run is killed."""
+SETTINGS = "config"
+_NAMED = 3
+
+_SWEEP = "multirun.yaml"
+NO_NAME = "{key}=: which folder? a run writes into one of its own, such as {key}=logs/mine"
+HELD = (
+    "{key}={folder}: holds something already ({content}), and a run does not overwrite; "
+    "name another folder, or say overwrite=true"
+)
+
+_made: tuple[Path, ...] = ()
+
+
+class Refused(BaseException):
+    """A folder that cannot be used, found where Hydra turns exceptions of the ordinary kind into warnings."""
+
+
+class NotedFolders(Callback):
+    """Hydra makes a job's folder before it calls the job: notes before that which of its folders are not there yet."""
+
+    def __init__(self) -> None:
+        self._missing: tuple[Path, ...] = ()
+
+    def on_run_start(self, config: DictConfig, **_: Any) -> None:
+        self._missing = missing(Path(str(config.hydra.run.dir)))
+
+    def on_multirun_start(self, config: DictConfig, **_: Any) -> None:
+        # Hydra itself writes into the sweep's folder, before any job.
+        if not str(config.hydra.sweep.dir).strip():
+            raise Refused(NO_NAME.format(key="hydra.sweep.dir"))
+        if (Path(str(config.hydra.sweep.dir)) / _SWEEP).exists() and not (config.overwrite or config.resume):
+            raise Refused(HELD.format(key="hydra.sweep.dir", folder=config.hydra.sweep.dir, content="a sweep"))
+        self._missing = missing(Path(str(config.hydra.sweep.dir)))
+
+    def on_job_start(self, config: DictConfig, **_: Any) -> None:
+        # A launcher may have brought this object to another process, and with it what was noted.
+        global _made
+        out = Path(str(config.hydra.runtime.output_dir))
+        above = {p for p in self._missing if p in (out, *out.parents)}
+        if above:
+            outermost = min(above, key=lambda p: len(p.parts))
+            above = {p for p in (out, *out.parents) if outermost in (p, *p.parents)}
+        _made = tuple(sorted(above, key=lambda p: -len(p.parts)))
+
+
+def missing(folder: Path) -> tuple[Path, ...]:
+    """The folder and those above it that do not exist."""
+    folder = Path(os.path.abspath(folder))
+    return tuple(p for p in (folder, *folder.parents) if not p.exists())
+
+
+def free_name(folder: Path) -> Path:
+    """The folder, or with a number behind it the first that does not exist: two runs may start in one second."""
+    if not held(folder) and not (folder / LOCK).exists():
+        return folder
+    number = 2
+    while (found := folder.with_name(f"{folder.name}_{number}")).exists():
+        number += 1
+    return found
+
+
+@contextmanager
+def claimed(folder: Path, settings: Mapping[str, str], overwrite: bool) -> Iterator[None]:
+    """The folder for this run alone, with ``settings`` (text by file name) in it. ``overwrite``: resumed runs, too.
+
+    Where the run fails before it wrote anything, its folder is left as it was found. Raises ConfigError where another
+    run writes there, or where something lies there and ``overwrite`` is not set.
+    """
+    made = [*missing(folder), *_made]
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = _locked(folder)
+    found: list[str] = []
+    before: dict[Path, bytes | None] = {}
+    try:
+        found = held(folder)
+        if found and not overwrite:
+            raise ConfigError(HELD.format(key="hydra.run.dir", folder=shown(folder), content=_listed(found)))
+        before = _placed(folder / SETTINGS, settings)
+        yield
+    except BaseException:
+        if set(held(folder)) <= ({*found, SETTINGS} if before else set(found)):
+            _restore(before)
+        raise
+    finally:
+        (folder / LOCK).unlink(missing_ok=True)
+        os.close(lock)
+        remove_made(made)
+
+
+def remove_made(folders: Sequence[Path] | None = None) -> None:
+    """Remove those folders that this run made and left empty, innermost first."""
+    for path in _made if folders is None else folders:
+        with suppress(OSError):
+            path.rmdir()
+
+
+def shown(folder: Path) -> str:
+    """As short as it is clear: relative where it lies below the working folder."""
+    relative = os.path.relpath(folder)
+    return str(folder) if relative.startswith("..") else relative
+
+
+def kept(folder: Path) -> str:
+    """What a run that was stopped leaves behind, in words."""
+    names = [n for n in held(folder) if n != SETTINGS]
+    return f"kept in {shown(folder)}: {_listed(names)}" if names else "nothing was recorded yet, so nothing is kept"
+
+
+def settings_of(composed: DictConfig, hydra: DictConfig) -> dict[str, str]:
+    """What was asked for, as files: the composed settings, Hydra's own, and the overrides of the command line."""
+    return {
+        "config.yaml": OmegaConf.to_yaml(composed),
+        "hydra.yaml": OmegaConf.to_yaml(OmegaConf.create({"hydra": hydra})),
+        "overrides.yaml": OmegaConf.to_yaml(hydra.overrides.task),
+    }
+
+
+def _locked(folder: Path) -> int:
+    """Handle of the folder's lock, which is ours."""
+    path = folder / LOCK
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            who = os.read(handle, 200).decode(errors="replace").strip()
+            os.close(handle)
+            raise ConfigError(
+                f"hydra.run.dir={shown(folder)}: another run writes there now ({who}); wait for it, or name another folder"
+            ) from None
+        # Its last owner may have removed it after we opened it: then it locks nothing.
+        if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):
+            os.ftruncate(handle, 0)
+            os.write(handle, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
+            return handle
+        os.close(handle)
+
+
+def held(folder: Path) -> list[str]:
+    """Names of what lies in a folder, without hidden files and what is empty."""
+    if not folder.is_dir():
+        return []
+    seen = [p for p in sorted(folder.iterdir()) if not p.name.startswith(".")]
+    return [p.name for p in seen if not (p.is_dir() and not any(p.iterdir()))]
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _placed(folder: Path, texts: Mapping[str, str]) -> dict[Path, bytes | None]:
+    """Write files, and say what was there before."""
+    folder.mkdir(exist_ok=True)
+    before: dict[Path, bytes | None] = {}
+    for name, text in texts.items():
+        path = folder / name
+        before[path] = path.read_bytes() if path.is_file() else None
+        write_whole(path, text)
+    return before
+
+
+def _restore(before: Mapping[Path, bytes | None]) -> None:
+    for path, content in before.items():
+        with suppress(OSError):
+            if content is None:
+                path.unlink()
+            else:
+                write_whole(path, content)
+    for parent in {p.parent for p in before}:
+        with suppress(OSError):
+            parent.rmdir()
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file whole or not at all: what was there before stays until all of it is on the disk."""
+    partial = path.with_name(path.name + ".part")
+    try:
+        with partial.open("wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except OSError:
+        partial.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,158 @@
+"""What was measured, as trials, and the model they are to be compared with."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
+from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, from_entries
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.effects.model_file import read_model
+from ee_dist.recording.reader import read_run
+from ee_dist.recording.records import HARDWARE, RunRecord
+from ee_dist.robots.describe import BUILT_IN
+from ee_dist.robots.model import Robot
+from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.log import LogError, SensorLog
+
+FEWEST_ROWS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Trials of a robot. ``model`` is what the robot is believed to have; ``source`` how a model file names the robot."""
+
+    robot: Robot
+    trials: tuple[MeasuredTrial, ...]
+    files: tuple[Path, ...]
+    model: Hypothesis
+    source: Any
+    folder: Path
+    unmodelled: Unmodelled | None = None
+    """What the model is known to leave on an untouched robot (from calibration)."""
+    gained: float = 0.0
+    """Energy that the most promising effect took off there."""
+    calibrated_by: str = ""
+    """The way of comparing that the calibration was made with; empty without one."""
+
+
+def load(config: Config) -> Measurements:
+    """The files of ``config.measured`` and the model of ``config.model``. Raises ConfigError, LogError, RecordingError."""
+    files = files_of(config.measured)
+    runs = [read_run(f) for f in files]
+    robot = runs[0].robot
+    trials: list[MeasuredTrial] = []
+    for file, run in zip(files, runs, strict=True):
+        _same_robot(file, run, robot)
+        found = [t for t in run.trials if t.source == HARDWARE]
+        if not found:
+            raise LogError(f"{file}: no hardware trial in it; expected a log of task=trial or task=import")
+        held = [setup_of(Excitation(**e)) for e in json.loads(run.metadata.get("trials", "[]"))]
+        for t in found:
+            # What an import says about a trial (a gain, a payload) comes on top of how it was held.
+            setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
+            trials.append(MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup))
+    if config.model is None:
+        source = robot.name if robot.name in BUILT_IN else robot
+        return Measurements(robot, tuple(trials), tuple(files), (), source, Path.cwd())
+    believed = read_model(config.model)
+    if believed.robot.motor_names != robot.motor_names:
+        raise ConfigError(f"model={config.model}: it is of {believed.robot.name}, the log of {robot.name}")
+    apply(robot, believed.terms)
+    left, gained, by = _calibration(Path(config.model), robot)
+    source, folder = believed.source, believed.folder
+    return Measurements(robot, tuple(trials), tuple(files), believed.terms, source, folder, left, gained, by)
+
+
+def files_of(measured: Any) -> list[Path]:
+    """The recordings that ``measured`` names: one, several, or all in a folder. Raises ConfigError."""
+    if not measured:
+        raise ConfigError("measured=: which log? name an .mcap, several as [a.mcap,b.mcap], or the folder of a trial")
+    found: list[Path] = []
+    for name in measured if isinstance(measured, (list, tuple)) else [measured]:
+        path = Path(str(name))
+        if path.is_dir():
+            inside = sorted(path.glob("*.mcap"))
+            if not inside:
+                raise ConfigError(f"measured={path}: no .mcap in this folder; other formats come in with task=import")
+            found += inside
+        elif not path.is_file():
+            near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.mcap")], n=2, cutoff=0.3)
+            hint = f"; did you mean {' or '.join(near)}?" if near else ""
+            raise ConfigError(f"measured={path}: no such file{hint}")
+        else:
+            found.append(path)
+    return found
+
+
+def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
+    """The log with its channels in the robot's order. Raises LogError in one line for what cannot be compared."""
+    if len(log) < FEWEST_ROWS:
+        raise LogError(f"{where}: {len(log)} rows; at least {FEWEST_ROWS} are needed")
+    _names(where, "joint", log.motor_names, robot.motor_names)
+    _names(where, "channel", log.sensor_names, robot.sensor_names)
+    order = [log.sensor_names.index(n) for n in robot.sensor_names]
+    for k, sensor in zip(order, robot.sensors, strict=True):
+        if log.sensor_units[k] != sensor.unit:
+            raise LogError(
+                f"{where}: {sensor.name} is in {log.sensor_units[k]!r}, the model has it in {sensor.unit!r}; convert it"
+            )
+        bad = ~np.isfinite(log.sensors[:, k])
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise LogError(
+                f"{where}: {sensor.name} is not a number in {int(bad.sum())} rows, first at {log.times_s[row]:g} s"
+            )
+    if np.isnan(log.commands).any(axis=1).all() or np.isinf(log.commands).any():
+        raise LogError(f"{where}: commands hold values that are not numbers")
+    step = np.diff(log.times_s)
+    if abs(float(np.median(step)) - robot.time_step_s) > 1e-6 or float(np.ptp(step)) > 1e-6:
+        raise LogError(
+            f"{where}: rows are {np.median(step):g} s apart, the model steps {robot.time_step_s:g} s; resample the log"
+        )
+    motors = [log.motor_names.index(n) for n in robot.motor_names]
+    return replace(
+        log,
+        sensors=np.array(log.sensors[:, order]),
+        sensor_names=robot.sensor_names,
+        sensor_units=tuple(s.unit for s in robot.sensors),
+        commands=np.array(log.commands[:, motors]),
+        motor_names=robot.motor_names,
+    )
+
+
+def _names(where: str, what: str, have: Sequence[str], want: Sequence[str]) -> None:
+    missing = [n for n in want if n not in have]
+    if missing:
+        near = difflib.get_close_matches(missing[0], have, n=2, cutoff=0.5)
+        hint = f"; is it {' or '.join(near)}?" if near else f"; the log has: {', '.join(have[:8])}"
+        raise LogError(f"{where}: no {what} {missing[0]!r}{hint}")
+
+
+def _same_robot(file: Path, run: RunRecord, robot: Robot) -> None:
+    if run.robot.motor_names != robot.motor_names or run.robot.sensor_names != robot.sensor_names:
+        raise LogError(f"{file}: a log of another robot ({run.robot.name}) than the first ({robot.name})")
+
+
+def _calibration(path: Path, robot: Robot) -> tuple[Unmodelled | None, float, str]:
+    """What task=improve task.calibrate=true wrote beside the model file. Raises ConfigError for another kind of file."""
+    beside = path.with_suffix(".calibration.yaml")
+    if not beside.is_file():
+        return None, 0.0, ""
+    try:
+        content = yaml.safe_load(beside.read_text(encoding="utf-8"))
+        left = from_entries(content["unmodelled"], robot.sensor_names)
+        return left, float(content["gained"]), str(content.get("way", "open_loop"))
+    except (KeyError, TypeError, ValueError, AttributeError, yaml.YAMLError):
+        raise ConfigError(
+            f"{beside}: not a calibration; write it with task=improve task.calibrate=true on an untouched robot"
+        ) from None

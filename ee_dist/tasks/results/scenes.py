@@ -1,0 +1,125 @@
+"""The rerun recordings of compare, explain and improve: from typed results to the plain data that the scenes draw."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ee_dist.discrepancy.compare import Comparison, compare
+from ee_dist.discrepancy.evidence.judge import Judged
+from ee_dist.discrepancy.explain import Explanation
+from ee_dist.discrepancy.improve import Improvement
+from ee_dist.discrepancy.problem import Problem, Series
+from ee_dist.discrepancy.words import Account, placed, told_all
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.tasks.results.tables import TIED_STANDING, standing
+from ee_dist.trials.log import SensorLog
+from ee_dist.viewing import finding as drawn
+from ee_dist.viewing.finding_scene import write_compare_rrd, write_explain_rrd, write_improve_rrd
+
+CANDIDATES = 4
+"""Candidates whose predictions can be looked at."""
+STANDINGS = {"best": drawn.BEST, TIED_STANDING: drawn.TIED, "earned": drawn.EARNED}
+
+
+def compare_scene(problem: Problem, found: Comparison, account: Account, model: Hypothesis, path: Path) -> None:
+    write_compare_rrd(_finding(problem, found, account, model, found.error), path)
+
+
+def explain_scene(problem: Problem, found: Explanation, account: Account, path: Path) -> None:
+    """With the predictions of the first candidates to switch between."""
+    shown = found.tied or found.candidates[:CANDIDATES]
+    candidates = tuple(_candidate(problem, found, c, c in shown[:CANDIDATES]) for c in found.candidates)
+    where = compare(problem, found.base)
+    finding = _finding(problem, where, account, found.before, found.baseline_error)
+    write_explain_rrd(replace(finding, candidates=candidates), path)
+
+
+def improve_scene(problem: Problem, found: Improvement, account: Account, model: Hypothesis, path: Path) -> None:
+    """Before, after, and the ladder between them."""
+    finding = _finding(problem, compare(problem, found.base), account, model, found.ladder[0].error_heldout)
+    ladder = tuple(drawn.Rung(placed(r.name), r.error_heldout, r.error_fit) for r in found.ladder)
+    better = said(problem, "improved model", found.terms)
+    write_improve_rrd(replace(finding, ladder=ladder, better=better), path)
+
+
+def said(problem: Problem, label: str, terms: Hypothesis) -> drawn.Account:
+    """What a model says of each trial: simulated where the way simulates, else the channels that it compares."""
+    motions = problem.simulated(terms)
+    series = problem.series(terms)
+    logs = []
+    for k, (trial, motion) in enumerate(zip(problem.measured, motions, strict=True)):
+        own = {problem.channels[s.channel]: s for s in series if s.trial == k}
+        if motion is None:
+            logs.append(_of_series(trial.log, own))
+            continue
+        sensors, names = np.array(motion.sensors), list(motion.sensor_names)
+        for name, s in own.items():
+            if name in names and len(s.predicted) == len(sensors):
+                sensors[:, names.index(name)] = s.predicted
+        logs.append(replace(motion, sensors=sensors))
+    simulated = all(m is not None for m in motions)
+    return drawn.Account(label, tuple(logs), apply(problem.robot, terms) if simulated else None)
+
+
+def _of_series(measured: SensorLog, own: dict[str, Series]) -> SensorLog:
+    """A log of the channels that were compared alone, measured at the instants at which they were."""
+    rows = list(own.values())
+    first = rows[0]
+    return replace(
+        measured,
+        times_s=first.times_s,
+        sensors=np.stack([s.predicted for s in rows], axis=1),
+        sensor_names=tuple(own),
+        sensor_units=tuple(s.unit for s in rows),
+        commands=np.zeros((len(first.times_s), len(measured.motor_names))),
+        joints=None,
+        torques=None,
+        base_pose=None,
+        supply_v=None,
+    )
+
+
+def _finding(problem: Problem, where: Comparison, account: Account, model: Hypothesis, error: float) -> drawn.Finding:
+    names = [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)]
+    of_trial = dict(zip(problem.trials, names, strict=False))
+    channels = tuple(
+        drawn.ChannelError(
+            c.name, c.unit, c.normalised, c.rmse, of_trial.get(c.worst_trial, ""), c.worst_from_s, c.worst_to_s
+        )
+        for c in where.channels
+    )
+    mine = said(problem, "model", model)
+    cases: list[drawn.Case] = []
+    for name, trial, log in zip(names, problem.measured, mine.logs, strict=True):
+        measured = trial.log
+        if set(log.sensor_names) - set(measured.sensor_names):
+            k = len(cases)
+            own = {
+                problem.channels[s.channel]: replace(s, predicted=s.measured)
+                for s in problem.series(model)
+                if s.trial == k
+            }
+            measured = _of_series(measured, dict(own))
+        cases.append(drawn.Case(name, measured))
+    return drawn.Finding(
+        f"{problem.robot.name}, {problem.way}".replace("_", " "),
+        account.headline,
+        problem.robot,
+        tuple(cases),
+        mine,
+        error,
+        where.noise_floor,
+        "standard deviations",
+        channels,
+    )
+
+
+def _candidate(problem: Problem, found: Explanation, c: Judged, shown: bool) -> drawn.Candidate:
+    above = c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0
+    label = told_all(c.terms, problem.robot)
+    kind = STANDINGS.get(standing(c, found.candidates[0]), drawn.REFUSED)
+    account = said(problem, label, (*found.fixed, *c.hypothesis)) if shown else None
+    return drawn.Candidate(label, c.explained, above * c.interval[0], above * c.interval[1], kind, account)

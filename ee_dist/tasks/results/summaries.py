@@ -1,0 +1,126 @@
+"""The parts of summary.json that compare, explain and improve document: the same keys whatever the way of comparing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ee_dist.discrepancy.compare import Comparison
+from ee_dist.discrepancy.evidence.judge import Judged
+from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.explain import Explanation
+from ee_dist.discrepancy.improve import Improvement, Rung
+from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import Account
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.tasks.summary import hypothesis_list
+
+
+def common(problem: Problem, account: Account, floor: float, source: str, model: Hypothesis) -> dict[str, Any]:
+    """What all three say."""
+    return {
+        "way": problem.way,
+        "error_definition": problem.error_definition,
+        "natural": {"name": problem.natural_name, "unit": problem.natural_unit},
+        "noise_floor": floor,
+        "noise_floor_natural": problem.natural(floor),
+        "noise_floor_source": source,
+        "model_terms": hypothesis_list(model),
+        "headline": account.headline,
+        "words": [account.headline, *account.lines],
+    }
+
+
+def of_comparison(problem: Problem, found: Comparison, account: Account, model: Hypothesis) -> dict[str, Any]:
+    return {
+        **common(problem, account, found.noise_floor, found.floor_source, model),
+        "error": found.error,
+        "error_natural": problem.natural(found.error),
+        "channels": [
+            {"name": c.name, "unit": c.unit, "rmse": c.rmse, "normalised": c.normalised, "worst_trial": c.worst_trial,
+             "worst_from_s": c.worst_from_s, "worst_to_s": c.worst_to_s} for c in found.channels
+        ],
+        "regimes": [{"name": r.name, "error": r.error, "share": r.share, "values": r.values} for r in found.regimes],
+        "trials": [
+            {"name": t, "error": e, "error_natural": problem.natural(e)}
+            for t, e in zip(problem.trials, found.trial_errors, strict=True)
+        ],
+        "parted_s": found.parted_s,
+    }  # fmt: skip
+
+
+def of_explanation(
+    problem: Problem, found: Explanation, account: Account, ahead: PlannedTrial | None
+) -> dict[str, Any]:
+    worth = ahead is not None and ahead.separation >= ENOUGH
+    return {
+        **common(problem, account, found.noise_floor, found.floor_source, found.before),
+        "verdict": found.verdict,
+        "baseline_error": found.baseline_error,
+        "baseline_error_natural": problem.natural(found.baseline_error),
+        "refitted_error": found.refitted_error,
+        "candidates": [of_judged(problem, c) for c in found.candidates],
+        "left": of_left(found.left),
+        "next_trial": {**ahead.excitation.as_dict(), "separation": ahead.separation} if ahead and worth else None,
+    }
+
+
+def of_judged(problem: Problem, c: Judged) -> dict[str, Any]:
+    """One candidate. A proposal of several terms is named by its first; ``terms`` has all of them."""
+    terms = hypothesis_list(c.terms)
+    return {
+        **terms[0],
+        "terms": terms,
+        "name": c.name,
+        "error_fit": c.error_fit,
+        "error_heldout": c.error_heldout,
+        "error_heldout_natural": problem.natural(c.error_heldout),
+        "held_out": c.held_out,
+        "gain_heldout": c.gain,
+        "explained": c.explained,
+        "interval": list(c.interval),
+        "rank": c.rank,
+        "tied_with": c.tied_with,
+        "earned": c.earned,
+        "why_not": c.why_not,
+    }
+
+
+def of_left(left: Sequence[Leftover]) -> list[dict[str, Any]]:
+    return [{"trial": g.trial, "channel": g.channel, "deviations": g.z, "slow": g.trend} for g in left]
+
+
+def of_rung(problem: Problem, r: Rung) -> dict[str, Any]:
+    added = hypothesis_list(r.added)
+    first = added[0] if added else {"effect": None, "target": None, "values": {}}
+    return {
+        **first,
+        "name": r.name,
+        "added": added,
+        "dropped": list(r.dropped),
+        "error_fit": r.error_fit,
+        "error_heldout": r.error_heldout,
+        "error_heldout_natural": problem.natural(r.error_heldout),
+        "held_out": r.held_out,
+        "interval": list(r.interval),
+        "tied_with": r.tied_with,
+    }
+
+
+def of_improvement(problem: Problem, found: Improvement, account: Account, path: str) -> dict[str, Any]:
+    terms = hypothesis_list(found.terms)
+    return {
+        **common(problem, account, found.noise_floor, found.floor_source, found.terms),
+        "verdict": found.verdict,
+        "explained": found.explained,
+        "ladder": [of_rung(problem, r) for r in found.ladder],
+        "model": path,
+        "parameters": [
+            {**terms[p.term], "name": p.name, "value": p.value, "interval": [p.low, p.high], "flag": p.flag}
+            for p in found.parameters
+        ],
+        "stopped": found.stopped,
+        "not_earned": [of_judged(problem, c) for c in (found.last.judged if found.last else []) if not c.earned],
+        "left": of_left(found.left),
+    }

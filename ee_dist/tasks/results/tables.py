@@ -1,0 +1,109 @@
+"""Tables of the terminal, rendered from the typed results; each fits 80 columns."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from ee_dist.discrepancy.compare import Comparison
+from ee_dist.discrepancy.evidence.judge import Judged
+from ee_dist.discrepancy.explain import Explanation
+from ee_dist.discrepancy.improve import Improvement
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import Account, named, plain, told_all
+
+TIED_STANDING = "tied with the best"
+Column = tuple[str, bool]
+"""Heading, and whether it holds numbers."""
+
+
+def _table(title: str, columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for name, numeric in columns:
+        table.add_column(name, justify="right" if numeric else "left", no_wrap=numeric, overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def show_comparison(console: Console, problem: Problem, found: Comparison) -> None:
+    rows = [
+        (plain(c.name), f"{c.rmse:.3g} {c.unit}", f"{c.normalised:.2f}",
+         f"{c.worst_trial}, {c.worst_from_s:.1f} to {c.worst_to_s:.1f} s") for c in found.channels[:8]
+    ]  # fmt: skip
+    columns = (("channel", False), ("rmse", True), ("error", True), ("worst", False))
+    console.print(_table("Where it fails: channels", columns, rows))
+    ordered = sorted(found.regimes, key=lambda r: -r.error)
+    rows2 = [(r.name, f"{r.error:.2f}", f"{r.share:.0%}", f"{r.values:.0%}") for r in ordered]
+    columns = (("regime", False), ("error", True), ("share of excess", True), ("of data", True))
+    console.print(_table("Where it fails: regimes", columns, rows2))
+
+
+def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged], title: str) -> None:
+    if not judged:
+        return
+    best = judged[0]
+    rows = [
+        (str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), f"{c.gain:.0%}",
+         standing(c, best)) for c in judged
+    ]  # fmt: skip
+    columns = (("", True), ("effect", False), ("held out", True), ("gain", True), ("", False))
+    console.print(_table(title, columns, rows))
+
+
+def standing(c: Judged, best: Judged) -> str:
+    """How a candidate came out."""
+    if not c.earned:
+        return c.why_not
+    if c is best:
+        return "best"
+    return TIED_STANDING if c.name in best.tied_with else "earned"
+
+
+def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
+    rows = [
+        (told_all(r.added, problem.robot) or r.name, problem.told(r.error_fit), problem.told(r.error_heldout))
+        for r in found.ladder
+    ]
+    table = _table(f"The ladder: {problem.natural_name}", (("step", False), ("fitted", True), ("held out", True)), rows)
+    table.add_section()
+    table.add_row("noise floor", "", problem.told(found.noise_floor))
+    console.print(table)
+    for p in found.parameters:
+        console.print(
+            f"  {named(found.terms[p.term])}: {p.name} = {p.value:.4g}, 95 % [{p.low:.4g}, {p.high:.4g}] {p.flag}",
+            highlight=False,
+            markup=False,
+        )
+
+
+def show_account(console: Console, account: Account, out: Path, following: Sequence[str] = ()) -> None:
+    """What speaks for it, the files, and last the finding in one sentence with the command to type next."""
+    for line in account.lines:
+        console.print(line, highlight=False, markup=False)
+    for file in sorted(p.name for p in out.iterdir() if p.is_file() and not p.name.startswith(".")):
+        console.print(f"  {os.path.relpath(out / file)}", highlight=False, markup=False, soft_wrap=True)
+    console.print(account.headline, highlight=False, markup=False, style="bold")
+    if following:
+        console.print(f"Next: {command(following)}", highlight=False, markup=False, soft_wrap=True)
+
+
+def command(words: Sequence[str]) -> str:
+    """A command line of ours that a shell takes as it is, whatever is in its paths."""
+    return shlex.join(["python", "-m", "ee_dist", *words])
+
+
+def setting(key: str, value: str | os.PathLike[str]) -> str:
+    """``key=value`` as Hydra reads it, quoted where it must be."""
+    text = os.path.relpath(value) if os.path.exists(value) else str(value)
+    safe = all(ch.isalnum() or ch in "/._-@:" for ch in text)
+    return f"{key}={text}" if safe else f"{key}='{text}'"
+
+
+def show_explanation(console: Console, problem: Problem, found: Explanation) -> None:
+    show_candidates(console, problem, found.candidates, "Candidate effects, judged on data not fitted")

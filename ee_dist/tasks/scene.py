@@ -1,0 +1,24 @@
+"""The rerun scene of a run: drawn last, because it can be drawn again and what it shows cannot be measured again."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ee_dist.recording.reader import read_run
+from ee_dist.tasks.config import ConfigError
+
+
+def drawn(log: Path) -> Path:
+    """Draw a whole recording into the ``.rrd`` beside it. Raises ConfigError that says what is whole all the same."""
+    from ee_dist.viewing.rerun_scene import write_rrd  # slow to load, and needed only now
+
+    scene = log.with_suffix(".rrd")
+    try:
+        write_rrd(read_run(log), scene)
+    except OSError as error:
+        raise ConfigError(
+            f"{os.path.relpath(scene)}: cannot be drawn ({error.strerror or error}); recording and summary are whole: "
+            f"draw it later with: python -m ee_dist task=view log={os.path.relpath(log)}"
+        ) from error
+    return scene

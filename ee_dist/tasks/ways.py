@@ -1,0 +1,83 @@
+"""The ways of comparing by name, and the problem that measurements make under one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.engines.one_joint import fits
+from ee_dist.tasks.config import Config, ConfigError, one_of
+from ee_dist.tasks.measurements import Measurements
+from ee_dist.tasks.wiring import ONE_JOINT, evaluator_of
+
+AUTO = "auto"
+
+
+@dataclass(frozen=True)
+class Way:
+    """``make`` builds the problem; ``why`` is what speaks for it; ``moves``: whether it can follow a body that moves about."""
+
+    name: str
+    why: str
+    make: Callable[[Measurements, Config], Problem]
+    moves: bool = False
+
+
+def open_loop(measured: Measurements, config: Config) -> OpenLoop:
+    return OpenLoop(
+        measured.trials,
+        measured.robot,
+        evaluator_of(config),
+        unmodelled=measured.unmodelled,
+        gained=measured.gained,
+        before=measured.model,
+    )
+
+
+def _free_run(measured: Measurements, config: Config) -> Problem:
+    robot = measured.robot
+    return FreeRun(measured.trials, robot, evaluator_of(config, ONE_JOINT if fits(robot) else ""))
+
+
+def _force_balance(measured: Measurements, config: Config) -> Problem:
+    return ForceBalance(measured.trials, measured.robot)
+
+
+WAYS: dict[str, Way] = {
+    w.name: w
+    for w in (
+        Way("open_loop", "commands were recorded: every channel is compared on them", open_loop, moves=True),
+        Way("free_run", "joint positions were recorded: whole records are run freely", _free_run),
+        Way("force_balance", "torques were recorded, but no commands to simulate from", _force_balance),
+    )
+}
+"""All ways by name. To add one is to write a ``Problem`` and put it here."""
+
+
+def way_of(measured: Measurements, by: str) -> Way:
+    """The way asked for; for ``auto`` the first that the channels allow. Raises ConfigError for one that cannot be."""
+    one_of("task.by", by, (AUTO, *WAYS))
+    if by == AUTO:
+        driven = all(np.isfinite(t.log.commands).all(axis=1).any() for t in measured.trials)
+        torques = all(t.log.torques is not None and t.log.joints is not None for t in measured.trials)
+        by = "open_loop" if driven or not torques else "force_balance"
+    way = WAYS[by]
+    if measured.robot.free_base and not way.moves:
+        raise ConfigError(f"task.by={by}: {measured.robot.name} moves about; use task.by=open_loop")
+    if measured.calibrated_by and measured.calibrated_by != by:
+        raise ConfigError(
+            f"task.by={by}: the model was calibrated with task.by={measured.calibrated_by}; compare it that way, or name a model "
+            "without a calibration beside it"
+        )
+    return way
+
+
+def problem_of(measured: Measurements, config: Config, by: str) -> Problem:
+    """Raises MeasurementError where the logs lack what the way needs, ConfigError for a way that cannot be."""
+    return way_of(measured, by).make(measured, config)

@@ -1,0 +1,91 @@
+"""A finding in words and tables: the first thing to read in a scene. Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ee_dist.viewing.finding import BEST, TIED, Candidate, Finding
+
+BAR = 8
+"""Characters of the longest bar."""
+
+
+def bar(value: float, largest: float, width: int = BAR) -> str:
+    """A bar of squares that fits a table; empty for nothing, one square for very little."""
+    if not largest > 0 or not value > 0:
+        return ""
+    return "■" * max(round(width * min(value / largest, 1.0)), 1)
+
+
+def plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def headline(found: Finding) -> list[str]:
+    """Verdict, error and floor, and what to do next."""
+    floor = "" if found.floor is None else f"; noise alone would leave {found.floor:.3g}"
+    return [
+        f"### {found.title}",
+        "",
+        f"**{found.verdict}**",
+        "",
+        f"Error {found.error:.3g} {found.error_unit}{floor}.",
+        "",
+    ]
+
+
+def ending(found: Finding) -> list[str]:
+    return ["", f"Next: `{found.next_command}`"] if found.next_command else []
+
+
+def colours(found: Finding) -> list[str]:
+    """Which colour is what."""
+    said = ["**Blue**: measured.", f"**Orange**: {found.model.label}."]
+    if found.better is not None and not found.candidates:
+        said.append(f"**Violet**: {found.better.label}.")
+    elif any(c.account is not None for c in found.candidates):
+        said.append("**Violet**: the candidate of the tab.")
+    return [" ".join(said), ""]
+
+
+def channel_table(found: Finding) -> list[str]:
+    """Channels by error, worst first, with bars."""
+    ranked = found.worst_first
+    if not ranked:
+        return []
+    if not any(c.error for c in ranked):
+        return [f"All {len(ranked)} channels agree exactly: every error is 0."]
+    largest = max(c.error for c in ranked)
+    lines = ["| channel | error | | RMS | worst |", "|---|---|---|---|---|"]
+    for c in ranked:
+        unit = "" if c.unit in ("", "1") else f" {c.unit}"
+        where = f"{plain(c.worst_case)}, {c.worst_from_s:.2f} to {c.worst_to_s:.2f} s" if c.worst_case else ""
+        lines.append(f"| {plain(c.name)} | {c.error:.3g} | {bar(c.error, largest)} | {c.rmse:.3g}{unit} | {where} |")
+    return lines
+
+
+def candidate_table(candidates: Sequence[Candidate]) -> list[str]:
+    """Candidates in their order, with bars of what they gain; those that were chosen stand out."""
+    if not candidates:
+        return ["No candidate was judged."]
+    largest = max(c.gain for c in candidates)
+    lines = ["| # | missing effect | gain | | 95 % interval | |", "|---|---|---|---|---|---|"]
+    for k, c in enumerate(candidates):
+        name = f"**{c.label}**" if c.kind in (BEST, TIED) else c.label
+        told = f"{100 * c.low:.1f} to {100 * c.high:.1f} %"
+        lines.append(f"| {k + 1} | {name} | {100 * c.gain:.1f} % | {bar(c.gain, largest)} | {told} | {c.kind} |")
+    return lines
+
+
+def ladder_table(found: Finding) -> list[str]:
+    """The models from the first to the last with their held-out errors, and the floor below them."""
+    if not found.ladder:
+        return []
+    largest = max(r.error_heldout for r in found.ladder)
+    lines = ["| # | model | error held out | | in the fit |", "|---|---|---|---|---|"]
+    for k, rung in enumerate(found.ladder):
+        fit = "" if rung.error_fit is None else f"{rung.error_fit:.3g}"
+        lines.append(f"| {k} | {rung.label} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} |")
+    if found.floor is not None:
+        lines.append(f"| | *noise alone* | {found.floor:.3g} | {bar(found.floor, largest)} | |")
+    return lines

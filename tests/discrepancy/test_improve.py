@@ -1,0 +1,120 @@
+"""The ladder on residuals whose answer is known: what it adds, what it drops, what it calls tied, and where it stops."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear_problem import ROBOT, Linear
+
+from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
+from ee_dist.discrepancy.evidence.judge import TOO_LITTLE
+from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED
+from ee_dist.discrepancy.improve import BETTER, EXPLAINED, NOTHING_LEFT, improve
+from ee_dist.discrepancy.search.candidates import parse
+from ee_dist.effects.catalogue import Hypothesis, Term, term
+from ee_dist.trials.log import Array
+
+WEAK, JAM, GAIN = "motor_weak@knee_front_left", "joint_jam@hip_rear_left", "command_gain@hip_front_left"
+POOL = [parse(ROBOT, name) for name in (WEAK, JAM, GAIN)]
+HIDDEN = (term("motor_weak", "knee_front_left", loss=0.4), term("joint_jam", "hip_rear_left", loss=0.3))
+
+
+class Twins(Linear):
+    """``command_gain`` does nearly what ``motor_weak`` does."""
+
+    unlike = 0.01
+
+    def shift(self, hypothesis: Hypothesis) -> Array:
+        total = super().shift(tuple(t for t in hypothesis if t.effect != "command_gain"))
+        for t in hypothesis:
+            if t.effect == "command_gain":
+                size = t.values[0][1]
+                own = super().shift((Term(t.effect, t.target, (("change", 1.0),)),))
+                like = super().shift((term("motor_weak", "knee_front_left", loss=1.0),))
+                total = total + size * (like + self.unlike * own)
+        return total
+
+
+def test_what_is_there_is_added_and_nothing_else() -> None:
+    found = improve(Linear(HIDDEN), POOL)
+    assert [r.name for r in found.ladder[1:]] == [WEAK, JAM]
+    held = [r.error_heldout for r in found.ladder]
+    assert held[0] > held[1] > held[2]
+    assert held[2] == pytest.approx(1.0, abs=0.1)
+    assert not any(r.tied_with or r.dropped for r in found.ladder)
+    assert found.stopped == NOTHING_LEFT and found.verdict == EXPLAINED
+    assert found.explained == pytest.approx(1.0, abs=0.05)
+    assert found.last is not None and all(j.why_not for j in found.last.judged)
+
+
+def test_a_twin_is_called_tied() -> None:
+    first = improve(Twins(HIDDEN[:1]), POOL).ladder[1]
+    assert {first.name, *first.tied_with} == {WEAK, GAIN}
+
+
+def test_an_effect_that_is_worse_beyond_doubt_is_not_tied() -> None:
+    problem = Twins(HIDDEN[:1])
+    problem.unlike = 1.0
+    problem.data = np.random.default_rng(0).standard_normal(len(problem.data)) + problem.shift(HIDDEN[:1])
+    first = improve(problem, POOL).ladder[1]
+    assert first.name == WEAK and not first.tied_with
+
+
+def test_a_step_that_a_later_one_makes_useless_is_dropped() -> None:
+    # A gain that stands in for a weak motor at a knee and for a jam at a hip, but for a little.
+    class StandIn(Linear):
+        def shift(self, hypothesis: Hypothesis) -> Array:
+            total = super().shift(tuple(t for t in hypothesis if t.effect != "command_gain"))
+            for t in hypothesis:
+                if t.effect == "command_gain":
+                    own = super().shift((Term(t.effect, t.target, (("change", 0.3),)),))
+                    total = total + t.values[0][1] / 0.3 * (super().shift(HIDDEN) + own)
+            return total
+
+    found = improve(StandIn(HIDDEN), POOL)
+    assert found.ladder[1].name == GAIN, "it explains most at once"
+    assert {t.name for t in found.terms} == {WEAK, JAM}
+    assert [d for r in found.ladder for d in r.dropped] == [GAIN]
+    assert found.ladder[-1].error_heldout == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_robot_with_nothing_wrong_is_left_as_it_is() -> None:
+    found = improve(Linear(()), POOL)
+    assert found.verdict == NOTHING_MISSING and found.terms == () and len(found.ladder) == 1
+
+
+def test_what_no_effect_explains_is_unexplained_and_half_of_it_better() -> None:
+    alone = improve(Linear((), extra=1.0), POOL)
+    assert alone.verdict == UNEXPLAINED and alone.left and alone.terms == ()
+    beside = improve(Linear(HIDDEN, extra=1.0), POOL)
+    assert beside.verdict == BETTER and beside.left
+    assert {t.name for t in beside.terms} == {WEAK, JAM}
+
+
+def test_where_more_than_noise_is_left_other_motions_are_held_out() -> None:
+    calm = improve(Linear(HIDDEN, motions=4), POOL)
+    assert calm.ladder[-1].held_out == WINDOWS
+    messy = improve(Linear(HIDDEN, extra=2.0, motions=4), POOL)
+    assert messy.ladder[1].held_out == MOTIONS
+
+
+def test_an_effect_that_takes_little_of_a_large_misfit_is_not_worth_a_term() -> None:
+    small = (term("motor_weak", "knee_front_left", loss=0.15),)
+    asked = improve(Linear(small, motions=4), POOL)
+    assert [t.name for t in asked.terms] == [WEAK], "where nothing else is wrong it is found"
+    found = improve(Linear(small, extra=4.0, motions=4), POOL)
+    assert found.terms == () and found.verdict == UNEXPLAINED
+    assert found.last is not None
+    assert next(j for j in found.last.judged if j.name == WEAK).why_not == TOO_LITTLE
+
+
+def test_what_was_fitted_to_one_motion_only_does_not_travel() -> None:
+    # A pattern that an effect has in the first motion, and its opposite in the others.
+    class Fickle(Linear):
+        def shift(self, hypothesis: Hypothesis) -> Array:
+            return super().shift(hypothesis) * np.where(self.trial_of % 2, -1.0, 1.0)
+
+    problem = Fickle((), extra=2.0, motions=4)
+    problem.data = problem.data + Linear.shift(problem, HIDDEN[:1])
+    found = improve(problem, POOL)
+    assert WEAK not in {t.name for t in found.terms}

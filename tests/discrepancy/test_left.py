@@ -1,0 +1,62 @@
+"""Noise is not taken for something left, and what is left is found where it sits."""
+
+from __future__ import annotations
+
+import numpy as np
+from linear_problem import Linear
+
+from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.problem import Layout
+
+TRIALS, CHANNELS, PER = 6, 20, 15
+
+
+def problem(known: float = 0.0) -> Linear:
+    """Trials of 2 to 7 windows: in short ones a sum of squares is far from normal."""
+    trial_of_segment = np.repeat(np.arange(TRIALS), np.arange(TRIALS) + 2)
+    segments = len(trial_of_segment)
+    size = segments * CHANNELS * PER
+    layout = Layout(
+        segments=tuple(f"window {k}" for k in range(segments)),
+        trial_of_segment=trial_of_segment,
+        segment_of=np.repeat(np.arange(segments), CHANNELS * PER),
+        channel_of=np.tile(np.repeat(np.arange(CHANNELS), PER), segments),
+        time_s=np.zeros(size),
+        reading=np.ones(size, dtype=bool),
+        floor=np.full(size, 1.0 + known),
+        known=np.full(size, known),
+        channels=tuple(f"channel {c}" for c in range(CHANNELS)),
+        units=("1",) * CHANNELS,
+        joint_of_channel=(None,) * CHANNELS,
+    )
+    found = Linear(())
+    found.layout = layout
+    found.measured = tuple(MeasuredTrial(f"trial {k}", found.measured[0].log) for k in range(TRIALS))
+    return found
+
+
+def test_noise_alone_raises_no_alarm_in_two_hundred_robots() -> None:
+    p, rng = problem(), np.random.default_rng(0)
+    alarms = sum(bool(leftovers(p, rng.standard_normal(len(p.floor)))) for _ in range(200))
+    assert alarms == 0
+
+
+def test_a_small_steady_offset_and_a_burst_are_found_where_they_are() -> None:
+    p = problem()
+    residual = np.random.default_rng(1).standard_normal(len(p.floor))
+    trial = p.trial_of_segment[p.segment_of]
+    residual[(trial == 5) & (p.channel_of == 3)] += 0.8
+    residual[(trial == 2) & (p.channel_of == 7)] *= 2.5
+    found = {(x.trial, x.channel): x.trend for x in leftovers(p, residual)}
+    assert found == {("trial 5", "channel 3"): True, ("trial 2", "channel 7"): False}
+
+
+def test_what_calibration_left_is_no_news_but_much_more_of_it_is() -> None:
+    p = problem(known=0.5)
+    rng = np.random.default_rng(2)
+    cell = p.segment_of * CHANNELS + p.channel_of
+    steady = rng.standard_normal(cell.max() + 1)[cell]
+    noise = rng.standard_normal(len(p.floor))
+    assert not leftovers(p, noise + np.sqrt(0.5) * steady)
+    assert leftovers(p, noise + 4.0 * steady)

@@ -1,0 +1,138 @@
+"""What each way finds on robots that are measured here: the same name by every way, parameters, ripples, closed loops."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_problem import ROBOT, Linear
+from way_samples import measure, measured, problem, problem_by, samples
+
+from ee_dist.discrepancy.examine import Effort
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.candidates import candidate, candidates
+from ee_dist.discrepancy.search.cloud import effort_of, follow_cloud
+from ee_dist.discrepancy.search.fit import fit_one
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.discrepancy.ways.force_balance.ripple import describe, remains
+from ee_dist.discrepancy.ways.free_run.closed_loop import closed_loop
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.effects.catalogue import apply, term
+from ee_dist.engines.one_joint import OneJointEngine
+from ee_dist.measurements.errors import MeasurementError
+
+SUSPECTS = ("coulomb_friction", "viscous_friction", "parallel_spring", "offset_torque")
+QUICK = Effort(first=4, second=2, final=2, starts=1)
+SEEN = [("pendulum", "open_loop"), ("pendulum", "free_run"), ("pendulum", "force_balance"),
+        ("arm", "open_loop"), ("arm", "free_run"), ("arm", "force_balance"),
+        ("stage", "force_balance")]  # fmt: skip
+"""The stage's controller hides friction from whoever looks at positions only."""
+
+
+@pytest.mark.parametrize(("name", "way"), SEEN, ids=[f"{n}-{w}" for n, w in SEEN])
+def test_the_same_hidden_effect_has_the_same_name_whatever_the_way(name: str, way: str) -> None:
+    p, (hidden,) = problem(name, way), samples()[name].hidden
+    if isinstance(p, FreeRun):
+        p.effort = 0.4
+    pool = candidates(p.robot, only=SUSPECTS, families=p.families)
+    found = explain(p, pool, effort=QUICK)
+    assert found.verdict == EFFECT and found.best is not None
+    assert found.best.name == hidden.name
+    assert found.best.terms[0].values[0][1] == pytest.approx(hidden.values[0][1], rel=0.12)
+    if way != "force_balance":
+        assert not found.left, "a filter loses what happens at a reversal; nothing else is left"
+
+
+@pytest.mark.parametrize("way", ["open_loop", "free_run"])
+def test_an_untouched_pendulum_misses_nothing(way: str) -> None:
+    sample = samples()["pendulum"]
+    p = problem_by(way, measure(sample, (), seed=3), sample.robot)
+    p.effort = 0.4
+    found = explain(p, candidates(p.robot, only=SUSPECTS), effort=QUICK)
+    assert found.verdict == NOTHING_MISSING and found.best is None
+
+
+def test_a_balance_of_forces_gives_mass_and_friction_of_a_stage() -> None:
+    sample = samples()["stage"]
+    heavy = (term("part_mass", "carriage", factor=1.15), term("viscous_friction", "carriage", damping_nm_s_rad=150.0))
+    p = problem_by("force_balance", measure(sample, heavy), sample.robot)
+    model = Model((candidate(p.robot, "part_mass", "carriage"), candidate(p.robot, "viscous_friction", "carriage")))
+    fit = fit_one(Search(p), model, [0.05 * model.upper])
+    mass, damping = (t.values[0][1] for t in fit.hypothesis)
+    assert mass == pytest.approx(1.15, rel=0.01)
+    assert damping == pytest.approx(150.0, rel=0.03)
+    assert error(fit.residual) < 0.2 * error(p.residuals([()])[0])
+
+
+def test_a_ripple_over_position_is_told_with_its_wavelength() -> None:
+    t = np.linspace(0, 20, 8000)
+    x = 0.1 * np.sin(1.3 * t)
+    v, a = np.gradient(x, t), np.gradient(np.gradient(x, t), t)
+    noise = 0.05 * np.random.default_rng(0).standard_normal(len(t))
+    found = remains("carriage", np.sin(2 * np.pi * x / 0.02) + noise, x, v, a)
+    assert sum(r.time_share for r in found.regimes) == pytest.approx(1.0)
+    assert sum(r.energy_share for r in found.regimes) == pytest.approx(1.0)
+    assert {r.direction for r in found.ripples} == {"up", "down"}
+    for ripple in found.ripples:
+        assert ripple.wavelength == pytest.approx(0.02, rel=0.02)
+        assert ripple.share > 0.9 and ripple.repeats > 0.9 and ripple.passes >= 3
+    lines = describe(found, "N", "m")
+    assert "a ripple of 0.019" in lines[-1]
+    # What does not repeat with position is not called a ripple, and what changes with direction is told by regime.
+    other = remains("carriage", np.sign(v) + noise, x, v, a)
+    means = {r.name: r.mean for r in other.regimes}
+    assert means["cruising up"] > 0.9 and means["cruising down"] < -0.9
+    assert all(r.share < 0.2 for r in other.ripples)
+
+
+def test_what_a_way_alone_can_say_is_said_in_words() -> None:
+    balance, free = problem("stage", "force_balance"), problem("pendulum", "free_run")
+    assert any("near a reversal" in line for line in balance.remarks(()))
+    assert isinstance(balance, ForceBalance) and isinstance(free, FreeRun)
+    regimes = {r.name: r for r in balance.remains(()).regimes}
+    assert regimes["cruising up"].mean > 15 and regimes["cruising down"].mean < -15, "20 N of friction"
+    (line,) = free.remarks(())
+    assert line.startswith("Re-started from the measured state every 0.5 s: ")
+    off = free.mean_absolute(())
+    assert off.shape == (2,) and (off > free.mean_absolute(samples()["pendulum"].hidden)).all()
+    again = FreeRun(measured("pendulum"), free.robot, free.evaluator, windows_s=0.5)
+    assert len(again.segments) == 2 * 6 and again.natural(error(again.residuals([()])[0])) < 0.9 * off.mean()
+
+
+def test_in_a_closed_loop_forces_tell_what_positions_hide() -> None:
+    sample, (trial, _) = samples()["stage"], measured("stage")
+    truth = apply(sample.robot, sample.hidden)
+    right, wrong = closed_loop([truth, sample.robot], trial, OneJointEngine())
+    assert right.position < 0.001 and right.force < 0.05
+    assert wrong.force > 3 * right.force and wrong.position < 0.01
+    with pytest.raises(MeasurementError, match="joint positions and torques are needed"):
+        closed_loop([truth], replace(trial, log=replace(trial.log, torques=None)), OneJointEngine())
+
+
+def test_a_cloud_finds_what_slopes_find_and_the_same_every_time() -> None:
+    hidden = (term("motor_weak", "knee_front_left", loss=0.4),)
+    p = Linear(hidden)
+    p.rugged, p.effort = True, 0.5
+    search, model = Search(p), Model((candidate(ROBOT, "motor_weak", "knee_front_left"),))
+    mask = p.segment_of % 2 == 0
+    first, again = (follow_cloud(search, [(model, np.array([0.05]))], mask, 20, (1, 2))[0] for _ in range(2))
+    assert first.u.tolist() == again.u.tolist()
+    assert first.hypothesis[0].values[0][1] == pytest.approx(0.4, abs=0.05)
+    assert first.energy == pytest.approx(float(np.sum(first.residual[mask] ** 2)))
+    assert first.slopes.shape == (int(mask.sum()), 1) and np.abs(first.slopes).max() > 0
+    nothing = follow_cloud(search, [(Model(()), np.zeros(0))], mask, 5)[0]
+    assert nothing.energy > first.energy and nothing.slopes.shape[1] == 0
+    found = improve(p, [candidate(ROBOT, "motor_weak", j) for j in ("knee_front_left", "hip_rear_left")], effort=QUICK)
+    assert [t.name for t in found.terms] == ["motor_weak@knee_front_left"]
+
+
+def test_a_longer_search_has_more_generations_and_seeds() -> None:
+    assert effort_of(4) == (40, (1, 2, 3))
+    assert effort_of(4, 0.1) == (4, (1,))
+    assert effort_of(2) == (20, (1,))
+    assert effort_of(1, 0.01)[0] == 1

@@ -1,0 +1,140 @@
+"""A run that is told to leave, or is killed: one line, the status of the signal, nothing left over."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from ee_dist.evaluation.ray_session import MARK
+from ee_dist.recording.reader import read_run
+
+LONG = (
+    "+scenario=8", "engine=mujoco", "budget=quick", "budget.population=60", "budget.generations=4", "hydra.run.dir=out",
+)  # fmt: skip
+
+
+def started(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "ee_dist", *LONG, *arguments],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "LEAVING": str(folder)},
+    )  # fmt: skip
+
+
+def until(process: subprocess.Popen[str], words: str) -> None:
+    assert process.stdout is not None
+    while words not in (line := process.stdout.readline()):
+        assert line, "the run ended before it got there"
+
+
+def relatives(folder: Path) -> dict[int, str]:
+    """Processes that were started below a run, and are still there: by its environment or its open files."""
+    found = {}
+    for process in Path("/proc").iterdir():
+        if process.name.isdigit() and int(process.name) != os.getpid():
+            with contextlib.suppress(OSError):
+                if f"LEAVING={folder}".encode() in (process / "environ").read_bytes():
+                    found[int(process.name)] = (process / "comm").read_text().strip()
+    return found
+
+
+@pytest.mark.parametrize(("number", "why"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "asked to end")])
+def test_one_line_the_status_of_the_signal_and_what_was_recorded(tmp_path, number, why):
+    with started(tmp_path, "evaluator=serial") as process:
+        until(process, "hardware, after the change")
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    (line,) = err.strip().splitlines()
+    assert line.startswith(f"ee_dist: stopped ({why}); kept in out: recovery.mcap.part")
+    run = read_run(tmp_path / "out" / "recovery.mcap.part")
+    assert not run.complete
+    assert [t.name for t in run.trials if t.source == "hardware"] == ["intact", "after the change"]
+
+
+def test_while_it_loads_nothing_was_begun(tmp_path):
+    with started(tmp_path) as process:
+        time.sleep(0.3)  # Python itself has started by then, and hydra has not been loaded
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode in (130, -signal.SIGINT)
+    assert process.returncode < 0 or "nothing was begun" in err
+    assert not (tmp_path / "out").exists()
+
+
+GUARDED = """
+import subprocess, sys, time
+from ee_dist.evaluation import ray_session
+guard = ray_session._Guard()
+subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], env=guard.environment)
+open(guard.folder + "/session.log", "w").close()
+print(guard.mark, guard.folder, flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
+def test_a_killed_run_leaves_no_process_and_no_folder_of_ray(tmp_path):
+    with subprocess.Popen([sys.executable, "-c", GUARDED], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        mark, folder = process.stdout.readline().split()
+        assert Path(folder).is_dir()
+        assert len(marked(mark)) == 1
+        process.kill()
+    waited = 0
+    while (marked(mark) or Path(folder).exists()) and waited < 200:
+        time.sleep(0.05)
+        waited += 1
+    assert not marked(mark)
+    assert not Path(folder).exists()
+
+
+def marked(mark: str) -> list[str]:
+    assert mark.startswith(MARK)
+    found = []
+    for process in Path("/proc").iterdir():
+        with contextlib.suppress(OSError):
+            if process.name.isdigit() and mark.encode() in (process / "environ").read_bytes():
+                found.append(process.name)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("moment", ["start", "search"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_no_process_of_ray_outlives_its_run(tmp_path, moment, number):
+    with started(tmp_path, "evaluator=ray") as process:
+        if moment == "search":
+            until(process, "hardware, intact")
+        else:
+            while "gcs_server" not in relatives(tmp_path).values():
+                time.sleep(0.05)
+        assert len(relatives(tmp_path)) > 2
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == (-number if number == signal.SIGKILL else 128 + number)
+    assert len(err.strip().splitlines()) == (0 if number == signal.SIGKILL else 1), err
+    time.sleep(2.0)
+    assert not relatives(tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("victim", ["raylet", "gcs_server", "ray::Dashboard"])
+def test_a_lost_ray_is_one_line(tmp_path, victim):
+    with started(tmp_path, "evaluator=ray") as process:
+        until(process, "hardware, intact")
+        (pid,) = [pid for pid, name in relatives(tmp_path).items() if name.startswith(victim)]
+        os.kill(pid, signal.SIGKILL)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    (line,) = err.strip().splitlines()
+    assert line.startswith("ee_dist: Ray is lost: its process ")
+    assert "kept in out: recovery.mcap.part" in line
+    time.sleep(2.0)
+    assert not relatives(tmp_path)
