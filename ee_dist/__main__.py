@@ -64,8 +64,8 @@ def run(composed: DictConfig) -> None:
         leaving.leave(f"{error}; {_what_is_kept(out)}", MISTAKE)
     except USER_ERRORS as error:
         remove_made()
-        how = "" if isinstance(error, ConfigError) else _how_to_go_on(out)
-        sys.exit(_complain(f"{error}{how}"))
+        onward = "" if isinstance(error, ConfigError) else _how_to_go_on(out)
+        sys.exit(_complain(f"{error}{onward}"))
     except OmegaConfBaseException as error:
         remove_made()
         sys.exit(_complain(plain(error)))

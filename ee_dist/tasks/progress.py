@@ -10,7 +10,15 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ee_dist.recording.records import HARDWARE, REPAIR, GenerationRecord, HypothesisRecord, TrialRecord
+from ee_dist.recording.records import (
+    DIAGNOSIS,
+    HARDWARE,
+    POLISHED,
+    REPAIR,
+    GenerationRecord,
+    HypothesisRecord,
+    TrialRecord,
+)
 from ee_dist.recovery.observer import Observer
 from ee_dist.viewing.story import told
 
@@ -29,7 +37,8 @@ def starting(console: Console, what: str) -> Iterator[None]:
 class PassProgress(Observer):
     """A bar for the pass under way and one for the run; where there is no terminal, a line for each pass and trial.
 
-    The run's bar counts robot-steps expected, since a repair pass costs many times a diagnosis pass.
+    The run's bar counts robot-steps expected, ``weights`` of a pass of each phase, since a repair pass costs many times a
+    diagnosis pass; that of POLISHED is what follows the generations of a diagnosis.
     """
 
     def __init__(self, console: Console, passes: dict[str, int], weights: dict[str, float]) -> None:
@@ -39,6 +48,7 @@ class PassProgress(Observer):
         self.started = time.monotonic()
         self.done = 0.0
         self.total = sum(count * weights[phase] for phase, count in passes.items())
+        self.total += passes.get(DIAGNOSIS, 0) * weights.get(POLISHED, 0.0)
         self.passes = passes
         self.bars = Progress(
             TextColumn("{task.description}", justify="left"),
@@ -91,6 +101,7 @@ class PassProgress(Observer):
     def hypotheses(self, records: Sequence[HypothesisRecord]) -> None:
         for r in records:
             if r.final:
+                self.done += self.weights.get(POLISHED, 0.0)
                 self._say(f"diagnosis pass {r.pass_index + 1}: error {r.error:.5f} (evolved: {self.evolved:.5f})")
                 self.bars.console.print(
                     f"{'':10}believes: {told(r.terms)}", highlight=False, style="dim", soft_wrap=True

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.evaluation.physical import PhysicalRobot
-from ee_dist.recording.records import DIAGNOSIS, REPAIR
+from ee_dist.recording.records import DIAGNOSIS, POLISHED, REPAIR
 from ee_dist.recording.writer import RunWriter
 from ee_dist.recovery.loop import Recovery, recover
 from ee_dist.recovery.observer import Observers
@@ -39,6 +39,8 @@ from ee_dist.tasks.unfinished import remembered
 from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
 from ee_dist.viewing.story import told
 
+NEIGHBOURS = 300
+"""Roughly how many neighbours a step of polish tries."""
 WORKERS = {"ray": "starting Ray and its workers, about five seconds", "serial": "starting the engine"}
 QUICK = (
     "Budget quick shows that every part works. Its gaits hardly evolve: shares of intact, and so this verdict, "
@@ -88,6 +90,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     weights = {
         REPAIR: plan.repair.population * plan.repair.generations * float(plan.steps) / 2,
         DIAGNOSIS: plan.diagnosis.population * plan.diagnosis.generations * share / 4,
+        POLISHED: plan.polish * NEIGHBOURS * share / 2,
     }
     with starting(console, WORKERS[config.evaluator.name]):
         evaluator = evaluator_of(config)

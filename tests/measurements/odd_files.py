@@ -141,5 +141,10 @@ def cases() -> list[Case]:
              | spread("current{}", tau / 0.2)), hints=Hints(gains=(0.2, 0.2, 0.2))),
         Case("no header, with the order said", csv({"a": t} | spread("q{}", q) | spread("w{}", w) | spread("g{}", g)
              | spread("tau{}", tau / 0.2), header=False), hints=Hints(joints=JOINTS, gains=(0.2, 0.2, 0.2))),
+        Case("desired as d, with its speeds", csv({"t": t} | spread("q{}", q) | spread("qd{}", w) | spread("q{}_d", g)
+             | spread("qd{}_d", np.gradient(g, t, axis=0)) | spread("tau{}", tau))),
+        Case("a controller's own names", csv({"Timestamp (ms)": 1e3 * t} | spread("Axis {} actual position (°)", DEG * q)
+             | spread("Axis {} actual velocity (°/s)", DEG * w) | spread("Axis {} target position (°)", DEG * g)
+             | spread("Axis {} torque (Nm)", tau))),
         Case("no time", csv(spread("q{}", q) | spread("dq{}", w) | spread("cmd{}", g) | spread("tau{}", tau)), asks=True),
     ]  # fmt: skip

@@ -171,3 +171,15 @@ def test_what_is_proposed_says_how_sure_it_is_and_why(tmp_path: Path) -> None:
     assert "by number" in why
     assert found["time"][:3] == ("t_us", "us", "sure")
     assert "follow it by" in found["command of turn, shoulder, elbow"][3]
+
+
+def test_nothing_unknown_goes_without_a_question(tmp_path: Path) -> None:
+    """Speeds whose name contradicts their numbers, torques of an absurd size: each is asked for by name."""
+    m = odd_files.arrays()
+    base = {"t": m["t"]} | odd_files.spread("q{}", m["q"]) | odd_files.spread("cmd{}", m["g"])
+    lying = base | odd_files.spread("vel{} (rpm)", m["w"]) | odd_files.spread("tau{}", m["tau"])
+    (question,) = proposal_for(odd_files.csv(lying)(tmp_path), odd_files.robot(), Hints()).questions
+    assert "the name says rpm, but beside the positions it is rad/s" in question
+    absurd = base | odd_files.spread("vel{}", m["w"]) | odd_files.spread("tau{} (Nm)", 60 * m["tau"])
+    (question,) = proposal_for(odd_files.csv(absurd)(tmp_path), odd_files.robot(), Hints()).questions
+    assert "times what the motion needs in N.m" in question

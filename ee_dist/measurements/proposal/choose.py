@@ -50,7 +50,15 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     add_commands(v)
     add_rest(v)
     add_switches(v)
+    _ask_the_rest(v)
     return v.out
+
+
+def _ask_the_rest(v: View) -> None:
+    """Nothing unknown goes without a question."""
+    for c in v.out.choices:
+        if c.sure == UNKNOWN and c.why != "not found" and not any(c.why.split("; ")[-1] in q for q in v.out.questions):
+            v.out.ask(f"{c.name} ({c.column}): {c.why.split('; ')[-1]}; write the unit into the mapping")
 
 
 def _time_choice(v: View, table: str) -> None:

@@ -33,7 +33,11 @@ def add_commands(v: View) -> None:
     names = list(v.robot.motor_names)
     if chosen is None:
         if any(c.group == "torques" for c in v.out.choices) and not found:
-            v.out.notes.append("no commands were found: a balance of forces is the way to compare")
+            v.out.notes.append(
+                "no commands were found: the measured torques are taken as what was asked for"
+                if kind == "torque"
+                else "no commands were found: a balance of forces is the way to compare"
+            )
             return
         rivals = " or ".join(s.block.name for s in sorted(found, key=lambda s: -s.score)[:3])
         told = f"commands: {rivals}?" if rivals else f"commands: no columns look like {kind}s that were asked for;"

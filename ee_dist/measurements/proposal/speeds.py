@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -28,17 +29,25 @@ def add_speeds(v: View) -> None:
         score = (
             (2.0 if b.reading.kind == SPEED and not b.reading.weak else 0.0)
             + (b.reading.command is False)
-            - b.reading.second
+            - 1.5 * b.reading.second
         )
+        # Of two that change with the positions the better by a power of ten is the measured one.
+        score -= 0.5 * math.log10(1 - abs(r.correlation) + 1e-6)
         score += 3 if abs(r.correlation) > 0.9 else 1 if abs(r.correlation) > 0.6 else -3
         found.append(Scored(b, score, [f"change of the positions (correlation {r.correlation:.3f})"]))
     chosen = v.pick(sorted(found, key=lambda s: -s.score), 3.0)
     positions = v.sensor_names("position")
     if chosen is None:
+        able = [s.block.name for s in found if s.score >= 3]
+        why = (
+            f"{' or '.join(able)} could be it: estimated from the position"
+            if able
+            else "no column: estimated from the position"
+        )
         for name, of in zip(names, positions, strict=True):
             if name and of:
                 entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / v.step(v.position.block), 3))}
-                v.out.choices.append(Choice("sensors", name, entry, SURE, "no column: estimated from the position"))
+                v.out.choices.append(Choice("sensors", name, entry, LIKELY if able else SURE, why))
         return
     chosen.block.used = True
     v.add("sensors", names, chosen.block, speed_units(v, chosen.block), chosen.why)

@@ -166,11 +166,12 @@ def torque_units(v: View, block: Block) -> UnitChoice:
             gain = v.gains()[k]
             entry = {"unit": unit, "scale": gain * (1e-3 if stated == "mA" else 1.0)}
         elif relations is not None and abs(relations[k].correlation) > 0.7:
-            checked += 1
             size = UNITS[entry["unit"]][1] * abs(relations[k].slope)
             if size > 200 and stated is None:
                 entry["unit"] = f"m{unit}"
-            elif not 0.05 < size < 20:
+                size *= 1e-3
+            checked += 0.3 < size < 3
+            if not 0.05 < size < 20:
                 return UnitChoice((), UNKNOWN, f"{size:.3g} times what the motion needs in {entry['unit']}")
         if relations is not None and relations[k].correlation < -0.4:
             # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
