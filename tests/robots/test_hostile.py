@@ -39,10 +39,13 @@ def test_a_hostile_file_is_one_line(tmp_path: Path, text: str, message: str, suf
     file = tmp_path / f"robot{suffix}"
     file.write_text(text)
     tracemalloc.start()
-    with pytest.raises(RobotError, match=message) as caught:
-        load_robot(file)
-    assert tracemalloc.get_traced_memory()[1] < 5e6
-    tracemalloc.stop()
+    try:
+        with pytest.raises(RobotError, match=message) as caught:
+            load_robot(file)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 50e6, "a bomb would take gigabytes; what is imported on the way counts too"
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 400
 
@@ -116,7 +119,7 @@ def test_aliases_that_grow_without_end_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="stands? for more than"):
         load_robot(file)
     file.write_text("urdf: &a [*a]")
-    with pytest.raises(RobotError, match="nested without end"):
+    with pytest.raises(RobotError, match="nested (without end|deeper than)"):
         load_robot(file)
     file.write_text("[" * 5000)
     with pytest.raises(RobotError, match="not YAML"):
