@@ -62,7 +62,7 @@ class Weights(Problem):
 @pytest.fixture
 def weights(monkeypatch):
     way = Way(
-        "weights", "slow motions were recorded", lambda measured, config: Weights(measured.trials, measured.robot)
+        "weights", "slow motions were recorded", lambda measured, _: Weights(measured.trials, measured.robot)
     )
     monkeypatch.setitem(WAYS, "weights", way)
 
