@@ -23,8 +23,20 @@ from omegaconf.errors import OmegaConfBaseException
 from ee_dist.tasks.compose import check_flags, config_folder, handling, plain, quoted, settings
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.errors import USER_ERRORS, RayLostError, abandon_evaluators, defect, hydra_message, unasked_end
-from ee_dist.tasks.folder import NO_NAME, Refused, claimed, free_name, kept, remove_made, settings_of
+from ee_dist.tasks.folder import (
+    NO_NAME,
+    SETTINGS,
+    Refused,
+    claimed,
+    free_name,
+    held,
+    kept,
+    remove_made,
+    settings_of,
+    shown,
+)
 from ee_dist.tasks.help import answer
+from ee_dist.tasks.unfinished import can_go_on, finished, unfinished
 
 MISTAKE, DEFECT = 2, 1
 STOPPED = 130
@@ -37,21 +49,29 @@ def run(composed: DictConfig) -> None:
     try:
         out = _folder(hydra_settings)
         config, module, options = settings(composed)
-        with claimed(out, settings_of(composed, hydra_settings), handling(composed).overwrite):
+        how = handling(composed)
+        if how.resume is not None and resumed(out, config, options, how.overwrite):
+            return
+        free = how.overwrite or how.resume is not None
+        with (
+            claimed(out, settings_of(composed, hydra_settings), free),
+            unfinished(out, config, options, how.resume is not None),
+        ):
             module.run(config, options, out)
     except RayLostError as error:
         remove_made()
         abandon_evaluators()
-        leaving.leave(f"{error}; {kept(out)}", MISTAKE)
+        leaving.leave(f"{error}; {_what_is_kept(out)}", MISTAKE)
     except USER_ERRORS as error:
         remove_made()
-        sys.exit(_complain(str(error)))
+        onward = "" if isinstance(error, ConfigError) else _how_to_go_on(out)
+        sys.exit(_complain(f"{error}{onward}"))
     except OmegaConfBaseException as error:
         remove_made()
         sys.exit(_complain(plain(error)))
     except OSError as error:
         remove_made()
-        sys.exit(_complain(_unwritten(error)))
+        sys.exit(_complain(_unwritten(error) + _how_to_go_on(out)))
     except (SystemExit, MemoryError) as error:
         remove_made()
         sys.exit(_complain(unasked_end(error)))
@@ -64,11 +84,40 @@ def run(composed: DictConfig) -> None:
         _leave(stop, out)
 
 
+def _what_is_kept(out: Path) -> str:
+    return kept(out) + _how_to_go_on(out)
+
+
+def _how_to_go_on(out: Path) -> str:
+    return f"; go on with the same command and resume={shown(_whole(out))}" if can_go_on(out) else ""
+
+
+def _whole(out: Path) -> Path:
+    """What is to be resumed: the run, or the sweep that it is a job of."""
+    settings: Any = HydraConfig.get() if HydraConfig.initialized() else None
+    return Path(settings.sweep.dir) if settings is not None and settings.mode == RunMode.MULTIRUN else out
+
+
 def _leave(stop: KeyboardInterrupt, out: Path | None = None) -> NoReturn:
     """One line, and the end: 130 after Ctrl-C, 143 where a run was asked to end."""
     abandon_evaluators()
-    text = kept(out) if out else "nothing was begun"
+    text = _what_is_kept(out) if out else "nothing was begun"
     leaving.leave(f"stopped ({getattr(stop, 'why', 'Ctrl-C')}); {text}", getattr(stop, "status", STOPPED))
+
+
+def resumed(out: Path, config: Any, options: Any, overwrite: bool) -> bool:
+    """Whether there is nothing to do, since the run there is finished. Raises ConfigError where no run of ours was begun."""
+    if finished(out, config, options):
+        print(f"{shown(out)}: finished already", flush=True)
+        return True
+    inside = set(held(out)) - {SETTINGS}
+    if "summary.json" in inside and not can_go_on(out) and not overwrite:
+        raise ConfigError(f"resume={shown(out)}: the run there is finished, and had other settings")
+    if HydraConfig.get().mode != RunMode.MULTIRUN and not (out / SETTINGS).is_dir():
+        raise ConfigError(f"resume={shown(out)}: no run was begun there; name the folder of a run that was stopped")
+    if inside and not can_go_on(out) and not overwrite:
+        raise ConfigError(f"resume={shown(out)}: holds nothing to go on from; overwrite=true starts the run there anew")
+    return False
 
 
 def _folder(hydra_settings: Any) -> Path:

@@ -22,13 +22,15 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.scan import Scanned, scan
 from ee_dist.discrepancy.search.screen import Screened, screen
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.discrepancy.search.slopes import WIDTHS, slopes_at
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.groups import ALL_JOINTS
 from ee_dist.trials.log import Array
 
 CALM = 0.8
 """Share of the most predictable trial's trust from which a trial counts as calm."""
+FAR = 2.0
+"""Error over the noise floor of the best quick fit from which windows of the same motions need not even be looked at."""
 NEAR = 1.1
 """Error over the noise floor up to which windows of the same motions are evidence enough: no more than noise is left."""
 FAMILIES_TRIED = 3
@@ -94,11 +96,12 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     screened = screen(now.among(busiest(problem, base, calm)), pool, effort.shares)
     least = least_energy(len(pool))
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)[: effort.first]
-    scanned = sorted(scan(now.among(calm), promising), key=lambda s: s.energy)[: effort.second]
+    scanned = sorted(scan(now.among(busiest(problem, base, calm)), promising), key=lambda s: s.energy)[: effort.second]
     quick = sorted(_quick(now.among(calm), scanned, effort.starts), key=lambda f: f.energy)[: effort.final]
     starts = [(Proposal((f.model.parts[0],)), f.u) for f in quick]
     starts += _families(screened, quick, least)
-    judged = _judged(search, current, starts, base, len(pool))
+    nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
+    judged = _judged(search, current, starts, base, len(pool), far=nearest > FAR**2)
     if judged and not judged[0].earned and leftovers(problem, base):
         pairs = _pairs(screened, now)
         if pairs:
@@ -109,21 +112,33 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
 
 
 def _judged(
-    search: Search, current: Current, starts: Sequence[tuple[Proposal, Array]], base: Array, tried: int
+    search: Search,
+    current: Current,
+    starts: Sequence[tuple[Proposal, Array]],
+    base: Array,
+    tried: int,
+    far: bool = False,
 ) -> list[Judged]:
-    """On windows first; where more than noise is left with the best of them, on whole motions and settings."""
+    """On windows; where more than noise is left with the best of them (``far``: where that is known beforehand), on whole
+    motions and settings."""
     if not starts:
         return []
-    problem = search.problem
-    found = under(search, current, starts, windows(problem), base, tried)
-    floor = float(problem.floor.sum())
-    best = found[0]
-    if best.earned and float(best.held.sum()) <= NEAR**2 * floor:
-        return found
-    for cut in travelling(problem):
+    problem, cuts = search.problem, travelling(search.problem)
+    found: list[Judged] = []
+    if not (far and cuts):
+        found = under(search, current, starts, windows(problem), base, tried)
+        if not cuts or (found[0].earned and float(found[0].held.sum()) <= NEAR**2 * float(problem.floor.sum())):
+            return found
+        found = []
+    for cut in cuts:
         again = under(search, current, starts, cut, base, tried)
-        found = again if found[0].held_out == windows(problem).name else strictest(found, again)
+        found = strictest(found, again) if found else again
     return found
+
+
+def _floor_of(problem: Problem, trials: Sequence[int]) -> float:
+    """Energy that noise leaves in some trials."""
+    return float(problem.floor[np.isin(problem.trial_of, list(trials))].sum())
 
 
 def under(
@@ -131,10 +146,13 @@ def under(
 ) -> list[Judged]:
     """Proposals fitted together with the current model and judged under one cut, ranked."""
     models = [(Model((*current.parts, *p.parts)), np.concatenate([current.u, u])) for p, u in starts]
-    without = base
+    without, leading = base, None
     if len(current.u):
-        without = cross_fit(search, [(Model(current.parts), current.u)], cut)[0].residual
-    outcomes = cross_fit(search, models, cut)
+        own = Model(current.parts)
+        without = cross_fit(search, [(own, current.u)], cut)[0].residual
+        # What the model has already moves little when one effect is added: its slopes are taken once for all proposals.
+        leading = None if search.problem.rugged else slopes_at(search, own, current.u)
+    outcomes = cross_fit(search, models, cut, leading=leading)
     return ranked(
         [
             judge(search.problem, without, outcome, p, model, tried)

@@ -25,7 +25,8 @@ class Rollout:
 
     ``seed`` feeds the noise of the sensors, if they have any. ``pose`` asks for body pose, joint positions and torques
     at every row. ``supply_v`` (steps,) is the measured supply voltage. ``enabled`` (steps,) is 0 where the drives are
-    released: open circuit, no torque.
+    released: open circuit, no torque. ``external`` (steps, M) is a known torque on each drive's joint that is not the drive's
+    (a force for a slide): a stage pushed by a measured disturbance.
     """
 
     model: Robot
@@ -36,13 +37,14 @@ class Rollout:
     supply_v: Array | None = None
     pose: bool = False
     enabled: Array | None = None
+    external: Array | None = None
 
     @property
     def key(self) -> str:
         """Content address of all that decides the result, for the cache."""
         seed = self.seed if self.model.noisy else None
         parts = [self.model.digest, self.driver.key, str(self.steps), str(seed), str(self.pose)]
-        for a in (self.supply_v, self.enabled, *_arrays(self.start)):
+        for a in (self.supply_v, self.enabled, self.external, *_arrays(self.start)):
             parts.append("-" if a is None else hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest())
         return "|".join(parts)
 
@@ -73,8 +75,7 @@ class Bodies(Protocol):
     def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
         """Advance by one time step under joint torques (B, M) and a force (B, 3) on the root part, floor frame.
 
-        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step. Raises EngineError where an
-        engine cannot do that.
+        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step, in an engine that can do that.
         """
 
     def close(self) -> None:

@@ -27,9 +27,12 @@ from ee_dist.trials.log import Array
 
 __all__ = ["LAWS", "DrivePath", "LawContext", "LawFunction", "drive_law"]
 
-STIFF_SHARE, LOOK_SHARE = 0.9, 0.1
-"""A controller whose damping stops its joint in less than a step (this share of it) would shake it: from there on the engine
-takes the damping at the end of the step. Below the second share of the joint's own inertia nothing needs to be looked at."""
+STIFF_SHARE, LOOK_SHARE = 1.8, 0.2
+"""A controller whose damping takes this share of a joint's speed in a step would soon shake it (at 2 it turns the motion round):
+from there on an engine takes the damping at the end of the step, if it can. The share is of the inertia with which all joints
+can be stopped at once; below the second one, of the joint's own, nothing needs to be looked at."""
+HOPELESS_SHARE = 2.0
+"""Of the joint's own inertia, what no explicit step holds."""
 STOP_SHARE = 0.5
 """How much of the needed change of speed a stop makes in one step: below 1, because felt inertia is an estimate."""
 
@@ -300,11 +303,22 @@ def _within(value: float, limit: float) -> float:
 
 def stiff_joints(robot: Robot) -> NDArray[np.bool_]:
     """(M,) whether the controller of a joint is too steep for an explicit step."""
-    slopes = np.array([{"position": d.kd, "speed": d.kp}.get(d.command, 0.0) for d in robot.drives]) * robot.time_step_s
+    slopes = _slopes(robot)
     if not np.any(slopes > LOOK_SHARE * felt_inertia(robot)):
         return np.zeros(len(slopes), dtype=bool)
     found: NDArray[np.bool_] = slopes > STIFF_SHARE * steady_inertia(robot)
     return found
+
+
+def hopeless_joints(robot: Robot) -> tuple[str, ...]:
+    """Joints whose controller shakes them whatever the others do, in an engine that takes its damping at the start of a step."""
+    beyond = _slopes(robot) > HOPELESS_SHARE * felt_inertia(robot)
+    return tuple(name for name, b in zip(robot.motor_names, beyond.tolist(), strict=True) if b)
+
+
+def _slopes(robot: Robot) -> Array:
+    """(M,) N.m.s/rad of the controllers times the time step."""
+    return np.array([{"position": d.kd, "speed": d.kp}.get(d.command, 0.0) for d in robot.drives]) * robot.time_step_s
 
 
 def _present(robot: Robot) -> list[bool]:

@@ -35,6 +35,7 @@ def shape_of(rollout: Rollout) -> tuple[object, ...]:
         robot.free_base,
         rollout.supply_v is None,
         rollout.enabled is None,
+        rollout.external is None,
     )
 
 
@@ -55,6 +56,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     force = _Force(robots)
     supply = None if rollouts[0].supply_v is None else np.stack([_held(r.supply_v, steps) for r in rollouts])
     enabled = None if rollouts[0].enabled is None else np.stack([_switched(r.enabled, steps) for r in rollouts])
+    external = None if rollouts[0].external is None else np.stack([_held(r.external, steps) for r in rollouts])
     touch, twist = "touch" in kinds, force.needs_twist or bool(kinds & TWIST_KINDS)
     always_pose = pose or bool(kinds & POSE_KINDS)
 
@@ -85,7 +87,8 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
         if poses is not None and joints is not None and torques is not None and truth.base_pose is not None:
             poses[step], joints[step], torques[step] = truth.base_pose, truth.joints, torque
         if not last:
-            bodies.step(torque, force(step, truth), drive.give)
+            pulled = torque if external is None else torque + external[:, step]
+            bodies.step(pulled, force(step, truth), drive.give)
     assert begin is not None and truth.base_pose is not None
     travel = truth.base_pose[:, 0] - begin[:, 0]
     times: Array = np.arange(steps, dtype=np.float64) * dt

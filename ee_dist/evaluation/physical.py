@@ -40,6 +40,10 @@ class PhysicalRobot:
         self.trials += 1
         return log
 
+    def skip(self) -> None:
+        """A trial that was made before, by a run that is resumed now: the next one is the one after it."""
+        self.trials += 1
+
 
 def _runner(
     engine: Engine, robot: Robot, seed: np.random.SeedSequence, cause: str

@@ -10,14 +10,14 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Even
 from ee_dist.measurements.sampling import Timing, check_times
 from ee_dist.measurements.table import Table
-from ee_dist.measurements.units import factor
+from ee_dist.measurements.units import UNITS, factor
 from ee_dist.trials.log import Array
 
 MOST_ROWS = 5_000_000
 """On the grid: an hour at 1 kHz."""
-FAST_S = 2e-4
-"""Steps below this are a slip of the unit where they cost most rows."""
 SLOW_S = 1.0
+FASTEST_S, SLOWEST_S = 2e-4, 0.2
+"""Steps of a robot's log. A factor of 1000 lies between them, so the size of a step tells the unit."""
 KEPT = 0.05
 TORN = 0.5
 """A single gap of more than this share of the record, or a record stretched by it, is a wrong time stamp."""
@@ -82,15 +82,15 @@ def check_grid(found: Clocked, step_s: float, rate_stated: bool, unit: str) -> N
     often the unit of the time is another one."""
     table, length = found.table, float(found.times_s[-1] - found.times_s[0])
     rows, median = length / step_s, found.timing.median_s
-    if length < step_s or (rows < KEPT * len(table) and median < FAST_S and not rate_stated):
-        guess = f", say unit: {_better(median)!r}" if _better(median) != unit else ""
+    if length < step_s or (rows < KEPT * len(table) and median < FASTEST_S and not rate_stated):
         raise MeasurementError(
             f"{table}: the times of {len(table)} rows cover {length:.4g} s, {1e6 * median:.4g} us a row, so that steps of "
-            f"{step_s:g} s would keep {int(rows) + 1}; if the times are not in {unit!r}{guess}; if they are, set rate_hz"
+            f"{step_s:g} s would keep {int(rows) + 1}; if the times are not in {unit!r}{_cure(median, unit)}; "
+            "if they are, set rate_hz"
         )
     if median >= SLOW_S:
         raise MeasurementError(
-            f"{table}: a row every {median:.4g} s; if the times are not in {unit!r}, say unit: {_better(median)!r}; "
+            f"{table}: a row every {median:.4g} s; if the times are not in {unit!r}{_cure(median, unit)}; "
             "slower than one row a second tells nothing about a robot's motion"
         )
     if rows > MOST_ROWS:
@@ -100,6 +100,8 @@ def check_grid(found: Clocked, step_s: float, rate_stated: bool, unit: str) -> N
         )
 
 
-def _better(median_s: float) -> str:
-    """The unit in which steps that look like ``median_s`` would be those of a robot's log, told the unit was taken for s."""
-    return "ms" if median_s >= SLOW_S else "s"
+def _cure(median_s: float, unit: str) -> str:
+    """The unit in which such steps would be those of a robot's log, as advice."""
+    raw = median_s / UNITS[unit][1]
+    fits = [u for u in ("s", "ms", "us", "ns") if FASTEST_S <= raw * UNITS[u][1] <= SLOWEST_S and u != unit]
+    return f", say unit: {fits[0]!r}" if fits else ""

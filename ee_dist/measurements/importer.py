@@ -12,10 +12,9 @@ import numpy as np
 
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
-from ee_dist.measurements.alignment import Match, match, one_epoch
-from ee_dist.measurements.clocks import Clocked, check_grid, clocked, loosely_clocked
+from ee_dist.measurements.clocks import Clocked, check_grid
 from ee_dist.measurements.errors import MeasurementError, nearest
-from ee_dist.measurements.mapping import Column, Estimated, Even, Mapping
+from ee_dist.measurements.mapping import Column, Estimated, Mapping
 from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, grid, held, linear, smoothed
@@ -26,7 +25,8 @@ from ee_dist.measurements.suspicious import (
     time_suspicion,
     unit_suspicion,
 )
-from ee_dist.measurements.table import Recorded, Table
+from ee_dist.measurements.table import Recorded
+from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.trials import trials_of
 from ee_dist.measurements.units import factor
 from ee_dist.recording.records import HARDWARE, TrialRecord
@@ -35,8 +35,6 @@ from ee_dist.trials.log import Array, SensorLog
 
 SAME_RATE = 1e-3
 """A record whose even step is within this share of the wanted one is taken sample by sample."""
-LEAST_SHARED = 0.5
-"""Share of the main table's time that its other tables must cover."""
 
 
 def import_file(path: str | Path, mapping: Mapping, robot: Robot, index: int = 0) -> tuple[TrialRecord, Report]:
@@ -106,19 +104,13 @@ class _Import:
 
     def _time(self) -> None:
         """Fills ``main`` (the table of the first sensor), ``clocks`` by table, the grid ``at_s`` and ``step_s``."""
-        report, named = self.report, [c.table for _, _, c in self.mapping.columns()]
-        first = next((c.table for g, _, c in self.mapping.columns() if g == "sensors"), "")
-        time = self._time_column(first)
-        self.main = clocked(self._table(first), time, self.where)
-        self.clocks = {first: self.main}
-        for name in dict.fromkeys(named):
-            if name != first:
-                self.clocks[name] = loosely_clocked(self._table(name), self._time_column(name), self.where)
-        self._align(first)
+        report = self.report
         step = self.robot.time_step_s if self.mapping.rate_hz is None else 1.0 / self.mapping.rate_hz
-        unit = time.unit if isinstance(time, Column) else "s"
-        check_grid(self.main, step, self.mapping.rate_hz is not None, unit)
-        self._overlap(first)
+        found = TrialClocks(self.recorded, self.mapping, self.robot, report.done)
+        unit = found.unit
+        check_grid(found.main, step, self.mapping.rate_hz is not None, unit)
+        found.cut()
+        self.main, self.clocks = found.main, found.clocks
         times_s, timing = self.main.times_s, self.main.timing
         length = float(times_s[-1] - times_s[0])
         self.step_s = step
@@ -140,99 +132,6 @@ class _Import:
             report.suspicious.append(note)
         for row, seconds in timing.gaps[:5]:
             report.suspicious.append(f"time: a gap of {seconds:.4g} s before row {row}")
-
-    def _table(self, name: str) -> Table:
-        return self.recorded.table(name, self.where)
-
-    def _time_column(self, name: str) -> Column | Even | None:
-        own = self.mapping.tables.get(name)
-        if own is not None and own.time is not None:
-            return own.time
-        return self.mapping.time if self._table(name).clock is None else None
-
-    def _align(self, first: str) -> None:
-        """Brings the clocks of all tables to that of the first: as the format or the mapping states it, or as signals fit."""
-        stated = {n: self.mapping.tables[n].offset_s if n in self.mapping.tables else None for n in self.clocks}
-        for name, found in self.clocks.items():
-            offset = stated[name]
-            if offset is not None:
-                found.times_s = found.times_s + offset
-                self.report.done.append(f"{name}: {offset:g} s added to its clock, as the mapping says")
-        for name, found in self.clocks.items():
-            if name == first or stated[name] is not None:
-                continue
-            if found.table.clock is not None and self.main.table.clock is not None:
-                continue
-            if one_epoch(self.main.times_s, found.times_s):
-                self.report.done.append(
-                    f"{name}: its clock and that of {first} count from one epoch: taken as the same"
-                )
-                continue
-            fit = self._fit(name)
-            if fit is None or not fit.clear:
-                why = (
-                    "no channel to match it by"
-                    if fit is None
-                    else (f"best fit {fit.correlation:.2f} at {fit.offset_s:.4g} s, another {fit.rival:.2f}")
-                )
-                raise MeasurementError(
-                    f"{self.where}: tables: {name}: its clock is not that of {first or self.main.table.path.name}, and the "
-                    f"signals do not tell the offset ({why}); say 'offset_s: SECONDS' to add to it (0 if it is one clock)"
-                )
-            found.times_s = found.times_s + fit.offset_s
-            self.report.done.append(
-                f"{name}: {fit.offset_s:.4f} s added to its clock, where its signals fit best those of "
-                f"{first} (correlation {fit.correlation:.3f}); a lag of the drives is part of it: state offset_s if you know it"
-            )
-
-    def _fit(self, name: str) -> Match | None:
-        """The offset of a table by its commands against positions (or speeds), or its speeds against theirs."""
-        targets = {s.name: (s.kind, s.target) for s in self.robot.sensors}
-        of_joint = {targets[n]: c for n, c in self.mapping.sensors.items() if isinstance(c, Column) and n in targets}
-        kinds = {d.joint: command_kind(d) for d in self.robot.drives}
-        pairs: list[tuple[Array, Array]] = []
-        held_between = False
-        here, there = self.main, self.clocks[name]
-        for group, channel, c in self.mapping.columns():
-            if c.table != name or group not in ("sensors", "commands"):
-                continue
-            kind, joint = targets[channel] if group == "sensors" else (kinds[channel], channel)
-            base = of_joint.get(("position", joint))
-            if base is None or kind not in ("position", "velocity", "speed") or base.table == name:
-                continue
-            own = base.sign * base.scale * here.table.numbers(base.column)
-            if kind != "position":
-                own = np.gradient(own, here.times_s)
-            pairs.append((own, c.sign * c.scale * there.table.numbers(c.column)))
-            held_between = held_between or group == "commands"
-        if not pairs or len(there.times_s) < 3:
-            return None
-        a, b = (np.stack([p[k] for p in pairs], axis=1) for k in (0, 1))
-        return match(here.times_s, a, there.times_s, b, held_between)
-
-    def _overlap(self, first: str) -> None:
-        """Cuts the main table to the time that the others cover; what is held needs no end."""
-        start, end = self.main.times_s[0], self.main.times_s[-1]
-        for name, found in self.clocks.items():
-            if name == first:
-                continue
-            start = max(start, found.times_s[0])
-            if any(g == "sensors" and c.table == name for g, _, c in self.mapping.columns()):
-                end = min(end, found.times_s[-1])
-            elif found.times_s[-1] < start:
-                end = start
-        times_s = self.main.times_s
-        inside = np.flatnonzero((times_s >= start - 1e-9) & (times_s <= end + 1e-9))
-        if len(inside) < LEAST_SHARED * len(times_s):
-            raise MeasurementError(
-                f"{self.where}: the tables of {self.recorded.name} share only {max(0.0, end - start):.4g} s of "
-                f"{times_s[-1] - times_s[0]:.4g} s; are their clocks in the same unit? else give offset_s for one of them"
-            )
-        if len(inside) < len(times_s):
-            self.report.done.append(f"{len(times_s) - len(inside)} rows left out that not all tables cover")
-            rows = slice(int(inside[0]), int(inside[-1]) + 1)
-            self.main = Clocked(self.main.table.part(rows), times_s[rows], self.main.timing)
-            self.clocks[first] = self.main
 
     # -- columns -----------------------------------------------------------------------------------------------------
 

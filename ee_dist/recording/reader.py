@@ -13,7 +13,7 @@ from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.records import HARDWARE, HypothesisRecord, RunRecord, TrialRecord
 from ee_dist.recording.upgrade import Record, upgraded
 from ee_dist.robots.model import RobotError
-from ee_dist.robots.plausible import checked
+from ee_dist.robots.numbers import checked
 from ee_dist.robots.serial import robot_from_json
 
 
@@ -35,7 +35,7 @@ def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
     if robot is None:
         raise RecordingError(f"{path}: cut off before its robot was recorded; nothing can be recovered")
     try:
-        run = RunRecord(checked(robot_from_json(robot)), metadata, contents.attachments)
+        run = RunRecord(checked(robot_from_json(robot), "robot"), metadata, contents.attachments)
     except (RobotError, UnicodeError, RecursionError) as error:
         raise RecordingError(f"{path}: the attachment {topics.ROBOT_FILE} is not a robot of ours: {error}") from error
     records = list(_records(path, contents))

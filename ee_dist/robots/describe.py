@@ -59,7 +59,7 @@ def load_robot(source: str | Path | Mapping[str, Any], folder: str | Path = ".")
     if text in BUILT_IN:
         return BUILT_IN[text](), ()
     path = Path(folder) / text
-    if path.suffix.lower() in (".urdf", ".xml", ".mjcf"):
+    if path.suffix.lower() in (".urdf", ".xacro", ".xml", ".mjcf"):
         return _described({kind_of(path): str(path)}, Path("."), str(path))
     if path.suffix.lower() in (".yaml", ".yml", ".json"):
         return _described(_yaml(path), path.parent, str(path))
@@ -69,7 +69,7 @@ def load_robot(source: str | Path | Mapping[str, Any], folder: str | Path = ".")
 def kind_of(path: Path) -> str:
     """``urdf`` or ``mjcf``, by what the file begins with. Raises RobotError."""
     if path.suffix.lower() != ".xml":
-        return "urdf" if path.suffix.lower() == ".urdf" else "mjcf"
+        return "mjcf" if path.suffix.lower() == ".mjcf" else "urdf"
     tag = read_xml(path)[0].tag
     if tag not in ("robot", "mujoco"):
         raise RobotError(f"{path}: the outermost element is <{tag}>; expected <robot> (URDF) or <mujoco> (MJCF)")

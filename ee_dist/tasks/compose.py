@@ -30,6 +30,7 @@ TASKS = (
     "export",
 )
 _SWEEP = ("-m", "--multirun")
+_RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
 
 
@@ -45,6 +46,9 @@ def quoted(arguments: list[str]) -> list[str]:
 
     # The parser of the command line takes flags only where they stand together.
     sweep = [a for a in arguments if a in _SWEEP]
+    where = "hydra.sweep.dir" if sweep else "hydra.run.dir"
+    resumed = [m.group(1) for a in arguments if (m := _RESUME.match(a))]
+    arguments = [*arguments, *(f"{where}={folder}" for folder in resumed)]
     return [*sweep, *(quote(a) for a in arguments if a not in _SWEEP)]
 
 

@@ -162,6 +162,7 @@ class Config:
     log: str | None = None
     urdf: str | None = None
     mjcf: str | None = None
+    to: str | None = None
     robot: RobotConfig = field(default_factory=RobotConfig)
     engine: EngineConfig = field(default_factory=EngineConfig)
     evaluator: EvaluatorConfig = field(default_factory=EvaluatorConfig)
@@ -186,6 +187,7 @@ class Handling:
     """How the folder of a run is treated. Decides nothing of the result, so it is not part of the recorded settings."""
 
     overwrite: bool = False
+    resume: str | None = None
 
 
 def unknown_key(owner: str, key: str, known: tuple[str, ...], otherwise: str = "") -> ConfigError:

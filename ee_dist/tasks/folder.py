@@ -51,7 +51,7 @@ class NotedFolders(Callback):
         # Hydra itself writes into the sweep's folder, before any job.
         if not str(config.hydra.sweep.dir).strip():
             raise Refused(NO_NAME.format(key="hydra.sweep.dir"))
-        if (Path(str(config.hydra.sweep.dir)) / _SWEEP).exists() and not config.overwrite:
+        if (Path(str(config.hydra.sweep.dir)) / _SWEEP).exists() and not (config.overwrite or config.resume):
             raise Refused(HELD.format(key="hydra.sweep.dir", folder=config.hydra.sweep.dir, content="a sweep"))
         self._missing = missing(Path(str(config.hydra.sweep.dir)))
 
@@ -74,7 +74,7 @@ def missing(folder: Path) -> tuple[Path, ...]:
 
 def free_name(folder: Path) -> Path:
     """The folder, or with a number behind it the first that does not exist: two runs may start in one second."""
-    if not _holds(folder) and not (folder / LOCK).exists():
+    if not held(folder) and not (folder / LOCK).exists():
         return folder
     number = 2
     while (found := folder.with_name(f"{folder.name}_{number}")).exists():
@@ -84,7 +84,7 @@ def free_name(folder: Path) -> Path:
 
 @contextmanager
 def claimed(folder: Path, settings: Mapping[str, str], overwrite: bool) -> Iterator[None]:
-    """The folder for this run alone, with ``settings`` (text by file name) in it.
+    """The folder for this run alone, with ``settings`` (text by file name) in it. ``overwrite``: resumed runs, too.
 
     Where the run fails before it wrote anything, its folder is left as it was found. Raises ConfigError where another
     run writes there, or where something lies there and ``overwrite`` is not set.
@@ -95,13 +95,13 @@ def claimed(folder: Path, settings: Mapping[str, str], overwrite: bool) -> Itera
     found: list[str] = []
     before: dict[Path, bytes | None] = {}
     try:
-        found = _holds(folder)
+        found = held(folder)
         if found and not overwrite:
             raise ConfigError(HELD.format(key="hydra.run.dir", folder=shown(folder), content=_listed(found)))
         before = _placed(folder / SETTINGS, settings)
         yield
     except BaseException:
-        if set(_holds(folder)) <= ({*found, SETTINGS} if before else set(found)):
+        if set(held(folder)) <= ({*found, SETTINGS} if before else set(found)):
             _restore(before)
         raise
     finally:
@@ -125,7 +125,7 @@ def shown(folder: Path) -> str:
 
 def kept(folder: Path) -> str:
     """What a run that was stopped leaves behind, in words."""
-    names = [n for n in _holds(folder) if n != SETTINGS]
+    names = [n for n in held(folder) if n != SETTINGS]
     return f"kept in {shown(folder)}: {_listed(names)}" if names else "nothing was recorded yet, so nothing is kept"
 
 
@@ -159,7 +159,7 @@ def _locked(folder: Path) -> int:
         os.close(handle)
 
 
-def _holds(folder: Path) -> list[str]:
+def held(folder: Path) -> list[str]:
     """Names of what lies in a folder, without hidden files and what is empty."""
     if not folder.is_dir():
         return []

@@ -147,14 +147,11 @@ def written(proposal: Proposal, config: Config, files: list[Path], out: Path, co
 def robot_source(config: Config) -> Any:
     """The configured robot as a mapping names it, from wherever that stands."""
     robot = config.robot
-    if robot.name != "urdf":
-        return robot.name if robot.name in BUILT_IN else str(Path(robot.name).resolve())
-    if robot.drives is not None and robot.urdf is None:
-        return str(Path(robot.drives).resolve())
-    if robot.urdf is not None and robot.drives is None:
-        return str(Path(robot.urdf).resolve())
-    # Both: the description is named, and says itself which URDF it is of, or the URDF goes beside it.
-    return None
+    if robot.name in BUILT_IN:
+        return robot.name
+    named = [f for f in (robot.urdf, robot.drives) if f is not None] or [robot.name]
+    # Where a description and its URDF are named apart, the settings of the command line go on saying which belong together.
+    return str(Path(named[0]).resolve()) if len(named) == 1 else None
 
 
 def robot_of_mapping(mapping: Mapping, config: Config) -> tuple[Robot, tuple[str, ...]]:

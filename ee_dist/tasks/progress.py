@@ -3,21 +3,42 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ee_dist.recording.records import HARDWARE, REPAIR, GenerationRecord, HypothesisRecord, TrialRecord
+from ee_dist.recording.records import (
+    DIAGNOSIS,
+    HARDWARE,
+    POLISHED,
+    REPAIR,
+    GenerationRecord,
+    HypothesisRecord,
+    TrialRecord,
+)
 from ee_dist.recovery.observer import Observer
 from ee_dist.viewing.story import told
+
+
+@contextmanager
+def starting(console: Console, what: str) -> Iterator[None]:
+    """Say what happens before there is anything to count: live on a terminal, elsewhere as a line."""
+    if console.is_terminal:
+        with console.status(what):
+            yield
+    else:
+        console.print(f"     0 s  {what}", style="dim", highlight=False)
+        yield
 
 
 class PassProgress(Observer):
     """A bar for the pass under way and one for the run; where there is no terminal, a line for each pass and trial.
 
-    The run's bar counts robot-steps expected, since a repair pass costs many times a diagnosis pass.
+    The run's bar counts robot-steps expected, ``weights`` of a pass of each phase, since a repair pass costs many times a
+    diagnosis pass; that of POLISHED is what follows the generations of a diagnosis.
     """
 
     def __init__(self, console: Console, passes: dict[str, int], weights: dict[str, float]) -> None:
@@ -27,6 +48,7 @@ class PassProgress(Observer):
         self.started = time.monotonic()
         self.done = 0.0
         self.total = sum(count * weights[phase] for phase, count in passes.items())
+        self.total += passes.get(DIAGNOSIS, 0) * weights.get(POLISHED, 0.0)
         self.passes = passes
         self.bars = Progress(
             TextColumn("{task.description}", justify="left"),
@@ -41,7 +63,7 @@ class PassProgress(Observer):
             disable=not self.live,
         )
         self.run_bar = self.bars.add_task("whole run (%)", total=100, best="")
-        self.pass_bar = self.bars.add_task("starting", total=1, best="")
+        self.pass_bar = self.bars.add_task("first generation: compiling, loading", total=1, best="")
         self.phase, self.index, self.generations = "", 0, 1
         self.evolved = float("nan")
 
@@ -58,6 +80,9 @@ class PassProgress(Observer):
         self.phase, self.index, self.generations = phase, pass_index, generations + 1
         name = f"{phase} {pass_index + 1} of {self.passes[phase]}"
         self.bars.reset(self.pass_bar, total=self.generations, description=name, best="")
+        if not self.live and not self.done:
+            seconds = time.monotonic() - self.started
+            self.console.print(f"{seconds:6.0f} s  {name}, {generations} generations", style="dim", highlight=False)
 
     def generation(self, record: GenerationRecord) -> None:
         self.done += self.weights[self.phase] / self.generations
@@ -76,6 +101,7 @@ class PassProgress(Observer):
     def hypotheses(self, records: Sequence[HypothesisRecord]) -> None:
         for r in records:
             if r.final:
+                self.done += self.weights.get(POLISHED, 0.0)
                 self._say(f"diagnosis pass {r.pass_index + 1}: error {r.error:.5f} (evolved: {self.evolved:.5f})")
                 self.bars.console.print(
                     f"{'':10}believes: {told(r.terms)}", highlight=False, style="dim", soft_wrap=True

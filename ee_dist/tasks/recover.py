@@ -16,7 +16,7 @@ from rich.table import Table
 
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.evaluation.physical import PhysicalRobot
-from ee_dist.recording.records import DIAGNOSIS, REPAIR
+from ee_dist.recording.records import DIAGNOSIS, POLISHED, REPAIR
 from ee_dist.recording.writer import RunWriter
 from ee_dist.recovery.loop import Recovery, recover
 from ee_dist.recovery.observer import Observers
@@ -24,7 +24,7 @@ from ee_dist.tasks.compose import config_folder
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.observers import Beliefs, Recorder
 from ee_dist.tasks.outcome import Score, score
-from ee_dist.tasks.progress import PassProgress
+from ee_dist.tasks.progress import PassProgress, starting
 from ee_dist.tasks.run_digest import ResultDigest
 from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.summary import (
@@ -35,9 +35,13 @@ from ee_dist.tasks.summary import (
     package_version,
     write_summary,
 )
+from ee_dist.tasks.unfinished import remembered
 from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
 from ee_dist.viewing.story import told
 
+NEIGHBOURS = 300
+"""Roughly how many neighbours a step of polish tries."""
+WORKERS = {"ray": "starting Ray and its workers, about five seconds", "serial": "starting the engine"}
 QUICK = (
     "Budget quick shows that every part works. Its gaits hardly evolve: shares of intact, and so this verdict, "
     "say little. Without budget=quick it is the paper's."
@@ -64,6 +68,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     search_seed, intact_seed, changed_seed = seeds.spawn(3)
     intact = PhysicalRobot(hardware, robot, (), intact_seed, config.noise)
     changed = PhysicalRobot(hardware, robot, hidden, changed_seed, config.noise)
+    first, later = remembered("intact", intact, robot), remembered("changed", changed, robot)
     metadata = {
         "task": "recover",
         "version": package_version(),
@@ -85,8 +90,10 @@ def run(config: Config, options: Options, out: Path) -> None:
     weights = {
         REPAIR: plan.repair.population * plan.repair.generations * float(plan.steps) / 2,
         DIAGNOSIS: plan.diagnosis.population * plan.diagnosis.generations * share / 4,
+        POLISHED: plan.polish * NEIGHBOURS * share / 2,
     }
-    evaluator = evaluator_of(config)
+    with starting(console, WORKERS[config.evaluator.name]):
+        evaluator = evaluator_of(config)
     with (
         RunWriter(path, robot, metadata, {"config.yaml": config_yaml(config, options).encode()}) as writer,
         PassProgress(console, passes, weights) as progress,
@@ -94,7 +101,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         # Slow to load, and needed only later: done while the first controllers run.
         Thread(target=_load, args=("scipy.stats", "ee_dist.viewing.rerun_scene"), daemon=True).start()
         observer = Observers(Recorder(writer), digest, beliefs, progress)
-        result = recover(robot, intact, changed, metric, plan, evaluator, search_seed, observer)
+        result = recover(robot, first, later, metric, plan, evaluator, search_seed, observer)
         truth = changed.reveal()
         writer.finish({"result_digest": digest.hex, "truth": json.dumps([t.as_dict() for t in truth])})
     counts = evaluator.counts
@@ -143,7 +150,7 @@ def _load(*modules: str) -> None:
 
 
 def _print(console: Console, result: Recovery, truth: Hypothesis, final: Score) -> None:
-    table = Table(box=SIMPLE, pad_edge=False)
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("trial")
     table.add_column("distance\n(m)", justify="right")
     table.add_column("of\nintact", justify="right")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
-from scipy.stats import mannwhitneyu
+from scipy.stats import false_discovery_control, mannwhitneyu
 
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.folder import write_whole
@@ -47,10 +48,11 @@ def run(config: Config, options: Options, out: Path) -> None:
     writer.writerows(rows)
     write_whole(out / "study.csv", table.getvalue())
     write_whole(out / "study.md", markdown(rows))
+    lines = by_case(rows)
     _print(console, rows)
     totals = total(rows)
     write_summary(out, "study", config, options, watch, digest_of(rows), {"runs": len(rows), "totals": totals})
-    write_figures(runs, out / "figures.html")
+    write_figures(runs, {(x["metric"], x["scenario"]): p_text(x) for x in lines}, CAPTION, out / "figures.html")
     for name in ("study.csv", "study.md", "figures.html"):
         console.print(f"  {out / name}", highlight=False, soft_wrap=True)
 
@@ -102,7 +104,8 @@ def total(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """A line for each scenario and metric; p is of the last trial against the one after the change (Mann-Whitney)."""
+    """A line for each scenario and metric. ``p`` is of the last trial against the one after the change (Mann-Whitney, two
+    sides), ``p_corrected`` that for as many cases as the metric has (Benjamini and Hochberg); with one run there is none."""
     groups: dict[tuple[str, int], list[dict[str, Any]]] = defaultdict(list)
     for r in rows:
         groups[r["metric"], r["scenario"]].append(r)
@@ -119,25 +122,44 @@ def by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
             "right": sum(bool(r["right"]) for r in mine),
             "named": sum(r["found"] == r["true"] for r in mine),
             "p": p,
+            "p_corrected": float("nan"),
         })  # fmt: skip
+    for metric in {x["metric"] for x in lines}:
+        tested = [x for x in lines if x["metric"] == metric and math.isfinite(x["p"])]
+        if tested:
+            for x, corrected in zip(tested, false_discovery_control([x["p"] for x in tested]), strict=True):
+                x["p_corrected"] = float(corrected)
     return lines
 
 
+CAPTION = (
+    "Bars are means over runs, whiskers standard deviations, dots the runs. p: last trial against the trial after the change, "
+    "Mann-Whitney U test, two-sided, corrected for the number of cases by Benjamini and Hochberg."
+)
+
+
+def p_text(line: dict[str, Any]) -> str:
+    """What the test says of a case, for a figure."""
+    if not math.isfinite(line["p_corrected"]):
+        return "one run: no test"
+    return "p < 0.001" if line["p_corrected"] < 0.001 else f"p = {line['p_corrected']:.2g}"
+
+
 HEAD = (
-    "case", "runs", "intact (m)", "after (m)", "best trial (m)", "trial 4 (m)", "restored", "diagnosis right",
-    "truth named", "p",
+    "case", "runs", "intact (m)", "after (m)", "best trial (m)", "last trial (m)", "restored", "diagnosis right",
+    "truth named", "p (corrected)",
 )  # fmt: skip
 
 
-SHORT = ("case", "runs", "intact", "after", "best", "trial 4", "restored", "right", "named", "p")
+SHORT = ("case", "runs", "intact", "after", "best", "last", "restored", "right", "named", "p")
 """The same for a terminal of 80 columns."""
 
 
 def cells(line: dict[str, Any]) -> list[str]:
-    n = line["runs"]
+    n, p = line["runs"], "-" if math.isnan(line["p_corrected"]) else f"{line['p_corrected']:.2g}"
     return [
         str(line["scenario"]), str(n), *(f"{line[k]:.2f}" for k in ("intact_m", "after_m", "best_m", "last_m")),
-        f"{line['restored']}/{n}", f"{line['right']}/{n}", f"{line['named']}/{n}", f"{line['p']:.2g}",
+        f"{line['restored']}/{n}", f"{line['right']}/{n}", f"{line['named']}/{n}", p,
     ]  # fmt: skip
 
 
@@ -153,14 +175,16 @@ def markdown(rows: list[dict[str, Any]]) -> str:
         parts.append(
             f"\nRestored ({RESTORED:.0%} of intact or more in one of the compensating trials): {counts['restored']} of {n}. "
             f"Diagnosis right (every true effect at its place and no other): {counts['right']} of {n}; "
-            f"all true effects named: {counts['true_among_believed']} of {n}.\n"
+            f"all true effects named: {counts['true_among_believed']} of {n}. {CAPTION.split('. ', 1)[1]}\n"
         )
     return "\n".join(parts) + "\n"
 
 
 def _print(console: Console, rows: list[dict[str, Any]]) -> None:
     for metric, counts in total(rows).items():
-        table = Table(title=f"{metric}, distances in m", box=SIMPLE, pad_edge=False, title_justify="left")
+        table = Table(
+            title=f"{metric}, distances in m", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False, title_justify="left"
+        )
         for name in SHORT:
             table.add_column(name, justify="right", no_wrap=True)
         for line in by_case(rows):
@@ -170,3 +194,4 @@ def _print(console: Console, rows: list[dict[str, Any]]) -> None:
         n = counts["runs"]
         console.print(f"restored {counts['restored']}/{n}, diagnosis right {counts['right']}/{n}, "
                       f"all true effects named {counts['true_among_believed']}/{n}", highlight=False)  # fmt: skip
+    console.print(CAPTION.split(". ", 1)[1], style="dim", highlight=False)

@@ -28,8 +28,10 @@ from ee_dist.tasks.folder import write_whole
 from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.seal import FILE, sealed
 from ee_dist.tasks.summary import Stopwatch, package_version, write_summary
+from ee_dist.tasks.unfinished import remembered
 from ee_dist.tasks.wiring import build_robot, engine_maker
 from ee_dist.trials.excitation import Excitation, parse
+from ee_dist.trials.hardware import Hardware
 from ee_dist.trials.log import SensorLog
 from ee_dist.trials.noise import with_noise
 
@@ -77,6 +79,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "floor": PhysicalRobot(engine, robot, hidden, floor_seed),
         "stand": PhysicalRobot(engine, robot, (*hidden, term("on_stand")), stand_seed),
     }
+    tried = {name: remembered(name, body, robot) for name, body in hardware.items()}
     path, sums = out / "trial.mcap", hashlib.sha256()
     table = Table(title=f"Trials of {robot.name}, hidden change sealed", title_justify="left")
     for column in ("trial", "what was done", "seconds", "rows"):
@@ -85,7 +88,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     write_whole(out / FILE, text)
     with RunWriter(path, robot, metadata) as writer:
         for k, excitation in enumerate(plan * options.repeats):
-            log, record = one_trial(hardware[excitation.fixture], excitation, robot, k)
+            log, record = one_trial(tried[excitation.fixture], excitation, robot, k)
             writer.trial(record)
             sums.update(np.ascontiguousarray(log.sensors).tobytes())
             table.add_row(str(k + 1), str(excitation), f"{excitation.seconds:g}", str(len(log)))
@@ -107,9 +110,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     )
 
 
-def one_trial(
-    hardware: PhysicalRobot, excitation: Excitation, robot: Robot, index: int
-) -> tuple[SensorLog, TrialRecord]:
+def one_trial(hardware: Hardware, excitation: Excitation, robot: Robot, index: int) -> tuple[SensorLog, TrialRecord]:
     """Run it, and write down what the experimenter knows: what was sent, and what the sensors said."""
     driver = driver_of(excitation, robot)
     log = hardware.trial(driver, excitation.steps(robot))

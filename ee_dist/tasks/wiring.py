@@ -12,12 +12,14 @@ from ee_dist.effects.catalogue import load_plugin
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
+from ee_dist.evaluation.journal import JournaledEvaluator
 from ee_dist.evaluation.ray_actors import RayEvaluator
 from ee_dist.evaluation.ray_session import stop_ray
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.describe import robot_of
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config
+from ee_dist.tasks.unfinished import note_in
 
 ONE_JOINT = "one_joint"
 LARGE = 1024
@@ -90,9 +92,11 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
                 engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address
             )
             leaving.arm()  # Ray has put handlers of its own in place
+        inner = JournaledEvaluator(inner)
         _kept[key] = CachedEvaluator(inner) if settings.cache else inner
     evaluator = _kept[key]
     evaluator.counts.reset()
+    note_in(evaluator)
     return evaluator
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import html
+import textwrap
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,59 +13,125 @@ import numpy as np
 import plotly.graph_objects as go
 import plotly.io as pio
 
+STAGES = {"intact": "#8a94a6", "after the change": "#e08a1e", "last trial": "#3b7dd8"}
+"""What the bars of a case are, and their colours."""
+METRICS = {"rolling_mean": "diagnosed by rolling means", "distance": "diagnosed by distance"}
+LINES = ("#3b7dd8", "#e08a1e", "#7a5bd0", "#2f9e6e")
+LABEL = 13
+"""Characters of a line of a case's name below its bars."""
+ROOM = 0.12
+"""Free share of the axis beyond the farthest bar with its spread."""
+BUTTONS = [["toImage", "zoom2d", "pan2d", "resetScale2d"]]
+"""All that a figure offers: nothing that sends it anywhere."""
+_STYLE = (
+    "body{font-family:system-ui,sans-serif;max-width:1100px;margin:2rem auto;padding:0 1rem;color:#1c2330;"
+    "background:#fff}p{color:#55606f}@media(prefers-color-scheme:dark){body{color:#dfe4ec;background:#12151c}p{color:#9aa4b2}}"
+)
 
-def write_figures(summaries: Sequence[dict[str, Any]], path: Path) -> None:
-    """``summaries`` are those of recover runs."""
-    figures = [distances(summaries), dominants(summaries)]
-    body = "\n".join(pio.to_html(f, full_html=False, include_plotlyjs=k == 0) for k, f in enumerate(figures))
-    title = "ee_dist: a study of " + str(len(summaries)) + " runs"
+Tests = Mapping[tuple[str, int], str]
+"""By metric and scenario what a test said, in a few words."""
+
+
+def write_figures(summaries: Sequence[dict[str, Any]], tests: Tests, caption: str, path: Path) -> None:
+    """``summaries`` are those of recover runs; ``caption`` names the test, its correction and what bars and lines are."""
+    metrics = sorted({s["metric"] for s in summaries})
+    figures = [distances([s for s in summaries if s["metric"] == m], m, tests) for m in metrics]
+    figures.append(dominants(summaries))
+    config = {"displaylogo": False, "modeBarButtons": BUTTONS, "responsive": True}
+    body = "\n".join(
+        pio.to_html(f, full_html=False, include_plotlyjs=k == 0, config=config) for k, f in enumerate(figures)
+    )
+    title = f"A study of {len(summaries)} runs"
     page = (
         f"<!doctype html><html lang='en'><head><meta charset='utf-8'><title>{title}</title>"
-        "<style>body{font-family:system-ui,sans-serif;max-width:1100px;margin:2rem auto}</style></head>"
-        f"<body><h1>{title}</h1>{body}</body></html>"
+        "<meta name='viewport' content='width=device-width,initial-scale=1'>"
+        f"<style>{_STYLE}</style></head><body><h1>{title}</h1><p>{html.escape(caption)}</p>{body}</body></html>"
     )
     path.write_text(page, encoding="utf-8")
 
 
-def distances(summaries: Sequence[dict[str, Any]]) -> go.Figure:
-    """Mean distance intact, after the change and at the last trial, for each case and metric."""
+def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) -> go.Figure:
+    """Mean forward distance intact, after the change and at the last trial for each case, every run as a dot."""
+    groups: dict[int, list[dict[str, Any]]] = defaultdict(list)
+    for s in summaries:
+        groups[s["scenario"]].append(s)
+    cases = sorted(groups)
     figure = go.Figure()
-    metrics = sorted({s["metric"] for s in summaries})
-    for metric in metrics:
-        groups: dict[int, list[dict[str, Any]]] = defaultdict(list)
-        for s in summaries:
-            if s["metric"] == metric:
-                groups[s["scenario"]].append(s["distance_m"])
-        cases = sorted(groups)
-        for name in ("intact", "after the change", "last trial"):
-            values = [[_distance(d, name) for d in groups[c]] for c in cases]
-            figure.add_bar(
-                x=[str(c) for c in cases],
-                y=[float(np.mean(v)) for v in values],
-                error_y={"type": "data", "array": [float(np.std(v)) for v in values]},
-                name=f"{name} ({metric})" if len(metrics) > 1 else name,
-            )
-    figure.update_layout(title="Forward distance, mean and standard deviation over runs", barmode="group")
-    figure.update_xaxes(title="scenario", type="category")
-    figure.update_yaxes(title="distance (m)")
+    low, high = 0.0, 0.0
+    for k, (name, colour) in enumerate(STAGES.items()):
+        values = [np.array([_distance(s["distance_m"], name) for s in groups[c]]) for c in cases]
+        means, spread = [float(v.mean()) for v in values], [float(v.std()) for v in values]
+        # Cases stand at whole numbers, the bars of a case and the dots of its runs beside each other.
+        at = [i + (k - 1) * 0.27 for i in range(len(cases))]
+        figure.add_bar(
+            x=at,
+            y=means,
+            width=0.25,
+            name=name,
+            marker_color=colour,
+            opacity=0.75,
+            error_y={"array": spread, "width": 3},
+        )
+        figure.add_scatter(
+            x=[a for a, v in zip(at, values, strict=True) for _ in v],
+            y=[float(x) for v in values for x in v],
+            mode="markers",
+            marker={"color": colour, "size": 5, "line": {"color": "#ffffff", "width": 0.5}},
+            showlegend=False,
+            hovertemplate=f"{name}: %{{y:.2f}} m<extra></extra>",
+        )
+        for v, mean, wide in zip(values, means, spread, strict=True):
+            low, high = min(low, mean - wide, float(v.min())), max(high, mean + wide, float(v.max()))
+    room = ROOM * ((high - low) or 1.0)
+    for i, c in enumerate(cases):
+        told = tests.get((metric, c))
+        if told:
+            figure.add_annotation(x=i, y=high + room / 2, text=told, showarrow=False, font_size=11)
+    _styled(figure, f"How far the robot went forward, {METRICS.get(metric, metric)}", "distance (m)")
+    figure.update_layout(barmode="overlay")
+    labels = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}") for c in cases]
+    figure.update_xaxes(
+        tickmode="array", tickvals=list(range(len(cases))), ticktext=labels, tickangle=0, tickfont_size=10
+    )
+    figure.update_yaxes(range=[low - (room if low < 0 else 0.0), high + room])
     return figure
+
+
+def dominants(summaries: Sequence[dict[str, Any]]) -> go.Figure:
+    """New bests found so far in the diagnosis passes, mean over passes and runs, for each metric."""
+    figure = go.Figure()
+    for k, metric in enumerate(sorted({s["metric"] for s in summaries})):
+        curves = [c for s in summaries if s["metric"] == metric for c in s["dominants"]["diagnosis"]]
+        shortest = min(map(len, curves))
+        mean = np.mean([c[:shortest] for c in curves], axis=0)
+        name = METRICS.get(metric, metric)
+        line = {"color": LINES[k % len(LINES)]}
+        figure.add_scatter(x=list(range(shortest)), y=[float(v) for v in mean], name=name, mode="lines", line=line)
+    _styled(figure, "Dominants: new best hypotheses found so far in a diagnosis pass", "new bests so far")
+    figure.update_xaxes(title="generation", rangemode="tozero", tickformat="d")
+    figure.update_yaxes(rangemode="tozero")
+    return figure
+
+
+def _styled(figure: go.Figure, title: str, y_title: str) -> None:
+    """One style for all figures."""
+    figure.update_layout(
+        template="plotly_white",
+        title={"text": title, "x": 0.0, "xref": "paper", "font": {"size": 17}},
+        font={"family": "system-ui, sans-serif", "size": 13},
+        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0},
+        margin={"l": 60, "r": 20, "t": 90, "b": 110},
+        height=470,
+        showlegend=True,
+    )
+    figure.update_yaxes(title=y_title)
+
+
+def _wrapped(text: str) -> str:
+    return "<br>".join(textwrap.wrap(text, LABEL))
 
 
 def _distance(distances_m: dict[str, Any], name: str) -> float:
     if name == "last trial":
         return float(distances_m["trials"][-1])
     return float(distances_m["intact" if name == "intact" else "after"])
-
-
-def dominants(summaries: Sequence[dict[str, Any]]) -> go.Figure:
-    """New bests found so far in the diagnosis passes, mean over passes and runs, for each metric."""
-    figure = go.Figure()
-    for metric in sorted({s["metric"] for s in summaries}):
-        curves = [c for s in summaries if s["metric"] == metric for c in s["dominants"]["diagnosis"]]
-        shortest = min(map(len, curves))
-        mean = np.mean([c[:shortest] for c in curves], axis=0)
-        figure.add_scatter(x=list(range(shortest)), y=[float(v) for v in mean], name=metric)
-    figure.update_layout(title="Dominants of the diagnosis passes (new bests so far)", showlegend=True)
-    figure.update_xaxes(title="generation")
-    figure.update_yaxes(title="dominants")
-    return figure

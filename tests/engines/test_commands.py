@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from engine_robots import MASS_KG, at, one_joint, run
 
-from ee_dist.engines.contract import Engine
+from ee_dist.engines.contract import Engine, Rollout
+from ee_dist.engines.drivers import Commands
 from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import command_span, command_unit
@@ -67,6 +68,22 @@ def test_an_elastic_transmission_carries_a_torque_command(any_engine: Engine) ->
     push = np.full((1, 1), 3.0)
     plain, soft = (run(any_engine, slide(command="torque", compliance=c), 300, commands=push) for c in (0.0, 1e-3))
     assert soft.channel("velocity")[-1] == pytest.approx(plain.channel("velocity")[-1], rel=0.02)
+
+
+def test_a_known_force_from_outside_moves_the_slide_and_is_not_the_drives(any_engine: Engine) -> None:
+    still = Commands(np.zeros((1, 1)))
+    push = np.full((501, 1), 3.0)
+    jobs = [
+        Rollout(slide(command="torque", coulomb=c), still, 501, pose=True, external=push * share)
+        for c, share in ((0.0, 1.0), (2.0, 1.0), (2.0, 0.5))
+    ]
+    free, rubbing, held = any_engine.rollout(jobs)
+    assert free.channel("velocity")[-1] == pytest.approx(3.0 / MASS_KG, rel=1e-3)
+    assert rubbing.channel("velocity")[-1] == pytest.approx(1.0 / MASS_KG, rel=0.02)
+    assert np.abs(held.channel("position")).max() < 1e-5
+    assert free.torques is not None
+    assert not free.torques.any()
+    assert len({job.key for job in jobs}) == 3
 
 
 @pytest.mark.parametrize(

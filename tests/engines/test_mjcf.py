@@ -94,8 +94,8 @@ def test_an_arm_moves_as_mujoco_says(arm: Path) -> None:
     # The elbow's ctrl counts with gear 2 and a gain twice its stiffness: one unit is one radian at the joint.
     expected = native(arm, robot, commands[:, :3])
     assert log.joints is not None
-    # Friction of joints is the drive path's own, implicit in another way than MuJoCo's.
-    assert (np.abs(log.joints - expected).max(axis=0) < 2e-3 * np.ptp(expected, axis=0)).all()
+    # Friction of joints is the drive path's own, implicit in another way than MuJoCo's; a soft controller is explicit.
+    assert (np.abs(log.joints - expected).max(axis=0) < 5e-3 * np.ptp(expected, axis=0)).all()
     assert np.ptp(expected, axis=0).min() > 0.003
     assert not any("actuator b" in n for n in notes)
 
@@ -185,7 +185,7 @@ def test_a_description_goes_on_top_of_an_mjcf(arm: Path, tmp_path: Path) -> None
 
 
 def test_a_controller_too_steep_for_a_step_is_held_by_mujoco_and_refused_by_pybullet(arm: Path) -> None:
-    robot, _ = load_robot(arm)
+    robot = load_robot(arm)[0].with_drive("shoulder", kp=9000.0, kd=3000.0)
     job = [Rollout(robot, Commands(np.array([[0.5, -0.4, 0.0, 0.0]])), 300, pose=True)]
     (log,) = MuJoCoEngine(threads=1).rollout(job)
     assert log.joints is not None

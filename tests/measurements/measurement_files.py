@@ -25,6 +25,23 @@ STEP_S = 0.01
 START_NS = 1_700_000_000 * 10**9
 
 
+LINK = """<link name="{0}"><inertial><origin xyz="0 0 -0.1"/><mass value="0.3"/>
+<inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="0 0 -0.2"/><axis xyz="0 1 0"/>
+<limit lower="-1.7" upper="1.7" effort="5" velocity="9"/></joint>"""
+
+
+def robot_file(folder: Path, joints: tuple[str, ...] = JOINTS) -> Path:
+    """The description of a hanging chain of joints, with sensors by default: positions and speeds."""
+    links = ["base", *(f"link_{j}" for j in joints)]
+    parts = ['<link name="base"/>', *(LINK.format(n) for n in links[1:])]
+    parts += [JOINT.format(j, links[k], links[k + 1]) for k, j in enumerate(joints)]
+    (folder / "chain.urdf").write_text(f'<robot name="chain">{"".join(parts)}</robot>')
+    drives = "".join(f"  {j}: {{kp: 20, speed_limit: 8}}\n" for j in joints)
+    (folder / "chain.yaml").write_text(f"urdf: chain.urdf\ntime_step_s: {STEP_S}\ndrives:\n{drives}")
+    return folder / "chain.yaml"
+
+
 def motion() -> dict[str, np.ndarray]:
     """t (T,) on exact hundredths; q, w, g (T, 2): positions, speeds, commands that lead by 40 ms."""
     t = np.arange(ROWS) * 10 / 1000
@@ -66,7 +83,7 @@ def json_columns(folder: Path) -> Path:
 
 def json_lines(folder: Path) -> Path:
     m = motion()
-    rows = [{"t": m["t"][i], "state": {k: m[k][i].tolist() for k in "qwg"}} for i in range(ROWS)]
+    rows = [{"t": m["t"][i], "log": {k: m[k][i].tolist() for k in "qwg"}} for i in range(ROWS)]
     (folder / "run.jsonl").write_text("\n".join(json.dumps(r) for r in rows))
     return folder / "run.jsonl"
 
@@ -329,7 +346,7 @@ FORMATS: dict[str, tuple[Callable[[Path], Path], Where]] = {
     "json columns": (json_columns, _flat("t")),
     "json lines": (
         json_lines,
-        {"t": ("", "t")} | {k: (t, f"state.{c}") for k, (t, c) in _flat("t").items() if k != "t"},
+        {"t": ("", "t")} | {k: (t, f"log.{c}") for k, (t, c) in _flat("t").items() if k != "t"},
     ),
     "npz": (npz, _flat("t")),
     "mat": (mat, _flat("t", before="run.")),

@@ -142,6 +142,13 @@ def test_a_wrong_urdf_is_one_clear_line(tmp_path: Path, edits: dict[str, object]
     assert "arm.urdf" in str(caught.value)
 
 
+def test_a_xacro_says_how_it_becomes_a_urdf(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf.xacro"
+    file.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:macro name="m"/></robot>')
+    with pytest.raises(UrdfError, match=r"is a xacro, .*run 'xacro arm.urdf.xacro > robot.urdf'"):
+        load_robot(file)
+
+
 def test_broken_xml_names_the_line(tmp_path: Path) -> None:
     file = tmp_path / "cut.urdf"
     file.write_text(ARM.read_text()[:400])

@@ -6,8 +6,9 @@ import io
 
 from rich.console import Console
 
-from ee_dist.recording.records import REPAIR, GenerationRecord
-from ee_dist.tasks.progress import PassProgress
+from ee_dist.effects.catalogue import Term
+from ee_dist.recording.records import DIAGNOSIS, POLISHED, PRUNED, REPAIR, GenerationRecord, HypothesisRecord
+from ee_dist.tasks.progress import PassProgress, starting
 
 
 def test_a_finished_run_has_nothing_left_to_wait_for() -> None:
@@ -22,3 +23,29 @@ def test_a_finished_run_has_nothing_left_to_wait_for() -> None:
     lines = [line for line in out.getvalue().splitlines() if "left" in line]
     assert len(lines) == passes
     assert lines[-1].rstrip().endswith("about 0 s left")
+
+
+def test_what_is_done_before_the_first_bar_is_said() -> None:
+    out = io.StringIO()
+    console = Console(file=out, width=80)
+    with starting(console, "starting Ray and its workers"):
+        assert "starting Ray and its workers" in out.getvalue()
+    with PassProgress(console, {REPAIR: 2}, {REPAIR: 1.0}) as progress:
+        progress.pass_started(REPAIR, 0, 40)
+        assert "repair 1 of 2, 40 generations" in out.getvalue()
+
+
+def test_a_diagnosis_is_over_when_it_is_polished_and_told() -> None:
+    """The belief is told, not the best that evolved, and the time for polish is counted."""
+    out = io.StringIO()
+    with PassProgress(Console(file=out, width=80), {DIAGNOSIS: 1}, {DIAGNOSIS: 1.0, POLISHED: 3.0}) as progress:
+        progress.pass_started(DIAGNOSIS, 0, 1)
+        for k in range(2):
+            progress.generation(GenerationRecord(DIAGNOSIS, 0, k, 0.5, 0.6, 1, 10, 5))
+        assert "error" not in out.getvalue()
+        assert progress.done == progress.total / 4
+        lost = (Term("part_lost", "upper_rear_left"),)
+        progress.hypotheses([HypothesisRecord(0, 1, 0, lost, 0.25, final=True, stage=PRUNED)])
+        assert progress.done == progress.total
+    assert "diagnosis pass 1: error 0.25000 (evolved: 0.50000)" in out.getvalue()
+    assert "believes: part lost at upper rear left" in out.getvalue()

@@ -109,9 +109,14 @@ def _kinds(problem: Problem) -> list[object]:
 
 
 def cross_fit(
-    search: Search, starts: Sequence[tuple[Model, Array]], cut: Cut, widths: Sequence[float] = WIDTHS[2:]
+    search: Search,
+    starts: Sequence[tuple[Model, Array]],
+    cut: Cut,
+    widths: Sequence[float] = WIDTHS[2:],
+    leading: Array | None = None,
 ) -> list[HeldOut]:
-    """Each (model, start) fitted in every turn on what is not held out, and judged on the rest."""
+    """Each (model, start) fitted in every turn on what is not held out, and judged on the rest. ``leading`` (n, P0): slopes of
+    the first values, where all models have these in common."""
     problem = search.problem
     residuals = [np.zeros(len(problem.segment_of)) for _ in starts]
     seen, count = np.zeros(len(starts)), 0
@@ -121,7 +126,7 @@ def cross_fit(
         if mask.all():
             continue
         count += int(mask.sum())
-        for i, fit in enumerate(fit_all(search, starts, mask, widths, PRIOR)):
+        for i, fit in enumerate(fit_all(search, starts, mask, widths, PRIOR, leading)):
             residuals[i][~mask] = fit.residual[~mask]
             seen[i] += fit.energy
             fits[i].append(fit)

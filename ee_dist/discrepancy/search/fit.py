@@ -18,11 +18,13 @@ def fit_all(
     mask: Mask | None = None,
     widths: Sequence[float] = WIDTHS,
     prior: float = 0.0,
+    leading: Array | None = None,
 ) -> list[Fit]:
-    """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given."""
+    """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given. ``leading``: known
+    slopes of the first values (see slopes.py); a cloud needs none."""
     chosen = search.everything if mask is None else mask
     if not search.problem.rugged:
-        return follow_slopes(search, starts, chosen, widths, prior)
+        return follow_slopes(search, starts, chosen, widths, prior, leading)
     generations, seeds = effort_of(len(widths), search.problem.effort)
     return follow_cloud(search, starts, chosen, generations, seeds, prior=prior)
 

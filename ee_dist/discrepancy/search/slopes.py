@@ -42,12 +42,17 @@ def follow_slopes(
     mask: Mask,
     widths: Sequence[float] = WIDTHS,
     prior: float = 0.0,
+    leading: Array | None = None,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given.
 
     ``prior``: energy that a value at its bound costs beside one at neutral, so that a value which these data do not
-    determine says nothing about others.
+    determine says nothing about others. ``leading`` (n, P0): slopes of the first P0 values, where they are known for all
+    models alike. Only trials with values in the mask are simulated on the way.
     """
+    whole, needed = search, np.unique(search.problem.trial_of[mask]).tolist()
+    search = search.among(needed if search.trials is None else [k for k in search.trials if k in set(needed)])
+    known = None if leading is None else leading[mask]
     runs = [_Run(m, np.clip(np.asarray(u, float), m.lower, m.upper)) for m, u in starts]
 
     def evaluate(points: Sequence[tuple[_Run, Array]]) -> list[tuple[float, Array]]:
@@ -63,10 +68,13 @@ def follow_slopes(
         run.energy, run.residual = value, r
     moving = [run for run in runs if len(run.u)]
     for step, width in enumerate(widths):
-        _slopes(moving, width, mask, evaluate)
+        _slopes(moving, width, mask, evaluate, known)
         _steps(moving, mask, evaluate, prior)
         search.progress("fitting", (step + 1) / len(widths))
     out = []
+    if len(needed) < len(search.problem.trials):
+        for run, r in zip(runs, whole.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
+            run.residual = r
     for run in runs:
         assert run.residual is not None
         slopes = run.slopes if run.slopes is not None else np.zeros((int(mask.sum()), len(run.u)))
@@ -75,11 +83,13 @@ def follow_slopes(
     return out
 
 
-def _slopes(runs: Sequence[_Run], width: float, mask: Mask, evaluate: Evaluate) -> None:
-    """Derivatives over ``width`` (narrower for a small value), towards the inside; a better point found is taken."""
+def _slopes(runs: Sequence[_Run], width: float, mask: Mask, evaluate: Evaluate, leading: Array | None = None) -> None:
+    """Derivatives over ``width`` (narrower for a small value), towards the inside; a better point found is taken. Those of
+    the first values may be known (``leading``)."""
     points = []
+    first = 0 if leading is None else leading.shape[1]
     for run in runs:
-        for k in range(len(run.u)):
+        for k in range(first, len(run.u)):
             h = min(width, 0.3 * abs(run.u[k]) + 0.2 * width)
             u = run.u.copy()
             u[k] += h if u[k] + h <= run.model.upper[k] else -h
@@ -88,9 +98,9 @@ def _slopes(runs: Sequence[_Run], width: float, mask: Mask, evaluate: Evaluate) 
     at = 0
     for run in runs:
         assert run.residual is not None
-        columns = []
+        columns = [] if leading is None else list(leading.T)
         best = (run.energy, run.u, run.residual)
-        for k in range(len(run.u)):
+        for k in range(first, len(run.u)):
             (value, r), (_, u) = found[at], points[at]
             at += 1
             gap = u[k] - run.u[k]
@@ -124,3 +134,18 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, prior: float) -
     for (run, u), (value, r) in zip(points, evaluate(points), strict=True):
         if value < run.energy:
             run.energy, run.u, run.residual = value, u, r
+
+
+def slopes_at(search: Search, model: Model, u: Array, width: float = WIDTHS[2]) -> Array:
+    """(n, P) derivatives of the residual of a model at u, over ``width``."""
+    points = [u]
+    for k in range(len(u)):
+        moved = u.copy()
+        moved[k] += width if u[k] + width <= model.upper[k] else -width
+        points.append(moved)
+    rows = search.residuals([model.hypothesis(v) for v in points])
+    columns = [
+        (r - rows[0]) / (v[k] - u[k]) if np.isfinite(r).all() else np.zeros(len(r))
+        for k, (v, r) in enumerate(zip(points[1:], rows[1:], strict=True))
+    ]
+    return np.stack(columns, axis=1) if columns else np.zeros((rows.shape[1], 0))

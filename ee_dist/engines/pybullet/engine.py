@@ -9,7 +9,9 @@ import numpy as np
 import pybullet as p
 
 from ee_dist.engines.contract import EngineError, Rollout, Truth
+from ee_dist.engines.drive import hopeless_joints
 from ee_dist.engines.loop import gravity_vector, in_batches
+from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.pybullet.native import interface
 from ee_dist.engines.pybullet.reading import NativeReading, PublicReading, Reading
 from ee_dist.engines.pybullet.world import World, structure_key
@@ -76,6 +78,12 @@ class PyBulletEngine:
         return batches
 
     def _place(self, batch: Sequence[Rollout]) -> BulletBodies:
+        for joints in per_robot([r.model for r in batch], hopeless_joints):
+            if joints:
+                raise EngineError(
+                    f"pybullet cannot hold {joints[0]!r}: the damping of its controller stops it in less than a time step; "
+                    "use engine=mujoco, or a smaller time_step_s"
+                )
         placed: list[tuple[World, list[int]]] = []
         for rows in self._in_worlds(batch):
             models = [batch[i].model for i in rows]
@@ -108,7 +116,6 @@ class BulletBodies:
         self.engine = engine
         self.worlds = [world for world, _ in placed]
         motors = len(batch[0].model.drives)
-        self.names = batch[0].model.motor_names
         found = interface() if engine.native else None
         self.reading: Reading = PublicReading(placed, motors) if found is None else NativeReading(found, placed, motors)
         self.robots: list[tuple[int, int, int, list[int], list[int] | None]] = []
@@ -139,12 +146,6 @@ class BulletBodies:
         return truth
 
     def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
-        if give is not None and give.any():
-            joint = self.names[int(np.flatnonzero(give.any(axis=0))[0])]
-            raise EngineError(
-                f"pybullet cannot hold {joint!r}: the damping of its controller stops it in less than a time step; "
-                "use engine=mujoco, or a smaller time_step_s"
-            )
         send, simulate, mode = p.setJointMotorControlArray, p.stepSimulation, p.TORQUE_CONTROL
         values = torques.tolist()
         for row, client, body, links, motors in self.robots:

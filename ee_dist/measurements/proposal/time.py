@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.measurements.clocks import FASTEST_S, SLOWEST_S
 from ee_dist.measurements.proposal.blocks import series_of
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Hints
 from ee_dist.measurements.proposal.words import TIME, Reading, read_name, unit_word
@@ -13,8 +14,6 @@ from ee_dist.measurements.table import Table
 from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
 
-FASTEST_S, SLOWEST_S = 2e-4, 0.2
-"""Steps of a robot's log. A factor of 1000 lies between them, so the size of a step tells the unit."""
 TIMES = tuple(u for u, (kind, _) in UNITS.items() if kind == "time" and u in ("s", "ms", "us", "ns"))
 
 

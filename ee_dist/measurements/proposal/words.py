@@ -138,7 +138,9 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     elif unit is None and len(texts) > 1 and texts[-1] in _LETTERS and kinds:
         unit = _LETTERS[texts[-1]]
         texts = texts[:-1]
-    command = True if any(w in _COMMAND for w in texts) else False if any(w in _MEASURED for w in texts) else None
+    # A lone d behind a quantity is "desired": q_d, qd_d.
+    asked = any(w in _COMMAND for w in texts) or (len(texts) > 1 and texts[-1] == "d")
+    command = True if asked else False if any(w in _MEASURED for w in texts) else None
     kind, weak = _kind(kinds, texts, unit)
     return Reading(
         kind, command, unit, numbers[-1] if numbers else None, " ".join(texts), any(w in _SECOND for w in texts), weak

@@ -1,0 +1,1 @@
+"""A model for other simulators: what is native there, what a controller shim does, what cannot be said."""

@@ -1,0 +1,141 @@
+"""Which block is the commands, of the kind that the drives obey."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ee_dist.measurements.proposal import signals
+from ee_dist.measurements.proposal.blocks import Block
+from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
+from ee_dist.measurements.proposal.speeds import speed_units
+from ee_dist.measurements.proposal.torques import torque_units
+from ee_dist.measurements.proposal.units import LOOSE, UnitChoice, by_ratio
+from ee_dist.measurements.proposal.view import Scored, View
+from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE
+from ee_dist.measurements.robot_channels import command_kind
+
+
+def add_commands(v: View) -> None:
+    """The commands, or a question; none at all where torques were found, which a balance of forces does without."""
+    kinds = {command_kind(d) for d in v.robot.drives}
+    if len(kinds) > 1:
+        v.out.ask("commands: joints differ in what they obey (position, speed, torque); write them into the mapping")
+        return
+    kind = kinds.pop()
+    score: Callable[[View, Block], Scored | None] = {
+        "position": _as_position_command, "speed": _as_speed_command, "torque": _as_torque_command
+    }[kind]  # fmt: skip
+    # What neither is called a command nor goes with the motion is no rival.
+    found = [s for b in v.blocks if not b.used and (s := score(v, b)) is not None and s.score >= 2]
+    chosen = v.pick(sorted(found, key=lambda s: -s.score), 3.0)
+    names = list(v.robot.motor_names)
+    if chosen is None:
+        if any(c.group == "torques" for c in v.out.choices) and not found:
+            v.out.notes.append(
+                "no commands were found: the measured torques are taken as what was asked for"
+                if kind == "torque"
+                else "no commands were found: a balance of forces is the way to compare"
+            )
+            return
+        rivals = " or ".join(s.block.name for s in sorted(found, key=lambda s: -s.score)[:3])
+        told = f"commands: {rivals}?" if rivals else f"commands: no columns look like {kind}s that were asked for;"
+        v.out.ask(f"{told} write the right ones into the mapping")
+        for n in names:
+            v.out.choices.append(Choice("commands", n, {"column": "???"}, UNKNOWN, "not found"))
+        return
+    chosen.block.used = True
+    if kind == "torque":
+        units = torque_units(v, chosen.block)
+    else:
+        units = _position_command_units(v, chosen.block) if kind == "position" else speed_units(v, chosen.block)
+    if units.sure == UNKNOWN:
+        v.out.ask(f"commands ({chosen.block.name}): {units.why}; write the unit into the mapping")
+    level = SURE if chosen.block.reading.command else LIKELY
+    v.add("commands", names, chosen.block, units, chosen.why, level)
+
+
+def _as_position_command(v: View, b: Block) -> Scored | None:
+    r = b.reading
+    if r.command is False or not (r.kind in (POSITION, None) or r.weak) or not v.moves(b):
+        return None
+    if np.array_equal(b.values, v.position.block.values):
+        return None
+    ahead = v.lead(b, v.position.block)
+    step, fit = v.step(v.position.block), abs(ahead.correlation)
+    score = (3.0 if r.command else 0.0) + (r.kind == POSITION and not r.weak) - r.second
+    score += 2 if fit > 0.9 else 1 if fit > 0.7 else -3 if fit < 0.5 else 0
+    late = ahead.lead_s < -1.5 * step and fit > 0.7
+    score += 1 if ahead.lead_s > 0 else 0
+    if ahead.lead_s >= 0:
+        why = f"the positions follow it by {1e3 * ahead.lead_s:.0f} ms (correlation {ahead.correlation:.3f})"
+    else:
+        why = f"it follows the positions by {-1e3 * ahead.lead_s:.0f} ms, as no command should"
+    if late and r.command:
+        v.out.ask(f"commands ({b.name}): {why}; are they swapped with {v.position.block.name}? write the right columns")
+    return Scored(b, score - 3 * late, ["called a command", why] if r.command else [why])
+
+
+def _position_command_units(v: View, b: Block) -> UnitChoice:
+    """As the positions, unless its name or its ratio to them says otherwise."""
+    if not v.units.entries:
+        return UnitChoice((), UNKNOWN, "the unit of the positions is open")
+    values = v.on(v.position.block, b)
+    ahead = v.lead(b, v.position.block)
+    entries, why, sure = [], "in the unit of the positions", v.units.sure
+    shift = round(ahead.lead_s / v.step(v.position.block))
+    for k, base in enumerate(v.units.entries):
+        entry = dict(base)
+        stated = b.units[k] if b.units and b.units[k] in ("rad", "deg", "mrad", "turn", "m", "mm", "cm") else None
+        if values is not None and signals.moves(values[:, k]) and signals.moves(v.position.block.values[:, k]):
+            x, y = values[:, [k]], v.position.block.values[:, [k]]
+            r = (
+                signals.relation(x[: len(x) - shift], y[shift:])
+                if shift >= 0
+                else signals.relation(x[-shift:], y[:shift])
+            )
+            if abs(r.correlation) > 0.8:
+                allowed = ("rad", "deg", "turn") if v.joints[k].kind == "hinge" else ("m", "mm", "cm")
+                unit = str(base["unit"])
+                seen = by_ratio(r.slope, allowed, unit) if "scale" not in base else unit
+                if seen is None and by_ratio(r.slope, allowed[:2], unit, LOOSE) == unit:
+                    seen, why = unit, f"in the unit of the positions, which go {1 / abs(r.slope):.2g} of the way"
+                    sure = LIKELY
+                if seen is None or (stated and stated != seen):
+                    said = f", though its name says {stated}" if stated else ""
+                    return UnitChoice((), UNKNOWN, f"{r.slope:.3g} times the positions{said}")
+                if seen != unit:
+                    entry, why = {"unit": seen}, f"{seen} by its ratio to the positions"
+                if r.correlation < 0:
+                    entry["sign"] = -1
+                    why += "; sign turned: the positions run against it"
+        elif stated:
+            entry = {"unit": stated}
+        entries.append(entry)
+    return UnitChoice(tuple(entries), sure, why)
+
+
+def _as_speed_command(v: View, b: Block) -> Scored | None:
+    r = b.reading
+    if r.command is False or not (r.kind in (SPEED, None) or r.weak) or not v.moves(b):
+        return None
+    values = v.on(v.position.block, b)
+    if values is None:
+        return None
+    step = v.step(v.position.block)
+    ahead = signals.lead(values, signals.change(v.position.block.values, step), step)
+    fit = abs(ahead.correlation)
+    score = (
+        (3.0 if r.command else 0.0) + (r.kind == SPEED and not r.weak) + (2 if fit > 0.9 else 1 if fit > 0.7 else -2)
+    )
+    return Scored(
+        b, score, [f"the speeds follow it by {1e3 * ahead.lead_s:.0f} ms (correlation {ahead.correlation:.3f})"]
+    )
+
+
+def _as_torque_command(v: View, b: Block) -> Scored | None:
+    r = b.reading
+    if r.kind not in (TORQUE, CURRENT) or r.command is not True or r.weak:
+        return None
+    return Scored(b, 4.0 - 2 * r.second + (r.kind == TORQUE), ["called a commanded torque"])

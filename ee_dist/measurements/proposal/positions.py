@@ -1,0 +1,72 @@
+"""Which block is the measured positions."""
+
+from __future__ import annotations
+
+from ee_dist.measurements.proposal.model import UNKNOWN, Choice
+from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
+from ee_dist.measurements.proposal.words import POSITION, SPEED
+
+
+def ranked_positions(v: View) -> list[Scored]:
+    """Blocks that could be the positions, the best first."""
+    found = []
+    for b in v.blocks:
+        r = b.reading
+        if (r.kind not in (POSITION, None) and not r.weak) or not v.moves(b):
+            continue
+        score = 0.0
+        why: list[str] = []
+        if r.kind == POSITION:
+            score, why = (1.0, ["maybe a position by its letter"]) if r.weak else (2.0, ["called a position"])
+        if r.command is False:
+            score, why = score + 2, [*why, "called measured"]
+        elif r.command:
+            score -= 4
+        score -= r.second
+        rates = [(v.derivative(b, s).correlation, s) for s in v.blocks if s is not b and can_be(s, SPEED)]
+        best = max(rates, key=lambda x: x[0] if x[1].reading.command is not True else 0.0, default=(0.0, b))
+        if best[0] > 0.9:
+            score, why = score + 2 + best[0], [*why, f"its change is {best[1].name} (correlation {best[0]:.3f})"]
+        found.append(Scored(b, score, why))
+    return _told_by_lead(v, sorted(found, key=lambda s: -s.score))
+
+
+def _told_by_lead(v: View, found: list[Scored]) -> list[Scored]:
+    """Of two that could both be the positions, the one that follows the other was measured."""
+    for one in found[:4]:
+        for other in found[:4]:
+            if one is other or abs(one.score - other.score) >= TIED + 1 or one.block.reading.command is not None:
+                continue
+            ahead = v.lead(other.block, one.block)
+            if ahead.correlation > 0.9 and ahead.lead_s > 1.5 * v.step(one.block):
+                one.score += 1.5
+                one.why.append(f"follows {other.block.name} by {1e3 * ahead.lead_s:.0f} ms")
+    return sorted(found, key=lambda s: -s.score)
+
+
+def ask_for_positions(v: View) -> None:
+    """Why no block is the positions, as a question."""
+    ranked = ranked_positions(v)
+    n = len(v.joints)
+    names = ", ".join(v.robot.motor_names)
+    if len(ranked) > 1 and ranked[0].score >= 2:
+        v.out.ask(f"positions: {ranked[0].block.name} or {ranked[1].block.name}? write the right one into the mapping")
+    elif v.hints.joints is None and n > 1:
+        v.out.ask(
+            f"no columns can be told to be the positions of {names}; if they have no names, say task.joints=[...] "
+            "with the joints in the order of the columns, else write them into the mapping"
+        )
+    else:
+        v.out.ask(f"no columns look like the positions of {names}; write them into the mapping")
+    for m in v.robot.sensors:
+        v.out.choices.append(Choice("sensors", m.name, {"column": "???"}, UNKNOWN, "not found"))
+
+
+def add_positions(v: View) -> None:
+    """The position sensors, with a question where their unit is open."""
+    block = v.position.block
+    names = v.sensor_names("position")
+    if v.units.sure == UNKNOWN:
+        units = "deg or task.unit=percent" if block.table.header.get("format") == "lerobot" else "rad, deg, m or mm"
+        v.out.ask(f"positions ({block.name}): {v.units.why}; say task.unit={units}")
+    v.add("sensors", names, block, v.units, v.position.why)

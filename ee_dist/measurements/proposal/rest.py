@@ -1,0 +1,62 @@
+"""Sensors that no block could fill, switches and supply, and what is not used."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ee_dist.measurements.proposal.blocks import series_of
+from ee_dist.measurements.proposal.model import LIKELY, UNKNOWN, Choice
+from ee_dist.measurements.proposal.view import View
+from ee_dist.measurements.proposal.words import tokens
+from ee_dist.measurements.units import UNITS
+
+ENABLED = frozenset(["enable", "enabled", "active", "released", "powered", "on"])
+SUPPLY = frozenset(["supply", "volt", "volts", "voltage", "vin", "vbat", "battery", "bus"])
+
+
+def add_rest(v: View) -> None:
+    """Sensors that no block could fill."""
+    filled = {c.name for c in v.out.choices if c.group == "sensors"}
+    for s in v.robot.sensors:
+        if s.name not in filled:
+            exact = [(t, a) for t in v.recorded.tables for a in t.addresses() if a == s.name]
+            if len(exact) == 1:
+                place = {"table": exact[0][0].name} if len(v.recorded.tables) > 1 else {}
+                entry = place | {"column": exact[0][1], "unit": s.unit}
+                v.out.choices.append(Choice("sensors", s.name, entry, LIKELY, "a column of that name; unit assumed"))
+            else:
+                v.out.choices.append(Choice("sensors", s.name, {"column": "???"}, UNKNOWN, "not found"))
+                v.out.ask(
+                    f"{s.name} ({s.kind} of {s.target or 'the base'}): no column looks like it; write it into the mapping, "
+                    "or take the sensor out of the robot's description"
+                )
+
+
+def add_switches(v: View) -> None:
+    """What tells when drives obey, and the supply where the robot's drives depend on it; then what is not used at all."""
+    wants_supply = any(d.supply_nominal_v > 0 for d in v.robot.drives)
+    used = {(c.entry or {}).get("column") for c in v.out.choices}
+    left: list[str] = []
+    for table in v.recorded.tables:
+        place = {"table": table.name} if len(v.recorded.tables) > 1 else {}
+        for name, values in series_of(table).items():
+            if name in used or name == table.clock:
+                continue
+            words = set(tokens(name))
+            if words & ENABLED and set(np.unique(values)) <= {0.0, 1.0} and not v.has("enabled"):
+                why = "0 and 1, and called so: commands count where it is 1"
+                v.out.choices.append(Choice("enabled", "", place | {"column": name}, LIKELY, why))
+            elif wants_supply and words & SUPPLY and not words & {"motor"} and not v.has("supply"):
+                mean = float(np.mean(values))
+                nominal = max(d.supply_nominal_v for d in v.robot.drives)
+                unit = next((u for u in ("V", "mV") if 0.5 < mean * UNITS[u][1] / nominal < 2), None)
+                if unit is not None:
+                    why = f"called so, and about the nominal {nominal:g} V in {unit}"
+                    v.out.choices.append(Choice("supply", "", place | {"column": name, "unit": unit}, LIKELY, why))
+                else:
+                    left.append(name)
+            else:
+                left.append(name)
+    if left:
+        more = f" and {len(left) - 12} more" if len(left) > 12 else ""
+        v.out.notes.append(f"columns not used: {', '.join(left[:12])}{more}")

@@ -1,0 +1,92 @@
+"""Which block is the measured speeds, and in which unit: the one in which they are the change of the positions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from ee_dist.measurements.proposal import signals
+from ee_dist.measurements.proposal.blocks import Block
+from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
+from ee_dist.measurements.proposal.units import UnitChoice, by_ratio
+from ee_dist.measurements.proposal.view import Scored, View, can_be
+from ee_dist.measurements.proposal.words import SPEED
+
+SPEEDS = {"hinge": ("rad/s", "deg/s", "rpm"), "slide": ("m/s", "mm/s")}
+
+
+def add_speeds(v: View) -> None:
+    """The speed sensors: a block that is the change of the positions, or an estimate where there is none."""
+    names = v.sensor_names("velocity")
+    if not any(names):
+        return
+    found = []
+    for b in v.blocks:
+        if b.used or not can_be(b, SPEED) or b.reading.command:
+            continue
+        r = v.derivative(v.position.block, b)
+        score = (
+            (2.0 if b.reading.kind == SPEED and not b.reading.weak else 0.0)
+            + (b.reading.command is False)
+            - 1.5 * b.reading.second
+        )
+        # Of two that change with the positions the better by a power of ten is the measured one.
+        score -= 0.5 * math.log10(1 - abs(r.correlation) + 1e-6)
+        score += 3 if abs(r.correlation) > 0.9 else 1 if abs(r.correlation) > 0.6 else -3
+        found.append(Scored(b, score, [f"change of the positions (correlation {r.correlation:.3f})"]))
+    chosen = v.pick(sorted(found, key=lambda s: -s.score), 3.0)
+    positions = v.sensor_names("position")
+    if chosen is None:
+        able = [s.block.name for s in found if s.score >= 3]
+        why = (
+            f"{' or '.join(able)} could be it: estimated from the position"
+            if able
+            else "no column: estimated from the position"
+        )
+        for name, of in zip(names, positions, strict=True):
+            if name and of:
+                entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / v.step(v.position.block), 3))}
+                v.out.choices.append(Choice("sensors", name, entry, LIKELY if able else SURE, why))
+        return
+    chosen.block.used = True
+    v.add("sensors", names, chosen.block, speed_units(v, chosen.block), chosen.why)
+
+
+def speed_units(v: View, block: Block) -> UnitChoice:
+    """The unit in which the numbers are the change of the positions, with the sign that this takes."""
+    values = v.on(v.position.block, block)
+    if values is None or not v.units.entries:
+        return UnitChoice((), UNKNOWN, "the unit of the positions is open")
+    width = max(3, round(0.04 / v.step(v.position.block)))
+    truth = signals.change(v.metric(), v.step(v.position.block))
+    sure, why = SURE, ""
+    entries: list[dict[str, Any]] = []
+    for k, r in enumerate(signals.each(signals.smooth(signals.smooth(values, width), width), truth)):
+        kind = v.joints[k].kind
+        base = SPEEDS[kind][0]
+        seen = by_ratio(r.slope, SPEEDS[kind], base) if abs(r.correlation) > 0.8 else None
+        stated = block.units[k] if block.units and block.units[k] in SPEEDS[kind] else None
+        if seen is None and not signals.moves(values[:, k]):
+            seen = stated or (entries[-1]["unit"] if entries else base)
+        if stated and seen and stated != seen:
+            return UnitChoice((), UNKNOWN, f"the name says {stated}, but beside the positions it is {seen}")
+        if seen is None:
+            sure = LIKELY if stated else UNKNOWN
+            why = f"{stated or 'its unit'} could not be checked: {r.slope:.3g} times the change of the positions"
+        entry: dict[str, Any] = {"unit": seen or stated or "???"}
+        if r.correlation < -0.8:
+            entry["sign"] = -1
+        entries.append(entry)
+    _checks_time(v, entries, sure)
+    return UnitChoice(
+        tuple(entries) if sure != UNKNOWN else (), sure, why or f"{entries[0]['unit']} by its ratio to that change"
+    )
+
+
+def _checks_time(v: View, entries: list[dict[str, Any]], sure: str) -> None:
+    """A speed that is the change of the position in units of ours has checked the unit of the time, too."""
+    if sure == SURE and all(e["unit"] in ("rad/s", "m/s") for e in entries):
+        for k, c in enumerate(v.out.choices):
+            if c.group == "time" and c.sure == LIKELY:
+                v.out.choices[k] = replace(c, sure=SURE, why=f"{c.why}; speeds agree")

@@ -1,0 +1,198 @@
+"""Which block is the torques or motor currents, judged by what the motion needs."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from ee_dist.measurements.proposal import signals
+from ee_dist.measurements.proposal.blocks import BY_NUMBER, BY_PLACE, Block
+from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
+from ee_dist.measurements.proposal.units import UnitChoice
+from ee_dist.measurements.proposal.view import Scored, View
+from ee_dist.measurements.proposal.words import CURRENT, TORQUE
+from ee_dist.measurements.units import UNITS
+from ee_dist.robots.inverse_dynamics import joint_torques
+from ee_dist.robots.model import RobotError
+from ee_dist.trials.log import Array
+
+WINDOW_S = 0.06
+"""Of the means through which torques are compared with what the motion needs."""
+ROUGHER = 1.15
+"""What was measured is rougher than what was asked for, by this factor or more."""
+CLEARLY, WELL = 0.3, 0.3
+"""Another order of the joints is asked for if it leaves less than this share of what the robot's leaves, and of all."""
+
+
+def torques_needed(v: View, places: list[int] | None = None) -> tuple[Array, Array] | None:
+    """Torques (T, J) that the motion needs by the model without friction, and its speeds; None where it cannot say.
+    ``places``: the column that each joint has instead of its own."""
+    if not v.units.entries or v.robot.free_base:
+        return None
+    step = v.step(v.position.block)
+    q = signals.smooth(v.metric(), max(3, round(WINDOW_S / step)))
+    q = q if places is None else q[:, places]
+    speed = signals.change(q, step, WINDOW_S)
+    try:
+        found = joint_torques(v.robot, q, speed, signals.change(speed, step, WINDOW_S))
+    except (RobotError, np.linalg.LinAlgError):
+        return None
+    return (found, speed) if np.isfinite(found).all() else None
+
+
+def _beside_need(v: View, block: Block, places: list[int] | None = None) -> list[signals.Relation] | None:
+    """How a block goes with what the motion needs, joint by joint, friction left aside; None where that is not known."""
+    needed = v.needed if places is None else torques_needed(v, places)
+    if needed is None:
+        return None
+    values = v.on(v.position.block, block)
+    if values is None:
+        return None
+    need, speed = needed
+    values = values if places is None else values[:, places]
+    width = max(3, round(WINDOW_S / v.step(v.position.block)))
+    for _ in range(3):
+        values = signals.smooth(values, width)
+    found = []
+    for k in range(values.shape[1]):
+        own = speed[:, k]
+        friction = np.stack([own, np.tanh(own / (0.05 * np.abs(own).max() + 1e-12))], axis=1)
+        found.append(signals.beside(values[:, k], need[:, k], friction))
+    return found
+
+
+def _check_order(v: View, block: Block) -> None:
+    """Asks for the order of the joints where torques go with the motion in another order than the robot's."""
+    count = len(v.joints)
+    if block.how not in (BY_NUMBER, BY_PLACE) or v.hints.joints is not None or count < 2:
+        return
+    own = list(range(count))
+    orders = [list(p) for p in permutations(own)] if count <= 3 else [own, own[::-1]]
+    left = []
+    for places in orders:
+        relations = _beside_need(v, block, places)
+        left.append(sum(1 - r.correlation**2 for r in relations) / count if relations else 1.0)
+    best = int(np.argmin(left))
+    if left[best] < min(CLEARLY * left[0], WELL):
+        names = [v.joints[orders[best].index(k)].name for k in own]
+        v.out.ask(
+            f"joints: {block.name} leave {100 * left[best]:.0f} % of what the motion needs unexplained as those of "
+            f"{', '.join(names)}, {100 * left[0]:.0f} % in the robot's order; say task.joints=[...] as the columns are"
+        )
+
+
+def add_torques(v: View) -> None:
+    """The torque sensors and the torques of the drives, where a block is the one or the other."""
+    sensed = v.sensor_names("torque")
+    found = []
+    v.needed = torques_needed(v)
+    for b in v.blocks:
+        named = b.reading.kind in (TORQUE, CURRENT) and not b.reading.weak
+        if b.used or b.reading.command or not v.moves(b) or not (named or (b.how == BY_PLACE and v.hints.gains)):
+            continue
+        score = (
+            (3.0 if b.reading.kind == TORQUE else 2.0) + (1 if b.reading.command is False else 0) - 2 * b.reading.second
+        )
+        why = [f"called a {b.reading.kind}"] if named else []
+        if not named:
+            score, why = _as_current(v, b)
+        found.append(Scored(b, score, why))
+    chosen = v.pick(sorted(found, key=lambda s: -s.score))
+    if chosen is None:
+        if any(sensed):
+            rivals = " or ".join(s.block.name for s in found[:3])
+            v.out.ask(
+                f"torques: {rivals or 'no columns'}{'?' if rivals else ' look like them'}; write them into the mapping"
+            )
+            for n in sensed:
+                if n:
+                    v.out.choices.append(Choice("sensors", n, {"column": "???"}, UNKNOWN, "not found"))
+        return
+    chosen.block.used = True
+    units = torque_units(v, chosen.block)
+    _check_order(v, chosen.block)
+    level = LIKELY if chosen.block.how == BY_PLACE and chosen.block.reading.kind is None else SURE
+    if any(sensed):
+        v.add("sensors", sensed, chosen.block, units, chosen.why, level)
+    v.add("torques", list(v.robot.motor_names), chosen.block, units, chosen.why, level)
+
+
+def _as_current(v: View, block: Block) -> tuple[float, list[str]]:
+    """Whether a block without a name is the measured currents: it goes with the torques that the motion needs, and it is
+    no exact multiple of another, as what a controller computed would be."""
+    values, relations = v.on(v.position.block, block), _beside_need(v, block)
+    if values is None or relations is None:
+        return 0.0, []
+    fit = float(np.median([abs(r.correlation) for r in relations]))
+    if fit < 0.5:
+        return 0.0, []
+    if v.hints.gains is not None:
+        size = float(np.median([abs(r.slope) * abs(g) for r, g in zip(relations, v.gains(), strict=True)]))
+        if not 0.3 < size < 3:
+            return 1.0, [f"with your gains {size:.2g} times what the motion needs"]
+    score, why = (
+        3.0 + fit,
+        f"goes with the torques that the motion needs (correlation {fit:.2f}), as large with your gains",
+    )
+    for other in v.blocks:
+        if other is block or other.used or other.how != BY_PLACE or len(other.values) != len(block.values):
+            continue
+        alike = float(np.median([abs(r.correlation) for r in signals.each(block.values, other.values)]))
+        if alike > 0.7:
+            # Of what was asked for and what was measured the second is rougher.
+            rougher = signals.roughness(block.values) / max(signals.roughness(other.values), 1e-30)
+            score += 1 if rougher > ROUGHER else -2 if rougher < 1 / ROUGHER else 0
+            word = "rougher" if rougher > 1 else "smoother"
+            meant = "measured rather than asked for" if rougher > 1 else "asked for rather than measured"
+            why += f"; much like {other.name} but {word} ({max(rougher, 1 / rougher):.2g} times): {meant}"
+    return score, [why]
+
+
+def torque_units(v: View, block: Block) -> UnitChoice:
+    """N.m or N; a current through the gain that was said. A sign turned against the motion's need is turned back."""
+    kinds = ["N.m" if j.kind == "hinge" else "N" for j in v.joints]
+    current = block.reading.kind == CURRENT or (block.reading.kind is None and v.hints.gains is not None)
+    if current and v.hints.gains is None:
+        v.out.ask(f"torques: {block.name} are motor currents; say task.gains=[N.m per A, one for each joint]")
+        return UnitChoice((), UNKNOWN, "a current, whose gain no file can say")
+    relations = _beside_need(v, block) if not block.reading.command else None
+    entries, turned, unclear, checked = [], [], [], 0
+    for k, unit in enumerate(kinds):
+        stated = block.units[k] if block.units else None
+        entry: dict[str, Any] = {"unit": stated if stated in ("N.m", "mN.m", "N", "mN") else unit}
+        if current:
+            gain = v.gains()[k]
+            entry = {"unit": unit, "scale": gain * (1e-3 if stated == "mA" else 1.0)}
+        elif relations is not None and abs(relations[k].correlation) > 0.7:
+            size = UNITS[entry["unit"]][1] * abs(relations[k].slope)
+            if size > 200 and stated is None:
+                entry["unit"] = f"m{unit}"
+                size *= 1e-3
+            checked += 0.3 < size < 3
+            if not 0.05 < size < 20:
+                return UnitChoice((), UNKNOWN, f"{size:.3g} times what the motion needs in {entry['unit']}")
+        if relations is not None and relations[k].correlation < -0.4:
+            # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
+            r = relations[k]
+            size = abs(r.slope) * UNITS[entry["unit"]][1] * abs(float(entry.get("scale", 1.0)))
+            if r.correlation < -0.9 and 0.5 < size < 2:
+                entry["sign"] = -1
+                turned.append(v.joints[k].name)
+            elif r.correlation < -0.7 and 0.5 < size < 2:
+                v.out.ask(
+                    f"torques: {block.columns[k]} seems to run against what the motion of {v.joints[k].name} needs "
+                    f"(correlation {r.correlation:.2f}); if it does, add 'sign: -1' to it in the mapping"
+                )
+            else:
+                unclear.append(v.joints[k].name)
+        entries.append(entry)
+    why = "current times the gain you said" if current else f"{entries[0]['unit']}" + (
+        ", as large as the motion needs" if checked else ", the usual unit; not checked")  # fmt: skip
+    if turned:
+        why += f"; sign turned at {', '.join(turned)}: it was against what the motion needs"
+    if unclear:
+        why += f"; sign at {', '.join(unclear)} not clear, kept as it is: the model needs the other, but not this much"
+    stated_all = all(u in ("N.m", "mN.m", "N", "mN") for u in block.units) if block.units else False
+    return UnitChoice(tuple(entries), SURE if (current or stated_all) and not turned and not unclear else LIKELY, why)

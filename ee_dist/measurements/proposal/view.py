@@ -1,0 +1,154 @@
+"""What the steps of a proposal share: the recording on even grids, the robot, what is settled so far, and the choices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ee_dist.measurements.alignment import match, one_epoch
+from ee_dist.measurements.proposal import signals
+from ee_dist.measurements.proposal.blocks import BY_NAME, BY_NUMBER, BY_PLACE, Block
+from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
+from ee_dist.measurements.proposal.time import TimeChoice
+from ee_dist.measurements.proposal.units import UnitChoice
+from ee_dist.measurements.table import Recorded
+from ee_dist.measurements.units import UNITS
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+TIED = 1.0
+"""Scores closer than this are no decision."""
+
+
+@dataclass
+class Scored:
+    """A block for a role, with a score (2 and more is worth a thought) and the evidence."""
+
+    block: Block
+    score: float
+    why: list[str]
+
+
+class View:
+    """One proposal in the making. ``position`` and ``units`` are the block of the positions and its units, once known;
+    ``needed`` the torques (T, J) that the motion needs and its speeds."""
+
+    position: Scored
+    units: UnitChoice
+
+    def __init__(self, recorded: Recorded, robot: Robot, hints: Hints) -> None:
+        self.recorded, self.robot, self.hints = recorded, robot, hints
+        self.joints = [robot.joint(m) for m in robot.motor_names]
+        self.out = Proposal()
+        self.times: dict[str, TimeChoice] = {}
+        self.blocks: list[Block] = []
+        self.needed: tuple[Array, Array] | None = None
+
+    def even(self, block: Block) -> Block:
+        """The block on an even grid of its own median step, and no longer than it need be."""
+        times = self.times[block.table.name].seconds
+        step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+        count = min(int((times[-1] - times[0]) / step) + 1, signals.MOST_ROWS) if step > 0 else 0
+        at = times[0] + step * np.arange(max(count, 1))
+        return replace(block, values=np.stack([np.interp(at, times, c) for c in block.values.T], axis=1))
+
+    def step(self, block: Block) -> float:
+        times = self.times[block.table.name].seconds
+        return float(np.median(np.diff(times)))
+
+    def on(self, block: Block, other: Block) -> Array | None:
+        """``other`` on the grid of ``block``; None where their clocks have nothing in common."""
+        if other.table.name == block.table.name:
+            return other.values
+        a, b = self.times[block.table.name].seconds, self.times[other.table.name].seconds
+        if not (block.table.clock is not None and other.table.clock is not None) and not one_epoch(a, b):
+            found = match(
+                a[0] + self.step(block) * np.arange(len(block.values)), block.values,
+                b[0] + self.step(other) * np.arange(len(other.values)), other.values, held=False,
+            )  # fmt: skip
+            if not found.clear:
+                return None
+            b = b + found.offset_s
+        at = a[0] + self.step(block) * np.arange(len(block.values))
+        own = b[0] + self.step(other) * np.arange(len(other.values))
+        return np.stack([np.interp(at, own, c) for c in other.values.T], axis=1)
+
+    def derivative(self, position: Block, speed: Block) -> signals.Relation:
+        values = self.on(position, speed)
+        if values is None:
+            return signals.Relation(0.0, 0.0)
+        return signals.derivative(position.values, values, self.step(position))
+
+    def lead(self, command: Block, measured: Block) -> signals.Lead:
+        values = self.on(measured, command)
+        if values is None:
+            return signals.Lead(0.0, 0.0, 0.0, 0.0)
+        return signals.lead(values, measured.values, self.step(measured))
+
+    def pick(self, found: list[Scored], least: float = 2.0) -> Scored | None:
+        """The best, if it is good enough and clearly before the next; equal numbers are no rivals."""
+        if not found or found[0].score < least:
+            return None
+        for rival in found[1:]:
+            same = rival.block.values.shape == found[0].block.values.shape and np.allclose(
+                rival.block.values, found[0].block.values
+            )
+            if found[0].score - rival.score < TIED and not same:
+                return None
+        return found[0]
+
+    def moves(self, b: Block) -> bool:
+        return any(signals.moves(c) for c in b.values.T)
+
+    def order(self, block: Block) -> tuple[str, str]:
+        """How sure the joints of a block are, and why."""
+        if block.how in (BY_NUMBER, BY_PLACE) and self.hints.joints is None:
+            return LIKELY, f"joints {block.how}, in the robot's order"
+        if block.how in (BY_NUMBER, BY_PLACE):
+            return SURE, "joints in the order you said"
+        return SURE, "joint by its name" if block.how == BY_NAME else ""
+
+    def entry(self, block: Block, k: int, more: dict[str, Any]) -> dict[str, Any]:
+        place = {"table": block.table.name} if len(self.recorded.tables) > 1 else {}
+        return place | {"column": block.columns[k]} | more
+
+    def add(
+        self, group: str, names: list[str], block: Block, units: UnitChoice, why: list[str], sure: str = SURE
+    ) -> None:
+        order, how = self.order(block)
+        level = UNKNOWN if UNKNOWN in (units.sure, sure) else LIKELY if LIKELY in (units.sure, sure, order) else SURE
+        text = "; ".join(w for w in (*why, how, units.why) if w)
+        for name, k in zip(names, range(len(self.joints)), strict=True):
+            if not name:
+                continue
+            more = units.entries[k] if units.entries else {"unit": "???"}
+            still = "; does not move" if not signals.moves(block.values[:, k]) else ""
+            self.out.choices.append(Choice(group, name, self.entry(block, k, more), level, text + still))
+
+    def sensor_names(self, kind: str) -> list[str]:
+        """The sensor of a kind at each driven joint, "" where there is none."""
+        by_joint = {s.target: s.name for s in self.robot.sensors if s.kind == kind}
+        return [by_joint.get(j.name, "") for j in self.joints]
+
+    def metric(self) -> Array:
+        """Positions (T, J) in rad or m."""
+        out = np.empty_like(self.position.block.values)
+        for k, e in enumerate(self.units.entries):
+            size = UNITS[str(e["unit"])][1]
+            out[:, k] = (e.get("scale", 1.0) * self.position.block.values[:, k] + e.get("offset", 0.0)) * size
+        return out
+
+    def has(self, group: str) -> bool:
+        return any(c.group == group for c in self.out.choices)
+
+    def gains(self) -> list[float]:
+        """The gains in the order of the robot's drives."""
+        assert self.hints.gains is not None
+        order = list(self.hints.joints or self.robot.motor_names)
+        return [float(self.hints.gains[order.index(m)]) for m in self.robot.motor_names]
+
+
+def can_be(b: Block, kind: str) -> bool:
+    return b.reading.kind in (kind, None) or b.reading.weak

@@ -1,0 +1,132 @@
+"""All tables of a trial on one clock: that of the first sensor's table."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ee_dist.measurements.alignment import Match, match, one_epoch
+from ee_dist.measurements.clocks import Clocked, clocked, loosely_clocked
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.mapping import Column, Even, Mapping
+from ee_dist.measurements.robot_channels import command_kind
+from ee_dist.measurements.table import Recorded, Table
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+LEAST_SHARED = 0.5
+"""Share of the main table's time that its other tables must cover."""
+
+
+class TrialClocks:
+    """``main`` is the clocked table of the first sensor, ``clocks`` all by name, on its clock; ``unit`` is what the mapping
+    says its time is in. What was done goes to ``done``. Raises MeasurementError where the clocks cannot be brought together.
+    """
+
+    def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, done: list[str]) -> None:
+        self.recorded, self.mapping, self.robot, self.done = recorded, mapping, robot, done
+        self.where = str(mapping.source)
+        used = mapping.columns()
+        self.first = next((c.table for g, _, c in used if g == "sensors"), "")
+        time = self._time(self.first)
+        self.unit = time.unit if isinstance(time, Column) else "s"
+        self.main = clocked(self._table(self.first), time, self.where)
+        self.clocks = {self.first: self.main}
+        for name in dict.fromkeys(c.table for _, _, c in used):
+            if name != self.first:
+                self.clocks[name] = loosely_clocked(self._table(name), self._time(name), self.where)
+        self._align()
+
+    def _table(self, name: str) -> Table:
+        return self.recorded.table(name, self.where)
+
+    def _time(self, name: str) -> Column | Even | None:
+        """The time of a table: its own, that of all, or (None) what the format states."""
+        own, table, time = self.mapping.tables.get(name), self._table(name), self.mapping.time
+        if own is not None and own.time is not None:
+            return own.time
+        if table.clock is not None and not (isinstance(time, Column) and time.column in table):
+            return None
+        return time
+
+    def _align(self) -> None:
+        """Brings the clocks of all tables to that of the first: as the format or the mapping states it, or as signals fit."""
+        stated = {n: self.mapping.tables[n].offset_s if n in self.mapping.tables else None for n in self.clocks}
+        for name, found in self.clocks.items():
+            offset = stated[name]
+            if offset is not None:
+                found.times_s = found.times_s + offset
+                self.done.append(f"{name}: {offset:g} s added to its clock, as the mapping says")
+        for name, found in self.clocks.items():
+            if name == self.first or stated[name] is not None:
+                continue
+            if found.table.clock is not None and self.main.table.clock is not None:
+                continue
+            if one_epoch(self.main.times_s, found.times_s):
+                self.done.append(f"{name}: its clock and that of {self.first} count from one epoch: taken as the same")
+                continue
+            fit = self._fit(name)
+            if fit is None or not fit.clear:
+                why = (
+                    "no channel to match it by"
+                    if fit is None
+                    else (f"best fit {fit.correlation:.2f} at {fit.offset_s:.4g} s, another {fit.rival:.2f}")
+                )
+                raise MeasurementError(
+                    f"{self.where}: tables: {name}: its clock is not that of {self.first or self.main.table.path.name}, and the "
+                    f"signals do not tell the offset ({why}); say 'offset_s: SECONDS' to add to it (0 if it is one clock)"
+                )
+            found.times_s = found.times_s + fit.offset_s
+            self.done.append(
+                f"{name}: {fit.offset_s:.4f} s added to its clock, where its signals fit best those of "
+                f"{self.first} (correlation {fit.correlation:.3f}); a lag of the drives is part of it: "
+                "state offset_s if you know it"
+            )
+
+    def _fit(self, name: str) -> Match | None:
+        """The offset of a table by its commands against positions (or speeds), or its speeds against theirs."""
+        targets = {s.name: (s.kind, s.target) for s in self.robot.sensors}
+        of_joint = {targets[n]: c for n, c in self.mapping.sensors.items() if isinstance(c, Column) and n in targets}
+        kinds = {d.joint: command_kind(d) for d in self.robot.drives}
+        pairs: list[tuple[Array, Array]] = []
+        held_between = False
+        here, there = self.main, self.clocks[name]
+        for group, channel, c in self.mapping.columns():
+            if c.table != name or group not in ("sensors", "commands"):
+                continue
+            kind, joint = targets[channel] if group == "sensors" else (kinds[channel], channel)
+            base = of_joint.get(("position", joint))
+            if base is None or kind not in ("position", "velocity", "speed") or base.table == name:
+                continue
+            own = base.sign * base.scale * here.table.numbers(base.column)
+            if kind != "position":
+                own = np.gradient(own, here.times_s)
+            pairs.append((own, c.sign * c.scale * there.table.numbers(c.column)))
+            held_between = held_between or group == "commands"
+        if not pairs or len(there.times_s) < 3:
+            return None
+        a, b = (np.stack([p[k] for p in pairs], axis=1) for k in (0, 1))
+        return match(here.times_s, a, there.times_s, b, held_between)
+
+    def cut(self) -> None:
+        """Cuts the main table to the time that the others cover; what is held needs no end."""
+        start, end = self.main.times_s[0], self.main.times_s[-1]
+        for name, found in self.clocks.items():
+            if name == self.first:
+                continue
+            start = max(start, found.times_s[0])
+            if any(g == "sensors" and c.table == name for g, _, c in self.mapping.columns()):
+                end = min(end, found.times_s[-1])
+            elif found.times_s[-1] < start:
+                end = start
+        times_s = self.main.times_s
+        inside = np.flatnonzero((times_s >= start - 1e-9) & (times_s <= end + 1e-9))
+        if len(inside) < LEAST_SHARED * len(times_s):
+            raise MeasurementError(
+                f"{self.where}: the tables of {self.recorded.name} share only {max(0.0, end - start):.4g} s of "
+                f"{times_s[-1] - times_s[0]:.4g} s; are their clocks in the same unit? else give offset_s for one of them"
+            )
+        if len(inside) < len(times_s):
+            self.done.append(f"{len(times_s) - len(inside)} rows left out that not all tables cover")
+            rows = slice(int(inside[0]), int(inside[-1]) + 1)
+            self.main = Clocked(self.main.table.part(rows), times_s[rows], self.main.timing)
+            self.clocks[self.first] = self.main

@@ -1,0 +1,191 @@
+"""What a run leaves for its resumption, in a folder ``unfinished`` of its own that goes when the run reaches its end.
+
+Three things: the settings it was started with, what was simulated so far, and every trial that was made on hardware. A
+resumed run goes through all its steps again, finds there what is known, and so ends with the digest of an undisturbed one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ee_dist.evaluation.jobs import Evaluator
+from ee_dist.evaluation.journal import Journal, JournaledEvaluator
+from ee_dist.evaluation.ray_actors import installed
+from ee_dist.recording.reader import read_logs
+from ee_dist.recording.records import HARDWARE, TrialRecord
+from ee_dist.recording.writer import RunWriter
+from ee_dist.robots.model import Robot
+from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
+from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.folder import shown, write_whole
+from ee_dist.tasks.summary import config_digest, config_yaml
+from ee_dist.trials.hardware import Hardware
+from ee_dist.trials.log import SensorLog
+
+FOLDER = "unfinished"
+_RUN, _SIMULATED = "run.json", "simulated.bin"
+_PACKAGES = ("ee_dist", "pybullet", "mujoco", "numpy", "numba")
+
+
+class Unfinished:
+    """The folder of one run. Nothing is in it until the run asks for an evaluator or tries hardware."""
+
+    def __init__(self, out: Path, config: Config, options: Any) -> None:
+        self.folder = out / FOLDER
+        self.settings = config_yaml(config, options)
+        self.digest = config_digest(config, options)
+        self._journal: Journal | None = None
+
+    def journal(self) -> Journal:
+        """What was simulated so far, open for more."""
+        if self._journal is None:
+            self._begin()
+            self._journal = Journal(self.folder / _SIMULATED)
+        return self._journal
+
+    def hardware(self, name: str, inner: Hardware, robot: Robot) -> Hardware:
+        """``inner``, of which no trial is asked twice. ``robot`` as its recordings know it."""
+        self._begin()
+        return _Remembered(self.folder, name, inner, robot)
+
+    def check(self) -> None:
+        """Raises ConfigError where the run in the folder was started with other settings or versions."""
+        try:
+            found = json_of(text_of(self.folder / _RUN))
+            digest, settings, versions = (
+                str(found["digest"]),
+                yaml.safe_load(found["settings"]),
+                dict(found["versions"]),
+            )
+        except FileNotFoundError:
+            return  # killed before it began
+        except (OSError, UntrustedError, KeyError, TypeError, ValueError, yaml.YAMLError) as error:
+            raise ConfigError(f"resume={shown(self.folder.parent)}: its {FOLDER}/{_RUN} is damaged ({error})") from None
+        for name, theirs in versions.items():
+            if name in _PACKAGES and installed().get(name) != theirs:
+                raise ConfigError(
+                    f"resume={shown(self.folder.parent)}: it was begun with {name} {theirs}, here is "
+                    f"{installed().get(name)}: its results would be of two kinds; install {name} {theirs} to go on"
+                )
+        if digest != self.digest:
+            changed = _changed(settings, yaml.safe_load(self.settings))
+            raise ConfigError(
+                f"resume={shown(self.folder.parent)}: the run there has other settings ({', '.join(changed[:4])}); "
+                "give the same command as before, and resume="
+            )
+
+    def _begin(self) -> None:
+        self.folder.mkdir(exist_ok=True)
+        if not (self.folder / _RUN).exists():
+            content = {"digest": self.digest, "settings": self.settings, "versions": installed()}
+            write_whole(self.folder / _RUN, json.dumps(content, indent=1))
+
+    def forget(self) -> None:
+        """Remove what was kept: only files of ours, by name."""
+        self.close()
+        for path in (*self.folder.glob("*.mcap"), *self.folder.glob("*.part"),
+                     self.folder / _SIMULATED, self.folder / _RUN):  # fmt: skip
+            path.unlink(missing_ok=True)
+        with suppress(OSError):
+            self.folder.rmdir()
+
+    def older_than(self, path: Path) -> bool:
+        """Whether the run was begun before that file was written."""
+        begun = self.folder / _RUN
+        return begun.exists() and begun.stat().st_mtime_ns <= path.stat().st_mtime_ns
+
+    def close(self) -> None:
+        if self._journal is not None:
+            self._journal.close()
+            self._journal = None
+
+
+class _Remembered:
+    """Hardware whose trials are on the disk as soon as they are made; those that are there are not made again."""
+
+    def __init__(self, folder: Path, name: str, inner: Hardware, robot: Robot) -> None:
+        self.folder, self.name, self.inner, self.robot = folder, name, inner, robot
+        self.count = 0
+
+    def trial(self, driver: Any, steps: int) -> SensorLog:
+        path = self.folder / f"{self.name}_{self.count:04d}.mcap"
+        self.count += 1
+        if path.exists():
+            (record,) = read_logs(path)
+            if record.driver.key != driver.key or len(record.log) > steps:
+                raise ConfigError(f"{shown(path)}: the trial made there is another than the one that is due now")
+            skip = getattr(self.inner, "skip", None)
+            if skip is not None:
+                skip()
+            return record.log
+        log = self.inner.trial(driver, steps)
+        with RunWriter(path, self.robot, {"task": "unfinished"}) as writer:
+            writer.trial(TrialRecord(self.count - 1, self.name, HARDWARE, driver, log))
+        return log
+
+
+_current: Unfinished | None = None
+
+
+@contextmanager
+def unfinished(out: Path, config: Config, options: Any, resume: bool) -> Iterator[None]:
+    """The run in ``out`` may be resumed if it does not reach the end of this block. Raises ConfigError (see ``check``)."""
+    global _current
+    found = Unfinished(out, config, options)
+    if resume:
+        found.check()
+    elif found.folder.is_dir():
+        found.forget()  # of a run that is to be overwritten
+    _current = found
+    try:
+        yield
+        found.forget()
+    except ConfigError:
+        # A picture may fail after the summary was written: nothing is left to go on with.
+        if finished(out, config, options) and found.older_than(out / "summary.json"):
+            found.forget()
+        raise
+    finally:
+        found.close()
+        _current = None
+
+
+def remembered(name: str, inner: Hardware, robot: Robot) -> Hardware:
+    """Hardware of the run under way, of which no trial is asked twice."""
+    return inner if _current is None else _current.hardware(name, inner, robot)
+
+
+def note_in(evaluator: Evaluator) -> None:
+    """Let the evaluator of the run under way note what it finds, and know what was found before."""
+    inner: Any = evaluator
+    while inner is not None:
+        if isinstance(inner, JournaledEvaluator):
+            inner.journal = None if _current is None else _current.journal()
+        inner = getattr(inner, "inner", None)
+
+
+def finished(out: Path, config: Config, options: Any) -> bool:
+    """Whether a run of these very settings has reached its end in that folder."""
+    try:
+        summary = json_of(text_of(out / "summary.json", 2**28))
+        return bool(summary["config_digest"] == config_digest(config, options))
+    except (OSError, UntrustedError, KeyError, TypeError):
+        return False
+
+
+def can_go_on(out: Path) -> bool:
+    """Whether ``resume=`` of that folder would find anything."""
+    return (out / FOLDER / _RUN).exists()
+
+
+def _changed(old: Any, new: Any, prefix: str = "") -> list[str]:
+    """Which settings differ, as ``name=old``."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        return [d for k in {**old, **new} for d in _changed(old.get(k), new.get(k), f"{prefix}{k}.")]
+    return [] if old == new else [f"{prefix.rstrip('.')}={old}"]

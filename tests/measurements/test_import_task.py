@@ -1,0 +1,101 @@
+"""task=import by the real command line: with a mapping, without one, and where a person has to say something."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import measurement_files as samples
+import numpy as np
+import odd_files
+import pytest
+
+from ee_dist.__main__ import main
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT.parent / "shared" / "data"
+Command = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
+    """The command line in this process: status, output, complaint."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.chdir(ROOT)
+        monkeypatch.setattr(sys, "argv", ["ee_dist", "task=import", *arguments])
+        capfd.readouterr()
+        try:
+            status = main()
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        return status, *capfd.readouterr()
+
+    return run
+
+
+def test_a_file_without_a_mapping_becomes_a_recording(tmp_path: Path, command: Command) -> None:
+    """The mapping that is written gives the same recording when it is named."""
+    robot = samples.robot_file(tmp_path)
+    log = samples.rosbag2_mcap(tmp_path)
+    out = tmp_path / "out"
+    status, said, _ = command(f"measured={log}", "robot=urdf", f"robot.drives={robot}", f"hydra.run.dir={out}")
+    assert status == 0
+    assert "Proposed mapping" in said
+    first: dict[str, Any] = json.loads((out / "summary.json").read_text())
+    assert first["mapping"] == "mapping.yaml"
+    assert {p["sure"] for p in first["proposed"]} <= {"sure", "likely"}
+    command(f"measured={log}", f"task.mapping={out / 'mapping.yaml'}", f"hydra.run.dir={tmp_path / 'again'}")
+    second = json.loads((tmp_path / "again" / "summary.json").read_text())
+    assert first["result_digest"] == second["result_digest"]
+
+
+def test_what_no_file_can_say_is_asked_in_one_line(tmp_path: Path, command: Command) -> None:
+    case = next(c for c in odd_files.cases() if c.name == "currents without a gain")
+    (file,) = case.write(tmp_path)
+    (tmp_path / "arm.yaml").write_text(
+        odd_files.ARM.read_text().replace("arm.urdf", str(odd_files.ARM.parent / "arm.urdf"))
+    )
+    given = (
+        f"measured={file}",
+        "robot=urdf",
+        f"robot.drives={tmp_path / 'arm.yaml'}",
+        f"hydra.run.dir={tmp_path / 'out'}",
+    )
+    status, _, said = command(*given)
+    assert status == 2
+    assert len(said.strip().splitlines()) == 1
+    assert "current1 to current3 are motor currents; say task.gains=[N.m per A, one for each joint]" in said
+    assert "???" in (tmp_path / "out" / "mapping.yaml").read_text()
+    assert not (tmp_path / "out" / "measured.mcap").exists()
+    command(*given, "task.gains=[0.2,0.2,0.2]")
+    assert (tmp_path / "out" / "measured.mcap").exists()
+
+
+@pytest.mark.skipif(not (DATA / "double_pendulum").is_dir(), reason="the public data are not here")
+def test_a_real_log_needs_no_mapping(tmp_path: Path, command: Command) -> None:
+    """The double pendulum, with a robot that is not it: measured before filtered, nothing turned round in silence."""
+    robot = samples.robot_file(tmp_path)
+    log = DATA / "double_pendulum" / "20230629-143339.csv"
+    out = tmp_path / "out"
+    command(f"measured={log}", "robot=urdf", f"robot.drives={robot}", f"hydra.run.dir={out}")
+    text = (out / "mapping.yaml").read_text()
+    assert "position_shoulder: {column: pos_meas1, unit: rad}" in text
+    assert "velocity_elbow: {column: vel_meas2" in text
+    assert "elbow: {column: tau_meas2" in text
+    assert "sign: -1}" not in text
+
+
+@pytest.mark.skipif(not (DATA / "emps").is_dir(), reason="the public data are not here")
+def test_a_real_stage_is_the_same_with_and_without_a_mapping(tmp_path: Path, command: Command) -> None:
+    from ee_dist.recording.reader import read_logs
+
+    log = DATA / "emps" / "train.csv"
+    command(f"measured={log}", "robot=linear_stage", f"hydra.run.dir={tmp_path / 'a'}")
+    command(f"measured={log}", "task.mapping=docs/examples/emps.yaml", f"hydra.run.dir={tmp_path / 'b'}")
+    (a,), (b,) = (read_logs(tmp_path / n / "measured.mcap") for n in "ab")
+    assert np.array_equal(a.log.sensors, b.log.sensors)
+    assert np.array_equal(a.log.commands, b.log.commands)

@@ -1,0 +1,153 @@
+"""A run that was stopped goes on with ``resume=`` and ends as an undisturbed one does; no trial is made twice."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ee_dist.evaluation.jobs import Counts
+from ee_dist.evaluation.journal import MAGIC, Journal, JournaledEvaluator
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.tasks.wiring import close_evaluators
+
+FAST = ("+scenario=8", "evaluator=serial", "engine=mujoco", "budget.compensating_trials=1", "budget.polish=1")
+
+
+@pytest.fixture
+def stopping(monkeypatch):
+    """``stopping(n)``: the run ends at its n-th call of the evaluator, in the middle of whatever it does."""
+    real, calls, due = SerialEvaluator.evaluate, [0, 10**9], [lambda: False]
+
+    def evaluate(self, jobs):
+        calls[0] += 1
+        if calls[0] == calls[1] or due[0]():
+            raise RuntimeError("the power went")
+        return real(self, jobs)
+
+    monkeypatch.setattr(SerialEvaluator, "evaluate", evaluate)
+
+    def stop(after: int = 10**9, when=lambda: False) -> None:
+        close_evaluators()  # what a new process would not have
+        calls[:], due[:] = [0, after], [when]
+
+    yield stop
+    close_evaluators()
+
+
+def test_a_stopped_run_goes_on_and_ends_with_the_same_bytes(cli, tiny, tmp_path, stopping, monkeypatch):
+    made: list[int] = []
+    real = PhysicalRobot.trial
+    monkeypatch.setattr(PhysicalRobot, "trial", lambda self, *a: (made.append(self.trials), real(self, *a))[1])
+    stopping(10**9)
+    assert cli(*FAST, *tiny, f"hydra.run.dir={tmp_path}/whole").status == 0
+    assert len(made) == 3
+    made.clear()
+    out = tmp_path / "run"
+    statuses = []
+    where = f"hydra.run.dir={out}"
+    for after in (2, 1, 3, 2, 3, 10**9):
+        stopping(after)
+        outcome = cli(*FAST, *tiny, where)
+        statuses.append(outcome.status)
+        where = f"resume={out}"
+    assert statuses == [1, 1, 1, 1, 1, 0]
+    assert len(made) == 3, "a trial was made twice"
+    whole, resumed = (json.loads((tmp_path / n / "summary.json").read_text()) for n in ("whole", "run"))
+    assert resumed["evaluations"] == whole["evaluations"]
+    assert resumed["result_digest"] == whole["result_digest"]
+    assert (out / "recovery.mcap").read_bytes() == (tmp_path / "whole" / "recovery.mcap").read_bytes()
+    assert not (out / "unfinished").exists()
+    again = cli(*FAST, *tiny, where)
+    assert (again.status, len(made)) == (0, 3)
+    assert "finished already" in again.out
+
+
+def test_what_cannot_be_resumed_is_said_in_one_line(cli, tiny, tmp_path, stopping):
+    out = tmp_path / "run"
+    stopping(2)
+    assert cli(*FAST, *tiny, f"hydra.run.dir={out}").status == 1
+    kept = sorted(p.name for p in (out / "unfinished").iterdir())
+    assert kept == ["run.json", "simulated.bin"]
+    stopping(10**9)
+    for arguments, said in (
+        ((*FAST, *tiny, "seed=3", f"resume={out}"), "the run there has other settings (seed=0)"),
+        ((*FAST, *tiny, f"resume={tmp_path}/nowhere"), "no run was begun there"),
+        ((*FAST, *tiny, f"hydra.run.dir={out}"), "holds something already"),
+    ):
+        outcome = cli(*arguments)
+        assert outcome.status == 2
+        (line,) = outcome.err.strip().splitlines()
+        assert said in line
+        assert sorted(p.name for p in (out / "unfinished").iterdir()) == kept
+    assert not (tmp_path / "nowhere").exists()
+    content = json.loads((out / "unfinished" / "run.json").read_text())
+    content["versions"]["mujoco"] = "0.1"
+    (out / "unfinished" / "run.json").write_text(json.dumps(content))
+    assert "it was begun with mujoco 0.1, here is" in cli(*FAST, *tiny, f"resume={out}").err
+    (out / "unfinished" / "run.json").write_text("[" * 9)
+    assert "is damaged" in cli(*FAST, *tiny, f"resume={out}").err
+
+
+def test_a_sweep_goes_on_where_it_stopped(cli, tiny, tmp_path, stopping):
+    sweep = ("-m", *FAST[1:], *tiny, "+scenario=1,9")
+    stopping(when=lambda: any((tmp_path / "sweep").rglob("summary.json")))
+    assert cli(*sweep, f"hydra.sweep.dir={tmp_path}/sweep").status == 1
+    (done,) = (tmp_path / "sweep").rglob("summary.json")
+    before = done.stat().st_mtime_ns
+    stopping(10**9)
+    outcome = cli(*sweep, f"resume={tmp_path}/sweep")
+    assert outcome.status == 0, outcome.err
+    assert outcome.out.count("finished already") == 1
+    assert done.stat().st_mtime_ns == before
+    assert len(list((tmp_path / "sweep").rglob("summary.json"))) == 2
+
+
+class _Numbers:
+    """Stands for an evaluator: gives each job a number, an array, or a text that no journal keeps."""
+
+    def __init__(self) -> None:
+        self.counts, self.asked = Counts(), 0
+
+    def evaluate(self, jobs):
+        self.asked += len(jobs)
+        return [(float(j.number), np.arange(3.0) + j.number, "text")[j.number % 3] for j in jobs]
+
+    def close(self) -> None: ...
+
+
+class _Job:
+    class rollout:  # noqa: N801
+        steps = 5
+
+    def __init__(self, number: int) -> None:
+        self.number, self.key = number, f"{number:064x}"
+
+
+def test_a_journal_cut_anywhere_gives_its_whole_entries(tmp_path: Path):
+    path, jobs = tmp_path / "j.bin", [_Job(k) for k in range(9)]
+    with Journal(path) as journal:
+        expected = JournaledEvaluator(_Numbers(), journal).evaluate(jobs)
+    whole, counts = path.read_bytes(), []
+    for length in (*range(0, len(whole), 7), len(whole)):
+        path.write_bytes(whole[:length])
+        with Journal(path) as journal:
+            counts.append(len(journal.values))
+            inner = _Numbers()
+            found = JournaledEvaluator(inner, journal).evaluate(jobs)
+            assert str(found) == str(expected)
+            assert inner.asked == 9 - counts[-1]
+            assert journal.values.keys() == {j.key for j in jobs if j.number % 3 < 2}
+        assert path.read_bytes().startswith(MAGIC)
+    assert counts == sorted(counts)
+    assert (counts[0], counts[-1]) == (0, 6)
+    for place in range(len(MAGIC), len(whole), 5):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
+        with Journal(path) as journal:
+            assert all(str(journal.values[j.key]) == str(e) for j, e in zip(jobs, expected, strict=True)
+                       if j.key in journal.values)  # fmt: skip
+    shutil.rmtree(tmp_path)
