@@ -3,21 +3,41 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
+from ee_dist.effects.groups import members_of
 from ee_dist.recording.reader import read_run
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.seal import FILE, opened
 from ee_dist.tasks.summary import Stopwatch, hypothesis_list, write_summary
+
+Places = frozenset[tuple[str, str]]
+"""Effects by the joints, parts or sensors that they act on: an effect on a group is one on each of its members."""
 
 
 @dataclass
 class Options:
     name: str = "reveal"
     explained: str | None = None
+
+
+@dataclass(frozen=True)
+class Score:
+    """``right``: all that is true was named at its place, and nothing else. ``named``: what was, in words; ``missed`` and
+    ``invented`` as (effect, target)."""
+
+    right: bool
+    named: tuple[str, ...]
+    missed: tuple[tuple[str, str], ...] = ()
+    invented: tuple[tuple[str, str], ...] = ()
 
 
 def run(config: Config, options: Options, out: Path) -> None:
@@ -28,31 +48,111 @@ def run(config: Config, options: Options, out: Path) -> None:
     folder = Path(config.log)
     folder = folder if folder.is_dir() else folder.parent
     logs = sorted(folder.glob("*.mcap"))
-    digest = read_run(logs[0]).metadata.get("seal") if logs else None
+    record = read_run(logs[0]) if logs else None
+    digest = record.metadata.get("seal") if record else None
     hidden, _ = opened(folder / FILE, digest)
+    found = (
+        score(_summary(Path(options.explained)), hidden, record.robot if record else None)
+        if options.explained
+        else None
+    )
     console.print("The truth: " + ("; ".join(map(str, hidden)) or "nothing was changed"), highlight=False)
-    rest: dict[str, object] = {"truth": hypothesis_list(hidden)}
-    if options.explained:
-        named = _named(Path(options.explained))
-        real = {(t.effect, t.target) for t in hidden}
-        right = real <= named if real else not named
-        console.print(f"Named: {', '.join(f'{e} at {t}' for e, t in sorted(named)) or 'nothing'}. "
-                      f"{'Right.' if right else 'Not right.'}", highlight=False)  # fmt: skip
-        rest["right"] = right
+    if found is not None:
+        verdict = "Right." if found.right else "Not right."
+        console.print(f"Named: {', or '.join(found.named) or 'nothing'}. {verdict}", highlight=False)
     out.mkdir(parents=True, exist_ok=True)
-    write_summary(out, "reveal", config, options, watch, digest or "", rest)
+    write_summary(out, "reveal", config, options, watch, digest or "", {
+        "truth": hypothesis_list(hidden),
+        "right": None if found is None else found.right,
+        "named": [] if found is None else found.named,
+        "missed": [] if found is None else [{"effect": e, "target": t} for e, t in found.missed],
+        "invented": [] if found is None else [{"effect": e, "target": t} for e, t in found.invented],
+    })  # fmt: skip
 
 
-def _named(folder: Path) -> set[tuple[str, str]]:
-    """What an explain (first and its ties) or improve (all terms) run says."""
-    path = folder / "summary.json" if folder.is_dir() else folder
+def score(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -> Score:
+    """What an explain or improve run says against the truth. Raises ConfigError for a summary of another verb."""
+    if summary.get("task") == "explain":
+        return _of_explanation(summary, hidden, robot)
+    if summary.get("task") == "improve":
+        return _of_model(summary, hidden, robot)
+    raise ConfigError(f"task.explained: a summary of task={summary.get('task')}; expected one of explain or improve")
+
+
+def places(terms: Sequence[tuple[str, str]], robot: Robot | None) -> Places:
+    """(effect, place) of (effect, target): those of the members where the target is a group."""
+    out: set[tuple[str, str]] = set()
+    for effect, target in terms:
+        allowed = CATALOGUE[effect].targets(robot) if robot is not None and effect in CATALOGUE else ()
+        members = members_of(robot, target, allowed) if robot is not None and target not in allowed else ()
+        out |= {(effect, m) for m in members or (target,)}
+    return frozenset(out)
+
+
+def _of_explanation(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -> Score:
+    """The best and what is tied with it are alternatives: right is one that is the truth, or, of a truth of several
+    effects, one of these."""
+    verdict = summary["verdict"]
+    if not hidden or verdict != EFFECT:
+        return Score(
+            not hidden and verdict == NOTHING_MISSING,
+            tuple(c["name"] for c in summary["candidates"][:1] if verdict == EFFECT),
+            _pairs(hidden),
+        )
+    best = summary["candidates"][0]
+    ties = [c for c in summary["candidates"] if c is best or c["name"] in best["tied_with"]]
+    said = [places([(t["effect"], t["target"]) for t in c["terms"]], robot) for c in ties]
+    truth = [places([pair], robot) for pair in _pairs(hidden)]
+    whole = frozenset().union(*truth)
+    right = any(s == whole or s in truth for s in said)
+    told = frozenset().union(*said)
+    missed = tuple(p for p, t in zip(_pairs(hidden), truth, strict=True) if not t <= told)
+    return Score(right, tuple(c["name"] for c in ties), missed)
+
+
+def _of_model(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -> Score:
+    """A model is right that has every true effect, each at its place or tied with one that it has, and none besides that
+    was added."""
+    terms = [(t["effect"], t["target"]) for t in summary["model_terms"]]
+    steps = [s for s in summary["ladder"] if s["added"]]
+    gone = {name for s in steps for name in s["dropped"]}
+    added = [(t["effect"], t["target"]) for s in steps for t in s["added"]]
+    added = [a for a in added if a in terms and "@".join(a) not in gone]
+    named = [*dict.fromkeys(added)]
+    by_effect: dict[str, list[Places]] = {}
+    for t in terms:
+        by_effect.setdefault(t[0], []).append(places([t], robot))
+    truth = {pair: places([pair], robot) for pair in _pairs(hidden)}
+    ties = {_pair(name): s for s in steps for name in s["tied_with"]}
+    missed, used = [], set()
+    for pair, where in truth.items():
+        # One effect on a group is not one of its members, and one for each member is the group.
+        inside = [p for p in by_effect.get(pair[0], []) if p <= where]
+        if inside and frozenset().union(*inside) == where:
+            used |= {t for t in terms if places([t], robot) in inside}
+        elif pair in ties:
+            used |= {(t["effect"], t["target"]) for t in ties[pair]["added"]}
+        else:
+            missed.append(pair)
+    invented = tuple(a for a in named if a not in used)
+    return Score(not missed and not invented, tuple("@".join(filter(None, n)) for n in named), tuple(missed), invented)
+
+
+def _pairs(hidden: Hypothesis) -> tuple[tuple[str, str], ...]:
+    return tuple((t.effect, t.target) for t in hidden)
+
+
+def _pair(name: str) -> tuple[str, str]:
+    effect, _, target = name.partition("@")
+    return effect, target
+
+
+def _summary(path: Path) -> Mapping[str, Any]:
+    file = path / "summary.json" if path.is_dir() else path
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        raise ConfigError(f"task.explained={folder}: no summary.json of explain or improve there") from None
-    if data.get("task") == "improve":
-        return {(t["effect"], t["target"]) for t in data["model_terms"]}
-    found = [c for c in data.get("candidates", []) if data.get("verdict") == "effect"]
-    if not found:
-        return set()
-    return {(c["effect"], c["target"]) for c in found if c["rank"] == 1 or c["name"] in found[0]["tied_with"]}
+        found = None
+    if not isinstance(found, dict):
+        raise ConfigError(f"task.explained={path}: no summary.json of explain or improve there")
+    return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -12,6 +11,10 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "tasks"))
+
+from schemas import validated  # noqa: E402
+
 FAULT = "coulomb_friction@elbow:torque_nm=0.35"
 QUICK = ("engine=mujoco", "evaluator=serial", "task.rerun=false")
 
@@ -32,8 +35,7 @@ def run(*arguments: str, fails: bool = False) -> str:
 
 def task(out: Path, *arguments: str) -> dict[str, Any]:
     run("-m", "ee_dist", *arguments, f"hydra.run.dir={out}")
-    found: dict[str, Any] = json.loads((out / "summary.json").read_text())
-    return found
+    return validated(out / "summary.json")
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,11 @@ from typing import Any
 
 import pytest
 
+# Under every import mode of pytest.
+sys.path.insert(0, str(Path(__file__).parent))
+
+from schemas import validated
+
 from ee_dist.__main__ import main
 
 TINY = (
@@ -51,6 +56,8 @@ def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFi
         except SystemExit as stop:
             status = int(stop.code or 0)
         out, err = capfd.readouterr()
+        for summary in folder.rglob("summary.json"):
+            validated(summary)
         return Outcome(status, out, err, folder)
 
     return run

@@ -124,7 +124,7 @@ def judge(problem: Problem, base: Array, found: HeldOut, proposal: Proposal, mod
         error_fit=math.sqrt(max(found.seen, 0.0)),
         error_heldout=error(found.residual) if np.isfinite(found.residual).all() else math.inf,
         gain=gain / share if math.isfinite(gain) else -math.inf,
-        explained=gain / above if math.isfinite(gain) else -math.inf,
+        explained=(gain / above if total > floor else 0.0) if math.isfinite(gain) else -math.inf,
         interval=(low / share, high / share),
         held=held,
         residual=found.residual,

@@ -1,0 +1,187 @@
+"""compare, explain, improve and reveal on the command line, by every way of comparing: the same keys, the same names.
+
+The robots are measured by ``task=trial``, and, where the force of a motor is wanted, by a log that an import wrote.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from ee_dist.effects.catalogue import apply, term
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
+from ee_dist.engines.one_joint import OneJointEngine
+from ee_dist.robots.servo_pendulum import servo_pendulum
+
+QUICK = ("engine=mujoco", "evaluator=serial")
+SUSPECTS = "task.only=[coulomb_friction,viscous_friction]"
+HIDDEN = "coulomb_friction@servo"
+WAYS = ("open_loop", "free_run", "force_balance")
+VERDICTS = ("effect", "nothing_missing", "unexplained")
+
+
+def run(cli, *arguments):
+    outcome = cli(*arguments)
+    assert outcome.status == 0, outcome.err
+    return outcome.runs()[0], outcome
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory) -> Path:
+    """Two motions of a pendulum with dry friction as a logger keeps them: angle, target and the motor's torque."""
+    folder = tmp_path_factory.mktemp("pendulum")
+    robot = servo_pendulum()
+    faulty = apply(robot, (term("coulomb_friction", "servo", torque_nm=0.06),))
+    t = np.arange(0, 2, robot.time_step_s)
+    rise = np.minimum(1.0, t / 0.4) ** 2
+    rng = np.random.default_rng(0)
+    drive = robot.drives[0]
+    for k, (a, b) in enumerate(((4.3, 9.7), (6.1, 2.9))):
+        sent = (rise * (0.7 * np.sin(a * t) + 0.3 * np.sin(b * t)))[:, None]
+        (log,) = OneJointEngine().rollout([Rollout(faulty, Commands(sent), len(t), pose=True)])
+        angle, speed = log.sensors[:, 0], log.sensors[:, 1]
+        asked = np.clip(drive.kp * (sent[:, 0] - angle), -drive.torque_limit, drive.torque_limit)
+        motor = asked - drive.torque_limit / drive.speed_limit * speed
+        columns = {"t": t, "angle": angle + 5e-4 * rng.standard_normal(len(t)),
+                   "speed": speed + 5e-3 * rng.standard_normal(len(t)), "target": sent[:, 0],
+                   "motor": motor + 2e-3 * rng.standard_normal(len(t))}  # fmt: skip
+        pd.DataFrame(columns).to_csv(folder / f"run{k + 1}.csv", index=False, float_format="%.8g")
+    mapping = {
+        "robot": {"robot": "servo_pendulum"}, "format": "csv", "time": {"column": "t", "unit": "s"},
+        "sensors": {"position": {"column": "angle", "unit": "rad"}, "speed": {"column": "speed", "unit": "rad/s"}},
+        "commands": {"servo": {"column": "target", "unit": "rad"}},
+        "torques": {"servo": {"column": "motor", "unit": "N.m"}},
+    }  # fmt: skip
+    (folder / "mapping.yaml").write_text(yaml.safe_dump(mapping))
+    return folder
+
+
+@pytest.fixture
+def imported(cli, record) -> Path:
+    done = record / "measured.mcap"
+    if not done.is_file():
+        found, _ = run(cli, "task=import", f"measured={record}", f"task.mapping={record / 'mapping.yaml'}")
+        (found / "measured.mcap").rename(done)
+    return done
+
+
+@pytest.mark.parametrize("by", WAYS)
+def test_every_verb_by_every_way(cli, imported, by):
+    way, log = f"task.by={by}", f"measured={imported}"
+    found, said = run(cli, "task=compare", log, way, *QUICK)
+    compared = json.loads((found / "summary.json").read_text())
+    assert compared["way"] == by and compared["error"] > 1.5 * compared["noise_floor"]
+    assert (found / "compare.rrd").is_file() and (found / "report.html").stat().st_size > 100_000
+    assert "Next: python -m ee_dist task=explain" in said.out
+
+    found, said = run(cli, "task=explain", log, way, SUSPECTS, "task.rerun=false", *QUICK)
+    explained = json.loads((found / "summary.json").read_text())
+    assert explained["verdict"] == "effect" and explained["candidates"][0]["name"] == HIDDEN
+    assert explained["candidates"][0]["values"]["torque_nm"] == pytest.approx(0.06, rel=0.15)
+    assert not (found / "explain.rrd").exists(), "a scene that was refused"
+    # Behind the filters of a balance of forces reversals leave more than noise.
+    doubt = ", as one of several things" if by == "force_balance" else ""
+    assert explained["headline"].startswith(f"Missing{doubt}: coulomb friction at servo (torque 0.0")
+
+    # What effect=auto finds by this way tests/discrepancy tells, in less time.
+    found, _ = run(cli, "task=improve", f"effect={HIDDEN}", log, way, "task.rerun=false", *QUICK)
+    improved = json.loads((found / "summary.json").read_text())
+    assert [t["effect"] for t in improved["model_terms"]] == ["coulomb_friction"]
+    assert improved["ladder"][-1]["error_heldout"] < 0.5 * improved["ladder"][0]["error_heldout"]
+    low, high = improved["parameters"][0]["interval"]
+    assert low < improved["parameters"][0]["value"] < high
+
+    found, _ = run(cli, "task=compare", log, way, f"model={found / 'model.yaml'}", "task.rerun=false", *QUICK)
+    again = json.loads((found / "summary.json").read_text())
+    assert again["error"] < 0.5 * compared["error"]
+    assert again["model_terms"] == improved["model_terms"]
+
+
+def test_auto_takes_the_first_way_that_the_channels_allow(cli, imported):
+    found, said = run(cli, "task=compare", f"measured={imported}", "task.rerun=false", *QUICK)
+    assert json.loads((found / "summary.json").read_text())["way"] == "open_loop"
+    assert "By open_loop: commands were recorded" in said.out
+
+
+@pytest.mark.parametrize("by", ["open_loop", "free_run"])
+def test_a_sealed_trial_is_explained_improved_and_revealed(cli, by):
+    plan = "task.excitations=['multisine:seconds=1.6,amplitude=0.2,seed=1','steps:seconds=1.6,amplitude=0.15,seed=2']"
+    hidden = "+hidden=[{effect: load_friction, target: servo, share: 0.3}]"
+    tried, _ = run(cli, "task=trial", "robot=servo_pendulum", "engine=mujoco", hidden, plan, "task.noise=0.0005")
+    log, way, only = f"measured={tried}", f"task.by={by}", "task.only=[load_friction,parallel_spring]"
+    asked = "effect=auto" if by == "open_loop" else "effect=load_friction@servo"
+    explained, _ = run(cli, "task=explain", log, way, only, "task.rerun=false", *QUICK)
+    shown, told = run(cli, "task=reveal", f"log={tried}", f"task.explained={explained}")
+    assert json.loads((shown / "summary.json").read_text())["right"] is True
+    assert "The truth: load_friction at servo" in told.out and "Right." in told.out
+    improved, _ = run(cli, "task=improve", asked, log, way, only, "task.rerun=false", *QUICK)
+    shown, _ = run(cli, "task=reveal", f"log={tried}", f"task.explained={improved}")
+    content = json.loads((shown / "summary.json").read_text())
+    assert content["right"] is True and content["missed"] == content["invented"] == []
+    nothing, _ = run(cli, "task=improve", "effect=none", log, way, "task.rerun=false", *QUICK)
+    shown, told = run(cli, "task=reveal", f"log={tried}", f"task.explained={nothing}")
+    content = json.loads((shown / "summary.json").read_text())
+    assert content["right"] is False and content["missed"] == [{"effect": "load_friction", "target": "servo"}]
+    assert "Named: nothing. Not right." in told.out
+
+
+def test_a_model_is_calibrated_on_an_untouched_robot_and_its_calibration_holds_one_way(cli):
+    plan = "task.excitations=['multisine:seconds=1.6,amplitude=0.2,seed=1','steps:seconds=1.6,amplitude=0.15,seed=2']"
+    tried, _ = run(cli, "task=trial", "robot=servo_pendulum", "engine=mujoco", plan, "task.noise=0.0005")
+    log, only = f"measured={tried}", "task.only=[coulomb_friction,parallel_spring]"
+    found, _ = run(cli, "task=improve", "effect=auto", log, only, "task.calibrate=true", "task.rerun=false", *QUICK)
+    beside = yaml.safe_load((found / "model.calibration.yaml").read_text())
+    assert beside["way"] == "open_loop" and beside["gained"] >= 0
+    model = f"model={found / 'model.yaml'}"
+    explained, _ = run(cli, "task=explain", log, model, only, "task.rerun=false", *QUICK)
+    summary = json.loads((explained / "summary.json").read_text())
+    assert summary["verdict"] == "nothing_missing"
+    assert "what calibration left" in summary["noise_floor_source"]
+    wrong = cli("task=compare", log, model, "task.by=free_run", *QUICK)
+    assert wrong.status == 2 and "the model was calibrated with task.by=open_loop" in wrong.err
+    wrong = cli("task=improve", "effect=auto", log, "task.calibrate=true", "task.by=free_run", *QUICK)
+    assert wrong.status == 2 and "use task.by=open_loop" in wrong.err
+    assert len(wrong.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("by", WAYS)
+@pytest.mark.parametrize(("verb", "setting", "said"), [
+    ("explain", "task.without=[coulomb_frictoin]", "did you mean coulomb_friction"),
+    ("explain", "task.only=[coulomb_friction@servoo]", "servo"),
+    ("improve", "task.without=[warp_drive]", "no effect named 'warp_drive'"),
+    ("improve", "task.most=0", "task.most=0: must be 1 or more"),
+    ("improve", "effect=coulomb_friction@knee", "coulomb_friction cannot act on 'knee'"),
+    ("compare", "evaluator.workers=2", "evaluator.workers: the chosen evaluator has no such setting"),
+])  # fmt: skip
+def test_settings_are_honoured_or_refused_by_every_way(cli, imported, by, verb, setting, said):
+    own = () if setting.startswith("effect=") or verb != "improve" else ("effect=auto",)
+    outcome = cli(f"task={verb}", f"measured={imported}", f"task.by={by}", *own, *QUICK, setting)
+    assert outcome.status == 2 and said in outcome.err, outcome.err
+    assert len(outcome.err.strip().splitlines()) == 1
+    assert not list(outcome.folder.rglob("*.json")), "a mistake left files behind"
+
+
+def test_another_way_is_told_with_the_nearest_name(cli, imported):
+    outcome = cli("task=compare", f"measured={imported}", "task.by=free_rum", *QUICK)
+    assert outcome.status == 2 and "did you mean free_run" in outcome.err
+
+
+def test_an_effect_that_was_left_out_is_not_named(cli, imported):
+    found, _ = run(cli, "task=explain", f"measured={imported}", "task.by=force_balance", SUSPECTS,
+                   "task.without=[coulomb_friction]", "task.rerun=false", *QUICK)  # fmt: skip
+    names = [c["name"] for c in json.loads((found / "summary.json").read_text())["candidates"]]
+    assert names and not [n for n in names if n.startswith("coulomb")]
+
+
+def test_a_log_is_looked_at(cli, imported):
+    copy = imported.with_name("copy.mcap")
+    copy.write_bytes(imported.read_bytes())
+    outcome = cli("task=view", f"log={copy}", "task.open=false")
+    assert outcome.status == 0, outcome.err
+    assert "rerun recording:" in outcome.out
