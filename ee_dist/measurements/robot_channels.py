@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Mapping
-from ee_dist.robots.model import Robot
-
-UNITS = {
-    "position": {"hinge": "rad", "slide": "m"},
-    "speed": {"hinge": "rad/s", "slide": "m/s"},
-    "torque": {"hinge": "N.m", "slide": "N"},
-}
+from ee_dist.robots import ranges
+from ee_dist.robots.model import Drive, Robot
 
 
-def command_kind(drive: Any) -> str:
-    """What a drive obeys: position, speed or torque."""
-    return str(getattr(drive, "command", "position"))
+def command_kind(drive: Drive) -> str:
+    """What a drive obeys: position, speed, torque or none."""
+    return drive.command
 
 
 def command_units(robot: Robot) -> dict[str, str]:
-    """The unit of the command of each driven joint."""
-    kinds = {j.name: j.kind for j in robot.joints}
-    return {d.joint: UNITS[command_kind(d)][kinds[d.joint]] for d in robot.drives}
+    """The unit of the command of each driven joint; passive joints have none."""
+    return {joint: unit for joint, unit in ranges.command_units(robot).items() if unit is not None}
 
 
 def torque_units(robot: Robot) -> dict[str, str]:
     """The unit of the torque (force) of each driven joint."""
     kinds = {j.name: j.kind for j in robot.joints}
-    return {d.joint: UNITS["torque"][kinds[d.joint]] for d in robot.drives}
+    return {d.joint: "N.m" if kinds[d.joint] == "hinge" else "N" for d in robot.drives}
 
 
 def check_names(mapping: Mapping, robot: Robot) -> None:
@@ -50,7 +42,8 @@ def check_names(mapping: Mapping, robot: Robot) -> None:
             if name not in allowed:
                 raise MeasurementError(f"{where}: {group}: {robot.name} has no {name!r}; {nearest(name, allowed)}")
     for group, names in (("commands", mapping.commands), ("torques", mapping.torques)):
-        missing = [m for m in motors if m not in names]
+        driven = command_units(robot) if group == "commands" else motors
+        missing = [m for m in driven if m not in names]
         # A log without any command is of use to a balance of forces, which needs the torques.
         if missing and (names or (group == "commands" and not mapping.torques)):
             raise MeasurementError(f"{where}: {group}: no column for joint {missing[0]!r} of {robot.name}")

@@ -33,6 +33,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     """Write summary.json, report.html and compare.rrd into ``out``. Raises ConfigError, LogError, RecordingError."""
     console, watch, measured = Console(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
+    for remark in measured.remarks:
+        console.print(remark, highlight=False, markup=False)
     problem = way.make(measured, config)
     residual = problem.residuals([measured.model])[0]
     found = compare(problem, residual)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
@@ -10,9 +11,12 @@ from ee_dist.effects.catalogue import Hypothesis, from_dict
 from ee_dist.evolution.ga import Budget
 from ee_dist.recovery.loop import Plan
 from ee_dist.recovery.metrics import Distance, Metric, RollingMean
+from ee_dist.trials.hardware import Limits
 
 ENGINES = ("pybullet", "mujoco")
-EVALUATORS = ("ray", "serial")
+EVALUATORS = ("auto", "ray", "serial")
+SMALL_STEPS = 1_000_000
+"""Robot-steps that the repair passes of a run ask for, below which Ray takes longer to start (5 s) than it saves."""
 
 
 class ConfigError(ValueError):
@@ -54,7 +58,7 @@ class EngineConfig:
 
 @dataclass
 class EvaluatorConfig:
-    name: str = "ray"
+    name: str = "auto"
     workers: int = 0
     chunk: int = 0
     cache: bool = True
@@ -68,6 +72,31 @@ class EvaluatorConfig:
 @dataclass
 class RayConfig:
     address: str | None = None
+
+
+@dataclass
+class HardwareConfig:
+    """A robot of one's own: where it answers, how long to wait for it, and what is never asked of it."""
+
+    address: str | None = None
+    begin_s: float = 60.0
+    timeout_s: float = 2.0
+    range_share: float = 1.0
+    speed: float = math.inf
+    acceleration: float = math.inf
+    torque: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name in ("begin_s", "timeout_s"):
+            if not 0.0 < getattr(self, name) <= 3600.0:
+                raise ConfigError(f"hardware.{name}={getattr(self, name)}: must be above 0 and at most 3600 (s)")
+        self.limits()
+
+    def limits(self) -> Limits:
+        try:
+            return Limits(self.range_share, self.speed, self.acceleration, self.torque)
+        except ValueError as error:
+            raise ConfigError(f"hardware.{error}") from None
 
 
 @dataclass
@@ -118,6 +147,11 @@ class BudgetConfig:
             within(f"budget.{name}", getattr(self, name), 0, most)
         self.plan()
 
+    @property
+    def small(self) -> bool:
+        """Whether starting Ray takes longer than it saves."""
+        return self.population * self.generations * self.steps * (self.compensating_trials + 1) < SMALL_STEPS
+
     def plan(self) -> Plan:
         shared = (self.tournament, self.mutation, self.crossovers)
         try:
@@ -167,6 +201,7 @@ class Config:
     engine: EngineConfig = field(default_factory=EngineConfig)
     evaluator: EvaluatorConfig = field(default_factory=EvaluatorConfig)
     ray: RayConfig = field(default_factory=RayConfig)
+    hardware: HardwareConfig = field(default_factory=HardwareConfig)
     metric: MetricConfig = field(default_factory=MetricConfig)
     budget: BudgetConfig = field(default_factory=BudgetConfig)
     scenario: ScenarioConfig | None = None

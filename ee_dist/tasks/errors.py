@@ -17,6 +17,7 @@ from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError, known_settings, unknown_key
 from ee_dist.tasks.help import options_with
 from ee_dist.trials.excitation import ExcitationError
+from ee_dist.trials.hardware import HardwareError
 from ee_dist.trials.log import LogError
 
 __all__ = ("USER_ERRORS", "RayLostError", "abandon_evaluators", "defect", "hydra_message", "unasked_end")
@@ -28,6 +29,7 @@ USER_ERRORS = (
     EffectError,
     EngineError,
     EvaluatorError,
+    HardwareError,
     LogError,
     RecordingError,
     RobotError,

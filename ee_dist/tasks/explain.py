@@ -42,6 +42,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     """Write summary.json, report.html and explain.rrd into ``out``. Raises ConfigError, LogError, RecordingError."""
     console, watch, measured = Console(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
+    for remark in measured.remarks:
+        console.print(remark, highlight=False, markup=False)
     with SearchProgress(console) as progress:
         problem = way.make(measured, config)
         pool = pool_of(problem, options.without, options.only)

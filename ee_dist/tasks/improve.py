@@ -53,6 +53,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     console, watch, measured = Console(), Stopwatch(), load(config)
     wanted = effects_of(config.effect, measured.robot)
     way = way_of(measured, options.by)
+    for remark in measured.remarks:
+        console.print(remark, highlight=False, markup=False)
     if options.calibrate and way.name != OpenLoop.way:
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
     with SearchProgress(console) as progress:

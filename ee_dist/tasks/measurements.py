@@ -18,6 +18,7 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import HARDWARE, RunRecord
+from ee_dist.robots.agree import agreed, changed_sources
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
@@ -25,6 +26,8 @@ from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import LogError, SensorLog
 
 FEWEST_ROWS = 60
+SHOWN = 4
+"""Differences between two robots that are told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,8 @@ class Measurements:
     """Energy that the most promising effect took off there."""
     calibrated_by: str = ""
     """The way of comparing that the calibration was made with; empty without one."""
+    remarks: tuple[str, ...] = ()
+    """What a user should know of before reading any result: where model and log name different robots."""
 
 
 def load(config: Config) -> Measurements:
@@ -61,16 +66,28 @@ def load(config: Config) -> Measurements:
             # What an import says about a trial (a gain, a payload) comes on top of how it was held.
             setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
             trials.append(MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup))
+    remarks = [line for run in runs for line in changed_sources(run.metadata)]
     if config.model is None:
         source = robot.name if robot.name in BUILT_IN else robot
-        return Measurements(robot, tuple(trials), tuple(files), (), source, Path.cwd())
+        return Measurements(robot, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks))
     believed = read_model(config.model)
-    if believed.robot.motor_names != robot.motor_names:
-        raise ConfigError(f"model={config.model}: it is of {believed.robot.name}, the log of {robot.name}")
+    robot, different = agreed(believed.robot, robot, f"model={config.model}")
+    if different:
+        remarks.append(f"The model's robot is used; it has otherwise than the log's: {'; '.join(different[:SHOWN])}")
     apply(robot, believed.terms)
     left, gained, by = _calibration(Path(config.model), robot)
-    source, folder = believed.source, believed.folder
-    return Measurements(robot, tuple(trials), tuple(files), believed.terms, source, folder, left, gained, by)
+    return Measurements(
+        robot,
+        tuple(trials),
+        tuple(files),
+        believed.terms,
+        believed.source,
+        believed.folder,
+        left,
+        gained,
+        by,
+        tuple(remarks),
+    )
 
 
 def files_of(measured: Any) -> list[Path]:

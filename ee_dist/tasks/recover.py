@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import numpy as np
 from rich.box import SIMPLE
@@ -21,7 +22,7 @@ from ee_dist.recording.writer import RunWriter
 from ee_dist.recovery.loop import Recovery, recover
 from ee_dist.recovery.observer import Observers
 from ee_dist.tasks.compose import config_folder
-from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig
 from ee_dist.tasks.observers import Beliefs, Recorder
 from ee_dist.tasks.outcome import Score, score
 from ee_dist.tasks.progress import PassProgress, starting
@@ -36,7 +37,7 @@ from ee_dist.tasks.summary import (
     write_summary,
 )
 from ee_dist.tasks.unfinished import remembered
-from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of
+from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of, hardware_of
 from ee_dist.viewing.story import told
 
 NEIGHBOURS = 300
@@ -56,11 +57,14 @@ class Options:
 def run(config: Config, options: Options, out: Path) -> None:
     """Write recovery.mcap, recovery.rrd and summary.json into ``out`` and print the result."""
     console, watch = Console(), Stopwatch()
-    if config.scenario is None:
+    own = config.hardware.address
+    if config.scenario is None and not own:
         numbers = sorted(int(p.stem) for p in (config_folder() / "scenario").glob("*.yaml") if p.stem.isdigit())
         raise ConfigError(f"which scenario? add one, such as +scenario=8; there are: {', '.join(map(str, numbers))}")
-    scenario, plan, metric = config.scenario, config.budget.plan(), config.metric.build()
-    hidden = scenario.hidden()
+    scenario = config.scenario or ScenarioConfig(title=f"a robot at {own}, of which nothing is known")
+    plan, metric = config.budget.plan(), config.metric.build()
+    truth = scenario.hidden() if config.scenario else None
+    hidden = truth or ()
     robot = build_robot(config)
     apply(robot, hidden)  # A wrong target must be said before hours of work, not after.
     hardware = engine_maker(config, alone=True)()
@@ -68,7 +72,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     search_seed, intact_seed, changed_seed = seeds.spawn(3)
     intact = PhysicalRobot(hardware, robot, (), intact_seed, config.noise)
     changed = PhysicalRobot(hardware, robot, hidden, changed_seed, config.noise)
-    first, later = remembered("intact", intact, robot), remembered("changed", changed, robot)
+    body = hardware_of(config, robot)
+    first, later = remembered("intact", body or intact, robot), remembered("changed", body or changed, robot)
     metadata = {
         "task": "recover",
         "version": package_version(),
@@ -102,11 +107,11 @@ def run(config: Config, options: Options, out: Path) -> None:
         Thread(target=_load, args=("scipy.stats", "ee_dist.viewing.rerun_scene"), daemon=True).start()
         observer = Observers(Recorder(writer), digest, beliefs, progress)
         result = recover(robot, first, later, metric, plan, evaluator, search_seed, observer)
-        truth = changed.reveal()
-        writer.finish({"result_digest": digest.hex, "truth": json.dumps([t.as_dict() for t in truth])})
+        known = {} if truth is None else {"truth": json.dumps([t.as_dict() for t in truth])}
+        writer.finish({"result_digest": digest.hex, **known})
     counts = evaluator.counts
     hardware.close()
-    final = score(result.intact_m, result.trials_m, result.hypotheses[-1], truth)
+    final = score(result.intact_m, result.trials_m, result.hypotheses[-1], hidden)
     summary = write_summary(out, "recover", config, options, watch, digest.hex, {
         "scenario": scenario.number,
         "title": scenario.title,
@@ -119,10 +124,10 @@ def run(config: Config, options: Options, out: Path) -> None:
         "diagnosis_error": result.errors,
         "diagnosis_stages": beliefs.stages,
         "dominants": digest.dominants,
-        "truth": hypothesis_list(truth),
+        "truth": None if truth is None else hypothesis_list(truth),
         "recovered_fraction": final.recovered_fraction,
         "restored": final.restored,
-        "diagnosis": {"found": final.found, "true": final.true, "invented": final.invented, "right": final.right},
+        "diagnosis": None if truth is None else _diagnosis(final),
         "evaluations": {"asked": counts.asked, "simulated": counts.simulated, "steps": counts.steps,
                         "asked_steps": counts.asked_steps},
     })  # fmt: skip
@@ -144,12 +149,16 @@ def run(config: Config, options: Options, out: Path) -> None:
     )
 
 
+def _diagnosis(final: Score) -> dict[str, Any]:
+    return {"found": final.found, "true": final.true, "invented": final.invented, "right": final.right}
+
+
 def _load(*modules: str) -> None:
     for name in modules:
         import_module(name)
 
 
-def _print(console: Console, result: Recovery, truth: Hypothesis, final: Score) -> None:
+def _print(console: Console, result: Recovery, truth: Hypothesis | None, final: Score) -> None:
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("trial")
     table.add_column("distance\n(m)", justify="right")
@@ -167,12 +176,13 @@ def _print(console: Console, result: Recovery, truth: Hypothesis, final: Score) 
             f"{k + 1}", f"{metres:.2f}", share(metres), f"{result.errors[k]:.5f}", lines(result.hypotheses[k])
         )
     table.add_section()
-    table.add_row("truth", "", "", "", lines(truth))
+    table.add_row("truth", "", "", "", "not known" if truth is None else lines(truth))
     console.print(table)
     verdict = "restored" if final.restored else "not restored"
+    named = f"{final.found} of {final.true} true effects at their place, {final.invented} that are not there"
     console.print(
-        f"Function {verdict}: best trial {final.recovered_fraction:.0%} of intact. "
-        f"Diagnosis: {final.found} of {final.true} true effects at their place, {final.invented} that are not there.",
+        f"Function {verdict}: best trial {final.recovered_fraction:.0%} of intact."
+        + ("" if truth is None else f" Diagnosis: {named}."),
         highlight=False,
     )
 

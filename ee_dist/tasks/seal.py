@@ -14,7 +14,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ee_dist.effects.catalogue import Hypothesis, from_dict
+from ee_dist.effects.catalogue import EffectError, Hypothesis, from_dict
+from ee_dist.robots.untrusted import LARGEST, json_of, text_of
 from ee_dist.tasks.config import ConfigError
 
 FILE = "sealed.json"
@@ -32,7 +33,7 @@ def sealed(truth: Mapping[str, Any]) -> tuple[str, str]:
 def opened(path: Path, digest: str | None = None) -> tuple[Hypothesis, dict[str, Any]]:
     """(hidden hypothesis, all that was sealed). Raises ConfigError where the seal is broken or of another log."""
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json_of(text_of(path))
         payload = str(data["payload"])
         found = hashlib.sha256(payload.encode()).hexdigest()
         if found != data["digest"]:
@@ -41,11 +42,12 @@ def opened(path: Path, digest: str | None = None) -> tuple[Hypothesis, dict[str,
             raise ConfigError(
                 f"{path}: this envelope belongs to another log (seal {found[:12]}, the log says {digest[:12]})"
             )
-        truth = json.loads(zlib.decompress(base64.b64decode(payload)[::-1]))
+        truth = json_of(zlib.decompressobj().decompress(base64.b64decode(payload)[::-1], LARGEST))
+        hidden = tuple(from_dict(entry) for entry in truth["hidden"])
     except FileNotFoundError:
         raise ConfigError(f"{path}: no sealed truth there; task=trial writes it beside the log") from None
-    except (ValueError, KeyError, zlib.error) as error:
-        if isinstance(error, ConfigError):
-            raise
+    except (ConfigError, EffectError):
+        raise
+    except (OSError, ValueError, KeyError, TypeError, zlib.error):
         raise ConfigError(f"{path}: not a sealed truth of task=trial") from None
-    return tuple(from_dict(entry) for entry in truth["hidden"]), truth
+    return hidden, truth

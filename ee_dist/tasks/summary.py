@@ -37,7 +37,7 @@ def config_digest(config: Config, options: Any) -> str:
     """Of the settings that decide the result: not of where and how it is computed."""
     tree = OmegaConf.create(config_yaml(config, options))
     assert isinstance(tree, DictConfig)
-    for key in ("evaluator", "ray", "plugins"):
+    for key in ("evaluator", "ray", "plugins", "hardware"):
         tree.pop(key, None)
     tree.engine.pop("threads", None)
     return hashlib.sha256(OmegaConf.to_yaml(tree, sort_keys=True).encode()).hexdigest()

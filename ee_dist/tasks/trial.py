@@ -29,7 +29,7 @@ from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.seal import FILE, sealed
 from ee_dist.tasks.summary import Stopwatch, package_version, write_summary
 from ee_dist.tasks.unfinished import remembered
-from ee_dist.tasks.wiring import build_robot, engine_maker
+from ee_dist.tasks.wiring import build_robot, engine_maker, hardware_of
 from ee_dist.trials.excitation import Excitation, parse
 from ee_dist.trials.hardware import Hardware
 from ee_dist.trials.log import SensorLog
@@ -65,13 +65,19 @@ def run(config: Config, options: Options, out: Path) -> None:
     hidden = hypothesis(config.hidden, robot, hidden_seed)
     apply(robot, hidden)
     plan = [parse(text) for text in options.excitations]
+    body = hardware_of(config, robot)
+    if body is not None and (hidden or any(e.fixture != "floor" for e in plan)):
+        raise ConfigError(
+            f"hardware.address={config.hardware.address}: a robot of your own hides what it hides, and stands on its "
+            "floor: leave out hidden, and name task.excitations without fixture=stand"
+        )
     text, digest = sealed({"hidden": [t.as_dict() for t in hidden], "seed": config.seed, "engine": config.engine.name})
     metadata = {
         "task": "trial",
         "version": package_version(),
         "engine": config.engine.name,
         "noise": str(config.noise or options.noise),
-        "seal": digest,
+        **({} if body is not None else {"seal": digest}),
         "trials": json.dumps([e.as_dict() for e in plan * options.repeats]),
     }
     floor_seed, stand_seed = noise_seed.spawn(2)
@@ -79,42 +85,51 @@ def run(config: Config, options: Options, out: Path) -> None:
         "floor": PhysicalRobot(engine, robot, hidden, floor_seed),
         "stand": PhysicalRobot(engine, robot, (*hidden, term("on_stand")), stand_seed),
     }
-    tried = {name: remembered(name, body, robot) for name, body in hardware.items()}
+    tried = {name: remembered(name, body or simulated, robot) for name, simulated in hardware.items()}
     path, sums = out / "trial.mcap", hashlib.sha256()
-    table = Table(title=f"Trials of {robot.name}, hidden change sealed", title_justify="left")
+    what = "of your own" if body else "hidden change sealed"
+    table = Table(title=f"Trials of {robot.name}, {what}", title_justify="left")
     for column in ("trial", "what was done", "seconds", "rows"):
         table.add_column(column)
     # The truth before the log that is sealed with it: a log without its envelope could never be opened.
-    write_whole(out / FILE, text)
+    if body is None:
+        write_whole(out / FILE, text)
     with RunWriter(path, robot, metadata) as writer:
         for k, excitation in enumerate(plan * options.repeats):
-            log, record = one_trial(tried[excitation.fixture], excitation, robot, k)
+            log, record = one_trial(tried[excitation.fixture], excitation, robot, k, body is not None)
             writer.trial(record)
             sums.update(np.ascontiguousarray(log.sensors).tobytes())
             table.add_row(str(k + 1), str(excitation), f"{excitation.seconds:g}", str(len(log)))
         writer.finish({"result_digest": sums.hexdigest()})
     engine.close()
     console.print(table)
-    console.print(
-        f"Noise: {config.noise or options.noise:.1%} of each channel's range. Seal {digest[:16]}.", highlight=False
-    )
+    if body is None:
+        told = f"Noise: {config.noise or options.noise:.1%} of each channel's range. Seal {digest[:16]}."
+        console.print(told, highlight=False)
     write_summary(out, "trial", config, options, watch, sums.hexdigest(), {
-        "trials": [e.as_dict() for e in plan * options.repeats], "noise": config.noise or options.noise, "seal": digest,
+        "trials": [e.as_dict() for e in plan * options.repeats], "noise": config.noise or options.noise,
+        "seal": None if body else digest,
         "log": str(path), "channels": [{"name": s.name, "unit": s.unit} for s in robot.sensors],
     })  # fmt: skip
     scene = drawn(path)
-    for label, file in (("log", path), ("rerun", scene), ("truth", out / FILE)):
+    files = [("log", path), ("rerun", scene), *([] if body else [("truth", out / FILE)])]
+    for label, file in files:
         console.print(f"  {label:<10}{os.path.relpath(file)}", highlight=False, soft_wrap=True)
     console.print(
         f"Next: python -m ee_dist task=explain measured={os.path.relpath(path)}", highlight=False, soft_wrap=True
     )
 
 
-def one_trial(hardware: Hardware, excitation: Excitation, robot: Robot, index: int) -> tuple[SensorLog, TrialRecord]:
-    """Run it, and write down what the experimenter knows: what was sent, and what the sensors said."""
+def one_trial(
+    hardware: Hardware, excitation: Excitation, robot: Robot, index: int, own: bool = False
+) -> tuple[SensorLog, TrialRecord]:
+    """Run it, and write down what the experimenter knows: what was sent, and what the sensors said.
+
+    ``own``: the log of a robot of one's own, whose commands are those that were sent.
+    """
     driver = driver_of(excitation, robot)
     log = hardware.trial(driver, excitation.steps(robot))
-    if isinstance(driver, Commands):
+    if isinstance(driver, Commands) and not own:
         # What reached the drives behind faulty wiring is not known to who sent the commands.
         log = replace(log, commands=np.array(driver.values[: len(log)]))
     log = replace(log, torques=None)

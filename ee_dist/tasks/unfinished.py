@@ -45,14 +45,13 @@ class Unfinished:
     def journal(self) -> Journal:
         """What was simulated so far, open for more."""
         if self._journal is None:
-            self._begin()
+            self.begin()
             self._journal = Journal(self.folder / _SIMULATED)
         return self._journal
 
     def hardware(self, name: str, inner: Hardware, robot: Robot) -> Hardware:
         """``inner``, of which no trial is asked twice. ``robot`` as its recordings know it."""
-        self._begin()
-        return _Remembered(self.folder, name, inner, robot)
+        return _Remembered(self, name, inner, robot)
 
     def check(self) -> None:
         """Raises ConfigError where the run in the folder was started with other settings or versions."""
@@ -80,7 +79,7 @@ class Unfinished:
                 "give the same command as before, and resume="
             )
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
         self.folder.mkdir(exist_ok=True)
         if not (self.folder / _RUN).exists():
             content = {"digest": self.digest, "settings": self.settings, "versions": installed()}
@@ -94,6 +93,12 @@ class Unfinished:
             path.unlink(missing_ok=True)
         with suppress(OSError):
             self.folder.rmdir()
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is nothing worth going on from."""
+        known = self._journal is not None and bool(self._journal.values)
+        return not known and self._journal is not None and not any(self.folder.glob("*.mcap"))
 
     def older_than(self, path: Path) -> bool:
         """Whether the run was begun before that file was written."""
@@ -109,8 +114,8 @@ class Unfinished:
 class _Remembered:
     """Hardware whose trials are on the disk as soon as they are made; those that are there are not made again."""
 
-    def __init__(self, folder: Path, name: str, inner: Hardware, robot: Robot) -> None:
-        self.folder, self.name, self.inner, self.robot = folder, name, inner, robot
+    def __init__(self, run: Unfinished, name: str, inner: Hardware, robot: Robot) -> None:
+        self.run, self.folder, self.name, self.inner, self.robot = run, run.folder, name, inner, robot
         self.count = 0
 
     def trial(self, driver: Any, steps: int) -> SensorLog:
@@ -124,10 +129,26 @@ class _Remembered:
             if skip is not None:
                 skip()
             return record.log
-        log = self.inner.trial(driver, steps)
+        try:
+            log = self.inner.trial(driver, steps)
+        except BaseException:
+            self._keep_aborted(driver)
+            raise
+        self.run.begin()
         with RunWriter(path, self.robot, {"task": "unfinished"}) as writer:
             writer.trial(TrialRecord(self.count - 1, self.name, HARDWARE, driver, log))
         return log
+
+    def _keep_aborted(self, driver: Any) -> None:
+        """What was measured in a trial that did not reach its end, beside the recording of the run: no resume removes it."""
+        log = getattr(self.inner, "aborted", None)
+        if log is None:
+            return
+        stem, number = f"aborted_{self.name}_{self.count - 1:04d}", 1
+        while (path := self.folder.parent / f"{stem}_{number}.mcap").exists():
+            number += 1
+        with RunWriter(path, self.robot, {"task": "aborted"}) as writer:
+            writer.trial(TrialRecord(self.count - 1, f"{self.name}, aborted", HARDWARE, driver, log))
 
 
 _current: Unfinished | None = None
@@ -152,6 +173,8 @@ def unfinished(out: Path, config: Config, options: Any, resume: bool) -> Iterato
             found.forget()
         raise
     finally:
+        if found.empty:
+            found.forget()
         found.close()
         _current = None
 

@@ -16,6 +16,8 @@ from ee_dist.evaluation.journal import JournaledEvaluator
 from ee_dist.evaluation.ray_actors import RayEvaluator
 from ee_dist.evaluation.ray_session import stop_ray
 from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.evaluation.socket_body import SocketBody
+from ee_dist.evaluation.stepped import SteppedRobot
 from ee_dist.robots.describe import robot_of
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config
@@ -63,6 +65,14 @@ def build_robot(config: Config) -> Robot:
     return robot_of(config.robot.name, config.robot.urdf, config.robot.drives)[0]
 
 
+def hardware_of(config: Config, robot: Robot) -> SteppedRobot | None:
+    """The user's own robot, where ``hardware.address`` names one. Raises HardwareError for an address that is none."""
+    own = config.hardware
+    if not own.address:
+        return None
+    return SteppedRobot(SocketBody(own.address, own.timeout_s, own.begin_s), robot, own.limits())
+
+
 _kept: dict[object, Evaluator] = {}
 
 
@@ -73,8 +83,11 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
     simulated already. A sweep over scenarios evolves the intact robot's controllers once.
     """
     settings = config.evaluator
+    name = settings.name
+    if name == "auto":
+        name = "serial" if config.budget.small and not settings.workers and not config.ray.address else "ray"
     key = (
-        settings.name,
+        name,
         settings.workers,
         settings.chunk,
         settings.cache,
@@ -85,7 +98,7 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
         close_evaluators()
         inner: Evaluator
         chunk = LARGE if engine == ONE_JOINT else 256
-        if settings.name == "serial":
+        if name == "serial":
             inner = SerialEvaluator(engine_maker(config, True, engine)(), settings.chunk or chunk)
         else:
             inner = RayEvaluator(

@@ -61,9 +61,7 @@ class Weights(Problem):
 
 @pytest.fixture
 def weights(monkeypatch):
-    way = Way(
-        "weights", "slow motions were recorded", lambda measured, _: Weights(measured.trials, measured.robot)
-    )
+    way = Way("weights", "slow motions were recorded", lambda measured, _: Weights(measured.trials, measured.robot))
     monkeypatch.setitem(WAYS, "weights", way)
 
 

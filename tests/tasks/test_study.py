@@ -80,7 +80,7 @@ def test_no_bar_whisker_or_dot_of_a_figure_is_cut():
         assert (np.array(trace.y) - whisker).min() >= low
         assert (np.array(trace.y) + whisker).max() < high
     assert figure.layout.annotations[0].y < high
-    assert figure.layout.xaxis.ticktext[0] == "1. what<br>happens in<br>case 1, told<br>at some length"
+    assert figure.layout.xaxis.ticktext[0] == "1. what<br>happens in<br>case 1, told<br>at some<br>length"
 
 
 def test_the_table_of_all_cases_survives_80_columns():

@@ -25,6 +25,8 @@ WINDOWS, MOTIONS, SETTINGS = (
 )
 ONE_BY_ONE = 3
 """Up to so many motions or settings each is held out by itself; more take turns in two groups."""
+SAME_MOTION, SAME_LENGTH = 0.02, 0.9
+"""Two trials are one motion where their commands differ by less than this share of how much they vary, over nearly all of it."""
 PRIOR = 1.0
 """Energy that a value at its bound costs in a fit that will be judged elsewhere: a value that the fitted part does not
 determine is neutral there, and not what the part held out would like it to be."""
@@ -102,10 +104,29 @@ def travelling(problem: Problem) -> list[Cut]:
     return cuts
 
 
-def _kinds(problem: Problem) -> list[object]:
-    """By trial: what motion it is. Trials of one name, or of the same commands, are repeats."""
-    known: dict[bytes, str] = {}
-    return [known.setdefault(t.log.commands.tobytes(), t.name) for t in problem.measured]
+def _kinds(problem: Problem) -> list[int]:
+    """By trial: the number of its motion. Trials with the same commands (or, with none, positions) are repeats; so are those
+    of one name in which a controller was in the loop."""
+    out: list[int] = []
+    for k in range(len(problem.measured)):
+        same = [j for j in range(k) if _alike(problem, j, k)]
+        out.append(out[same[0]] if same else k)
+    return out
+
+
+def _alike(problem: Problem, a: int, b: int) -> bool:
+    one, other = problem.measured[a], problem.measured[b]
+    if a in problem.looped or b in problem.looped:
+        return one.name == other.name
+    motions = []
+    for log in (one.log, other.log):
+        seen = log.commands if np.isfinite(log.commands).all() or log.joints is None else log.joints
+        motions.append(np.nan_to_num(seen))
+    rows = min(map(len, motions))
+    if rows < SAME_LENGTH * max(map(len, motions)):
+        return False
+    gap = np.sqrt(np.mean((motions[0][:rows] - motions[1][:rows]) ** 2))
+    return bool(gap <= SAME_MOTION * np.sqrt(np.mean(np.var(motions[0][:rows], axis=0))))
 
 
 def cross_fit(

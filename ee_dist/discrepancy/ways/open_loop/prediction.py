@@ -15,7 +15,7 @@ import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released, start_of
 from ee_dist.engines.contract import Rollout
-from ee_dist.engines.drivers import Commands, Controllers, Network, scaling
+from ee_dist.engines.drivers import Commands, Controllers, Network, command_scaling
 from ee_dist.engines.sensing import SensingPath
 from ee_dist.evaluation.jobs import Evaluator, Job
 from ee_dist.robots.model import Robot, Sensor, Wiring
@@ -230,7 +230,7 @@ def predicted_commands(trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
     """(T, B, M): what a trial's network would have commanded through the wiring of each model, given what the sensors
     did report. Exact: the network saw the very numbers in the log."""
     assert isinstance(trial.driver, Network)
-    control = Controllers(models, [trial.driver] * len(models), [scaling(m) for m in models], len(trial.log))
+    control = Controllers(models, [trial.driver] * len(models), [command_scaling(m) for m in models], len(trial.log))
     dt = models[0].time_step_s
     rows = [control.step(i, i * dt, np.repeat(s[None], len(models), axis=0)) for i, s in enumerate(trial.log.sensors)]
     return np.stack(rows)

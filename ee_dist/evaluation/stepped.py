@@ -1,0 +1,91 @@
+"""A body that is driven step by step as hardware: the controller runs here, within limits, and nothing measured is lost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ee_dist.engines.drivers import Controllers, scaling
+from ee_dist.robots.model import Robot
+from ee_dist.trials.hardware import Body, HardwareError, Limiter, Limits, Reading
+from ee_dist.trials.log import Array, LogError, SensorLog
+
+_REST = ("base_pose", "joints", "torques", "supply_v")
+
+
+class SteppedRobot:
+    """Implements ``ee_dist.trials.hardware.Hardware``. ``robot`` names its channels and drives, and bounds its joints.
+
+    ``aborted`` is the log of a trial that did not reach its end, whatever ended it.
+    """
+
+    def __init__(self, body: Body, robot: Robot, limits: Limits) -> None:
+        self.body, self.robot, self.limits = body, robot, limits
+        self.trials = 0
+        self.aborted: SensorLog | None = None
+
+    def skip(self) -> None:
+        """A trial that was made before, by a run that is resumed now."""
+        self.trials += 1
+
+    def trial(self, driver: Any, steps: int) -> SensorLog:
+        robot, limiter = self.robot, Limiter(self.robot, self.limits)
+        controllers = Controllers([robot], [driver], [scaling(robot)], steps)
+        sensors: list[Array] = []
+        commands: list[Array] = []
+        self.aborted = None
+        try:
+            reading = self.body.begin(self.trials, steps, robot.time_step_s)
+            for step in range(steps):
+                sensed = self._sensed(reading, step)
+                sent = limiter(controllers.step(step, step * robot.time_step_s, sensed[None])[0])
+                sensors.append(sensed)
+                commands.append(sent)
+                reading = self.body.step(sent)
+                self._check_torques(reading, step)
+            log = self._log(sensors, commands, self._rest(reading))
+        except BaseException as error:
+            # Whatever it was, Ctrl-C too: the body must not go on moving, and what was measured is kept.
+            self.body.abort()
+            self.aborted = self._log(sensors, commands[: len(sensors)], {}) if len(sensors) > 1 else None
+            if isinstance(error, (HardwareError, LogError)):
+                at = f"trial {self.trials + 1}, step {len(sensors)} of {steps}"
+                raise HardwareError(f"{at}: {error}", self.aborted) from None
+            raise
+        self.trials += 1
+        return log
+
+    def _sensed(self, reading: Reading, step: int) -> Array:
+        found = reading.sensors
+        if found is None or found.shape != (len(self.robot.sensors),) or not np.isfinite(found).all():
+            shape = None if found is None else found.shape
+            raise HardwareError(f"it answered sensors of shape {shape}; expected {len(self.robot.sensors)} numbers")
+        return found
+
+    def _check_torques(self, reading: Reading, step: int) -> None:
+        found = reading.torques
+        if found is not None and not np.all(np.abs(found) <= self.limits.torque):
+            worst = self.robot.drives[int(np.argmax(np.abs(found)))].joint
+            raise HardwareError(
+                f"{np.abs(found).max():.3g} N.m at {worst}, beyond the limit of {self.limits.torque:g} (hardware.torque)"
+            )
+
+    def _rest(self, reading: Reading) -> dict[str, Any]:
+        if reading.rest is None:
+            raise HardwareError("it did not say that the trial is over")
+        return {k: np.asarray(v, dtype=float) for k, v in reading.rest.items() if k in _REST and v is not None} | {
+            "travel_m": float(reading.rest.get("travel_m", float("nan")))
+        }
+
+    def _log(self, sensors: list[Array], commands: list[Array], rest: dict[str, Any]) -> SensorLog:
+        robot = self.robot
+        return SensorLog(
+            times_s=np.arange(len(sensors), dtype=np.float64) * robot.time_step_s,
+            sensors=np.array(sensors, dtype=np.float64),
+            commands=np.array(commands, dtype=np.float64),
+            sensor_names=robot.sensor_names,
+            sensor_units=tuple(s.unit for s in robot.sensors),
+            motor_names=robot.motor_names,
+            **rest,
+        )

@@ -1,0 +1,38 @@
+"""Which evaluator a run gets that does not name one."""
+
+from __future__ import annotations
+
+import pytest
+
+from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.tasks import wiring
+from ee_dist.tasks.config import BudgetConfig, Config, EngineConfig, EvaluatorConfig, RayConfig
+
+QUICK = BudgetConfig("quick", population=32, generations=6, crossovers=4, steps=300)
+
+
+@pytest.mark.parametrize(("budget", "evaluator", "address", "expected"), [
+    (QUICK, EvaluatorConfig(), None, "serial"),
+    (BudgetConfig(), EvaluatorConfig(), None, "ray"),
+    (QUICK, EvaluatorConfig(workers=2), None, "ray"),
+    (QUICK, EvaluatorConfig(), "127.0.0.1:6379", "ray"),
+    (QUICK, EvaluatorConfig("ray"), None, "ray"),
+    (BudgetConfig(), EvaluatorConfig("serial"), None, "serial"),
+])  # fmt: skip
+def test_serial_for_a_small_budget_and_ray_where_it_pays_or_is_asked_for(
+    monkeypatch, budget, evaluator, address, expected
+):
+    asked = []
+
+    class Ray(SerialEvaluator):
+        def __init__(self, make_engine, workers, chunk, address):
+            asked.append((workers, address))
+            super().__init__(make_engine())
+
+    monkeypatch.setattr(wiring, "RayEvaluator", Ray)
+    wiring.close_evaluators()
+    wiring.evaluator_of(
+        Config(engine=EngineConfig("mujoco"), budget=budget, evaluator=evaluator, ray=RayConfig(address))
+    )
+    wiring.close_evaluators()
+    assert asked == ([(evaluator.workers, address)] if expected == "ray" else [])

@@ -1,0 +1,182 @@
+"""A robot in a process of its own behind a socket: the same result as the simulated one, whatever is unplugged."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ee_dist.engines.drivers import Commands
+from ee_dist.evaluation.socket_body import SocketBody
+from ee_dist.evaluation.stepped import SteppedRobot
+from ee_dist.recording.reader import read_logs
+from ee_dist.robots.quadruped import quadruped
+from ee_dist.trials.hardware import HardwareError, Limiter, Limits, Reading
+
+ROBOT = Path(__file__).parents[2] / "docs" / "examples" / "socket_robot.py"
+FAST = ("evaluator=serial", "engine=mujoco", "budget.compensating_trials=1", "budget.polish=1")
+
+
+@contextlib.contextmanager
+def plugged_in(*arguments: str) -> Iterator[str]:
+    """Its address."""
+    command = [sys.executable, str(ROBOT), "--port", "0", "--engine", "mujoco", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            yield process.stdout.readline().split()[-1]
+        finally:
+            process.kill()
+
+
+def test_recovery_on_it_with_the_plug_pulled_and_a_resume_ends_as_the_simulated_one_does(cli, tiny, tmp_path):
+    base = ("+scenario=8", *FAST, *tiny)
+    simulated = cli(*base, f"hydra.run.dir={tmp_path}/simulated")
+    assert simulated.status == 0, simulated.err
+    out = tmp_path / "own"
+    with plugged_in("--unplug", "1:30") as address:
+        stopped = cli(*base, f"hardware.address={address}", f"hydra.run.dir={out}")
+    assert stopped.status == 2
+    (line,) = stopped.err.strip().splitlines()
+    assert f"trial 2, step 30 of 80: hardware.address={address}: the robot does not answer any more" in line
+    assert "go on with the same command and resume=" in line
+    (aborted,) = read_logs(out / "aborted_changed_0000_1.mcap")
+    assert len(aborted.log) == 30
+    gone = cli(*base, f"hardware.address={address}", f"resume={out}")
+    assert gone.status == 2
+    assert "no robot answers there" in gone.err
+    with plugged_in() as address:
+        resumed = cli(*base, f"hardware.address={address}", f"resume={out}")
+    assert resumed.status == 0, resumed.err
+    digests = {json.loads((tmp_path / n / "summary.json").read_text())["result_digest"] for n in ("simulated", "own")}
+    assert len(digests) == 1
+    complete = read_logs(out / "recovery.mcap")
+    assert aborted.log.sensors.tobytes() == complete[1].log.head(30).sensors.tobytes()
+    assert (out / "aborted_changed_0000_1.mcap").exists()
+
+
+def test_trials_of_it_are_recorded_and_nothing_is_sealed_that_nobody_knows(cli, tmp_path):
+    asked = ("task=trial", "engine=mujoco", "task.excitations=['sway:seconds=0.5,amplitude=0.1']")
+    with plugged_in("--robot", "quadruped_lab", "--scenario", "none") as address:
+        outcome = cli(*asked, f"hardware.address={address}", f"hydra.run.dir={tmp_path}/out")
+        refused = cli("task=trial", "+hidden=drag", f"hardware.address={address}")
+    assert outcome.status == 0, outcome.err
+    (record,) = read_logs(tmp_path / "out" / "trial.mcap")
+    assert len(record.log) == 50
+    assert not (tmp_path / "out" / "sealed.json").exists()
+    assert refused.status == 2
+    assert "leave out hidden" in refused.err
+
+
+class Dummy:
+    """A body that answers what it is told to."""
+
+    def __init__(self, torque: float = 0.0, sensors: int = 8, fail_at: int = 10**9) -> None:
+        self.torque, self.sensors, self.fail_at = torque, sensors, fail_at
+        self.sent: list[np.ndarray] = []
+        self.stopped, self.steps = 0, 0
+
+    def begin(self, trial: int, steps: int, step_s: float) -> Reading:
+        self.steps = steps
+        return Reading(np.zeros(self.sensors))
+
+    def step(self, commands: np.ndarray) -> Reading:
+        self.sent.append(commands)
+        if len(self.sent) == self.fail_at:
+            raise KeyboardInterrupt
+        over = len(self.sent) == self.steps
+        return Reading(
+            np.zeros(self.sensors), np.full(8, self.torque * len(self.sent)), {"travel_m": 1.0} if over else None
+        )
+
+    def abort(self) -> None:
+        self.stopped += 1
+
+
+def test_no_command_leaves_that_is_outside_of_the_limits():
+    robot, rng = quadruped(), np.random.default_rng(0)
+    wild = rng.normal(scale=5.0, size=(60, 8))
+    body = Dummy()
+    limits = Limits(range_share=0.5, speed=2.0, acceleration=50.0)
+    log = SteppedRobot(body, robot, limits).trial(Commands(wild), 60)
+    sent = np.array(body.sent)
+    assert np.array_equal(log.commands, sent)
+    joints = [robot.joint(d.joint) for d in robot.drives]
+    half = np.array([(j.upper - j.lower) / 2 for j in joints])
+    middle = np.array([(j.upper + j.lower) / 2 for j in joints])
+    assert (np.abs(sent - middle) <= half * 0.5 + 1e-12).all()
+    moved = np.diff(np.concatenate([np.zeros((1, 8)), sent]), axis=0)
+    assert np.abs(moved).max() <= 2.0 * robot.time_step_s + 1e-12
+    assert np.abs(moved).max() > 1.9 * robot.time_step_s, "the limits were never reached"
+    within = np.clip(wild, [j.lower for j in joints], [j.upper for j in joints])
+    free = Dummy()
+    SteppedRobot(free, robot, Limits()).trial(Commands(within), 60)
+    assert np.array(free.sent).tobytes() == within.tobytes(), "what is allowed is sent as it is"
+
+
+def test_what_ends_a_trial_stops_the_body_and_keeps_what_was_measured():
+    robot, drive = quadruped(), Commands(np.zeros((40, 8)))
+    hot = SteppedRobot(Dummy(torque=0.1), robot, Limits(torque=1.05))
+    with pytest.raises(
+        HardwareError, match=r"trial 1, step 11 of 40: 1\.1 N\.m at .*, beyond the limit of 1\.05"
+    ) as caught:
+        hot.trial(drive, 40)
+    assert caught.value.log is not None and len(caught.value.log) == 11
+    assert (hot.body.stopped, hot.trials) == (1, 0)
+    interrupted = SteppedRobot(Dummy(fail_at=7), robot, Limits())
+    with pytest.raises(KeyboardInterrupt):
+        interrupted.trial(drive, 40)
+    assert interrupted.body.stopped == 1
+    assert interrupted.aborted is not None and len(interrupted.aborted) == 7
+    with pytest.raises(HardwareError, match="expected 8 numbers"):
+        SteppedRobot(Dummy(sensors=3), robot, Limits()).trial(drive, 40)
+    with pytest.raises(HardwareError, match="not 8 numbers"):
+        Limiter(robot, Limits())(np.full(8, np.nan))
+
+
+ANSWERS = (b"", b"no json\n", b"[1]\n", b'{"error": "too hot"}\n', b"[" * 9000 + b"\n", b'{"a": 1}\n', None)
+
+
+@pytest.mark.parametrize("answer", ANSWERS)
+def test_whatever_it_answers_is_one_line_within_the_time(answer):
+    import socket
+    import threading
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        hold = threading.Event()
+
+        def serve() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(1000)
+                if answer is None:
+                    hold.wait(5)
+                else:
+                    connection.sendall(answer)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        body = SocketBody(f"127.0.0.1:{server.getsockname()[1]}", 0.3, 0.3)
+        with pytest.raises(HardwareError) as caught:
+            body.begin(0, 10, 0.01)
+        hold.set()
+        thread.join(5)
+    text = str(caught.value)
+    assert text.startswith("hardware.address=127.0.0.1:") and "\n" not in text and len(text) < 400
+
+
+@pytest.mark.parametrize(("setting", "said"), [
+    ("hardware.address=nowhere", "expected host:port"), ("hardware.timeout_s=0", "hardware.timeout_s=0.0: must be above 0"),
+    ("hardware.speed=-1", "hardware.speed=-1.0: must be above 0"), ("hardware.range_share=2", "must be above 0 and at most 1"),
+])  # fmt: skip
+def test_a_wrong_setting_is_one_line(cli, setting, said):
+    outcome = cli("+scenario=8", setting)
+    assert outcome.status == 2
+    (line,) = outcome.err.strip().splitlines()
+    assert said in line
