@@ -20,6 +20,7 @@ from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.folder import write_whole
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.wiring import build_robot, evaluator_of
+from ee_dist.viewing.templates import FIGURE
 
 
 @dataclass
@@ -99,4 +100,4 @@ def _figure(before: list[tuple[int, float]], after: list[tuple[int, float]], tit
     figure.update_layout(title="Evolution on the body alone")
     figure.update_xaxes(title="trials on the body")
     figure.update_yaxes(title="best forward distance (m)")
-    write_whole(path, figure.to_html(include_plotlyjs=True))
+    write_whole(path, figure.to_html(include_plotlyjs=True, config=FIGURE))

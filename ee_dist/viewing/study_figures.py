@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import textwrap
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -11,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-import plotly.io as pio
+
+from ee_dist.viewing.templates import plot, rendered
 
 STAGES = {"intact": "#8a94a6", "after the change": "#e08a1e", "last trial": "#3b7dd8"}
 """What the bars of a case are, and their colours."""
@@ -21,12 +21,6 @@ LABEL = 13
 """Characters of a line of a case's name below its bars."""
 ROOM = 0.12
 """Free share of the axis beyond the farthest bar with its spread."""
-BUTTONS = [["toImage", "zoom2d", "pan2d", "resetScale2d"]]
-"""All that a figure offers: nothing that sends it anywhere."""
-_STYLE = (
-    "body{font-family:system-ui,sans-serif;max-width:1100px;margin:2rem auto;padding:0 1rem;color:#1c2330;"
-    "background:#fff}p{color:#55606f}@media(prefers-color-scheme:dark){body{color:#dfe4ec;background:#12151c}p{color:#9aa4b2}}"
-)
 
 Tests = Mapping[tuple[str, int], str]
 """By metric and scenario what a test said, in a few words."""
@@ -37,15 +31,9 @@ def write_figures(summaries: Sequence[dict[str, Any]], tests: Tests, caption: st
     metrics = sorted({s["metric"] for s in summaries})
     figures = [distances([s for s in summaries if s["metric"] == m], m, tests) for m in metrics]
     figures.append(dominants(summaries))
-    config = {"displaylogo": False, "modeBarButtons": BUTTONS, "responsive": True}
-    body = "\n".join(
-        pio.to_html(f, full_html=False, include_plotlyjs=k == 0, config=config) for k, f in enumerate(figures)
-    )
     title = f"A study of {len(summaries)} runs"
-    page = (
-        f"<!doctype html><html lang='en'><head><meta charset='utf-8'><title>{title}</title>"
-        "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-        f"<style>{_STYLE}</style></head><body><h1>{title}</h1><p>{html.escape(caption)}</p>{body}</body></html>"
+    page = rendered(
+        "study.html", title=title, caption=caption, figures=[plot(f, f"plot{k}") for k, f in enumerate(figures)]
     )
     path.write_text(page, encoding="utf-8")
 

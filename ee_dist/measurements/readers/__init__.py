@@ -6,11 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.readers.arrays import read_mat, read_npz
+from ee_dist.measurements.readers.arrays import read_npz
 from ee_dist.measurements.readers.bags import is_bag, read_bag, read_mcap
 from ee_dist.measurements.readers.hdf5 import read_hdf5
 from ee_dist.measurements.readers.json_rows import read_json
 from ee_dist.measurements.readers.lerobot import is_lerobot, read_lerobot
+from ee_dist.measurements.readers.matlab import read_mat
 from ee_dist.measurements.readers.options import Options
 from ee_dist.measurements.readers.parquet import read_parquet
 from ee_dist.measurements.readers.text import read_text

@@ -1,4 +1,4 @@
-"""Arrays by name as tables: what NumPy's archives, MATLAB's files and HDF5 have in common, and the first two themselves."""
+"""Arrays by name as tables: what NumPy's archives, MATLAB's files and HDF5 have in common, and the first of them."""
 
 from __future__ import annotations
 
@@ -114,67 +114,9 @@ def read_npz(file: Path, options: Options) -> tuple[Recorded, ...]:
             raise MeasurementError(
                 f"{file}: holds Python objects (a pickle), which are not loaded: they could run code; save arrays of numbers"
             ) from None
-        raise MeasurementError(f"{file}: not an archive of NumPy, or cut short: {_one(error)}") from None
+        raise MeasurementError(f"{file}: not an archive of NumPy, or cut short: {in_one_line(error)}") from None
 
 
-def read_mat(file: Path, options: Options) -> tuple[Recorded, ...]:
-    """MATLAB's files to version 7 by SciPy, 7.3 by h5py. Structs are columns ``run.q``, arrays of structs trials.
-
-    Raises MeasurementError.
-    """
-    from scipy import io
-
-    try:
-        sizes = [float(np.prod(shape, dtype=float)) for _, shape, _ in io.whosmat(str(file))]
-        bounded(file, 8 * sum(sizes))
-        content = io.loadmat(str(file), simplify_cells=True, verify_compressed_data_integrity=True)
-    except NotImplementedError:
-        from ee_dist.measurements.readers.hdf5 import read_hdf5
-
-        return read_hdf5(file, options)
-    except MeasurementError:
-        raise
-    except OSError as error:
-        if error.errno:
-            raise
-        raise MeasurementError(f"{file}: not a MATLAB file, or cut short: {_one(error)}") from None
-    except Exception as error:  # The parser raises what it stumbles upon.
-        raise MeasurementError(f"{file}: not a MATLAB file, or cut short: {_one(error)}") from None
-    flat: dict[str, Any] = {}
-    trials: dict[str, list[dict[str, Any]]] = {}
-    _flatten({k: v for k, v in content.items() if not k.startswith("__")}, "", flat, trials, 0)
-    if trials:
-        name, runs = max(trials.items(), key=lambda item: len(item[1]))
-        found = []
-        for k, run in enumerate(runs):
-            inner: dict[str, Any] = {}
-            _flatten(run, "", inner, {}, 0)
-            found.append(recorded(file, f"{name} {k + 1}", inner))
-        return tuple(found)
-    if not any(np.asarray(v).dtype.kind in "fiub" for v in flat.values()):
-        raise MeasurementError(
-            f"{file}: no arrays of numbers in it (timeseries, tables and objects are not read): save arrays or structs of arrays"
-        )
-    return (recorded(file, "", flat),)
-
-
-def _flatten(data: Mapping[str, Any], before: str, into: dict[str, Any], trials: dict[str, Any], depth: int) -> None:
-    for key, value in data.items():
-        name = f"{before}{key}"
-        if isinstance(value, Mapping) and depth < 6:
-            _flatten(value, f"{name}.", into, trials, depth + 1)
-        elif (
-            isinstance(value, (list, np.ndarray))
-            and len(np.shape(value)) == 1
-            and len(value)
-            and isinstance(value[0], Mapping)
-        ):
-            trials[name] = list(value)
-        elif isinstance(value, (str, int, float, bool)) or (
-            isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
-        ):
-            into[name] = value
-
-
-def _one(error: BaseException) -> str:
+def in_one_line(error: BaseException) -> str:
+    """What a library said, short."""
     return " ".join(f"{error or type(error).__name__}".split())[:120]
