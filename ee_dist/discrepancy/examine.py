@@ -34,7 +34,7 @@ FAR = 2.0
 """Error over the noise floor of the best quick fit from which windows of the same motions need not even be looked at."""
 NEAR = 1.1
 """Error over the noise floor up to which windows of the same motions are evidence enough: no more than noise is left."""
-FAMILIES_TRIED = 3
+FAMILIES_TRIED = 4
 """Effects whose members at all joints, each with a value of its own, are tried together."""
 
 
@@ -247,7 +247,7 @@ def _families(
         if promise > 1.3 * max(s.promise for s in visible):
             label = f"{name}@each of {len(visible)} joints"
             parts = Proposal(tuple(s.candidate for s in visible), label)
-            out.append((promise / parts.size, parts, np.concatenate([s.starts[0] for s in visible])))
+            out.append((promise / np.sqrt(parts.size), parts, np.concatenate([s.starts[0] for s in visible])))
     out = sorted(out, key=lambda f: -f[0])[:FAMILIES_TRIED]
     found = [(p, u) for _, p, u in out]
     by_name = {s.candidate.name: s for s in screened}

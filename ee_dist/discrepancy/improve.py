@@ -30,8 +30,9 @@ from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
-EXCHANGES = 2
-"""How often an effect may be exchanged for what was tied with it."""
+EXCHANGES, LOOKED_AT, CLOSE = 2, 2, 1.1
+"""How often an effect may be exchanged for what was tied with it; how many of these are looked at, and how much worse they
+may be by themselves, as a share of the squared error."""
 MOST = 12
 """Effects that are added at most unless told otherwise."""
 NO_MORE = "no further effect earns its place: {why}"
@@ -118,10 +119,12 @@ def improve(
             last = examine(search, current, [c for c in pool if c.name not in names], effort)
             best = last.best
             if best is None:
-                exchanged = _exchanged(search, current, ladder, own, len(pool))
-                if exchanged is not None and exchanges < EXCHANGES:
+                found = None
+                if exchanges < EXCHANGES and leftovers(problem, last.base):
                     exchanges += 1
-                    current, rung = exchanged
+                    found = _exchanged(search, current, ladder, own, pool, effort)
+                if found is not None:
+                    current, rung = found
                     ladder.append(rung)
                     continue
                 nearest = last.judged[0].why_not if last.judged else LUCK
@@ -227,46 +230,53 @@ def _pruned(
 
 
 def _exchanged(
-    search: Search, current: Current, ladder: Sequence[Rung], own: int, tried: int
+    search: Search, current: Current, ladder: Sequence[Rung], own: int, pool: Sequence[Candidate], effort: Effort
 ) -> tuple[Current, Rung] | None:
-    """The model with one of its effects exchanged for what was tied with it when it was added, if later effects have
-    decided that tie: on held-out data the other is better by more than luck."""
+    """The model with one of its effects exchanged for what was tied with it when it was added, if that is better by more
+    than luck: by itself, or with what earns its place only beside the other. Two effects that mimic one another decide
+    which third one can still be seen."""
     problem, places = search.problem, _places(current.parts)
     where = {c.name: k for k, c in enumerate(current.parts) if k >= own}
-    options: list[tuple[Rung, int, Proposal, Array]] = []
+    options: list[tuple[int, Proposal]] = []
+    models = [(Model(current.parts), current.u)]
     for rung in ladder:
         for k in [where[t.name] for t in rung.added if t.name in where and len(rung.added) == 1]:
-            options += [(rung, k, p, u) for p, u in rung.alternatives if p.parts[0].name not in where]
+            for p, u in rung.alternatives:
+                if p.parts[0].name not in where:
+                    options.append((k, p))
+                    parts = (*current.parts[:k], p.parts[0], *current.parts[k + 1 :])
+                    values = np.concatenate([current.u[: places[k].start], u, current.u[places[k].stop :]])
+                    models.append((Model(parts), values))
     if not options:
         return None
-    models = [(Model(current.parts), current.u)]
-    for _, k, p, u in options:
-        parts = (*current.parts[:k], p.parts[0], *current.parts[k + 1 :])
-        values = np.concatenate([current.u[: places[k].start], u, current.u[places[k].stop :]])
-        models.append((Model(parts), values))
     cut = _cut(problem)
     now, *others = cross_fit(search, models, cut, WIDTHS[1:])
-    energies = [float((h.residual**2).sum()) for h in others]
-    best = int(np.argmin(energies))
     energy = float((now.residual**2).sum())
-    if not energies[best] < energy - least_energy(tried) * max(1.0, energy / len(problem.floor)):
-        return None
-    _, k, proposal, _ = options[best]
-    fit = fit_one(search, models[1 + best][0], [models[1 + best][1]], None, WIDTHS[1:])
-    changed = Current(models[1 + best][0].parts, fit.u)
-    held = others[best]
-    term = changed.hypothesis[k]
-    rung = Rung(
-        proposal.name,
-        (term,),
-        (*search.fixed, *changed.hypothesis),
-        float(np.sqrt(held.seen)),
-        error(held.residual),
-        per_segment(problem, held.residual),
-        cut.name,
-        dropped=(current.parts[k].name,),
-    )
-    return changed, rung
+    enough = energy - least_energy(len(pool)) * max(1.0, energy / len(problem.floor))
+    order = sorted(range(len(options)), key=lambda i: float((others[i].residual ** 2).sum()))
+    for i in order[:LOOKED_AT]:
+        (k, proposal), (model, start), held = options[i], models[1 + i], others[i]
+        alone = float((held.residual**2).sum())
+        if not alone < energy * CLOSE:
+            break
+        changed = Current(model.parts, fit_one(search, model, [start], None, WIDTHS[1:]).u)
+        if alone >= enough:
+            names = {c.name for c in changed.parts}
+            beside = examine(search, changed, [c for c in pool if c.name not in names], effort).best
+            if beside is None or float(beside.held.sum()) >= enough:
+                continue
+        rung = Rung(
+            proposal.name,
+            (changed.hypothesis[k],),
+            (*search.fixed, *changed.hypothesis),
+            float(np.sqrt(held.seen)),
+            error(held.residual),
+            per_segment(problem, held.residual),
+            cut.name,
+            dropped=(current.parts[k].name,),
+        )
+        return changed, rung
+    return None
 
 
 def _places(parts: Sequence[Candidate]) -> list[slice]:
