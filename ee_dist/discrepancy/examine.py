@@ -19,6 +19,7 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.scan import Scanned, scan
 from ee_dist.discrepancy.search.screen import Screened, screen
 from ee_dist.discrepancy.search.search import Search
@@ -93,19 +94,26 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     if not np.isfinite(base).all():
         raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
     calm = calm_trials(problem, base)
-    screened = screen(now.among(busiest(problem, base, calm)), pool, effort.shares)
+    # What the model has already moves little when one effect is added: its slopes are taken once for all proposals.
+    leading = None
+    if len(current.u) and not problem.rugged:
+        leading = slopes_at(search, Model(current.parts), current.u)
+    refit, busy = Refit(leading), busiest(problem, base, calm)
+    screened = screen(now.among(busy), pool, effort.shares, refit)
     least = least_energy(len(pool))
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)[: effort.first]
-    scanned = sorted(scan(now.among(busiest(problem, base, calm)), promising), key=lambda s: s.energy)[: effort.second]
-    quick = sorted(_quick(now.among(calm), scanned, effort.starts), key=lambda f: f.energy)[: effort.final]
-    starts = [(Proposal((f.model.parts[0],)), f.u) for f in quick]
-    starts += _families(screened, quick, least)
+    scanned = sorted(scan(now.among(busy), promising, refit), key=lambda s: s.energy)[: effort.second]
+    quick = sorted(_quick(search.among(calm), current, scanned, effort.starts, leading), key=lambda f: f.energy)
+    quick = quick[: effort.final]
+    starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
+    starts += _families(screened, starts, least)
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
-    judged = _judged(search, current, starts, base, len(pool), far=nearest > FAR**2)
-    if judged and not judged[0].earned and leftovers(problem, base):
+    far = nearest > FAR**2
+    judged = _judged(search, current, starts, base, len(pool), leading, far)
+    if judged and not judged[0].earned and not far and leftovers(problem, base):
         pairs = _pairs(screened, now)
         if pairs:
-            judged = ranked([*judged, *_judged(search, current, pairs, base, len(pool))])
+            judged = ranked([*judged, *_judged(search, current, pairs, base, len(pool), leading)])
     best = judged[0] if judged and judged[0].earned else None
     left = leftovers(problem, base if best is None else best.residual)
     return Examined(judged, screened, base, left, len(pool))
@@ -117,6 +125,7 @@ def _judged(
     starts: Sequence[tuple[Proposal, Array]],
     base: Array,
     tried: int,
+    leading: Array | None = None,
     far: bool = False,
 ) -> list[Judged]:
     """On windows; where more than noise is left with the best of them (``far``: where that is known beforehand), on whole
@@ -126,12 +135,12 @@ def _judged(
     problem, cuts = search.problem, travelling(search.problem)
     found: list[Judged] = []
     if not (far and cuts):
-        found = under(search, current, starts, windows(problem), base, tried)
+        found = under(search, current, starts, windows(problem), base, tried, leading)
         if not cuts or (found[0].earned and float(found[0].held.sum()) <= NEAR**2 * float(problem.floor.sum())):
             return found
         found = []
     for cut in cuts:
-        again = under(search, current, starts, cut, base, tried)
+        again = under(search, current, starts, cut, base, tried, leading)
         found = strictest(found, again) if found else again
     return found
 
@@ -142,16 +151,19 @@ def _floor_of(problem: Problem, trials: Sequence[int]) -> float:
 
 
 def under(
-    search: Search, current: Current, starts: Sequence[tuple[Proposal, Array]], cut: Cut, base: Array, tried: int
+    search: Search,
+    current: Current,
+    starts: Sequence[tuple[Proposal, Array]],
+    cut: Cut,
+    base: Array,
+    tried: int,
+    leading: Array | None = None,
 ) -> list[Judged]:
     """Proposals fitted together with the current model and judged under one cut, ranked."""
     models = [(Model((*current.parts, *p.parts)), np.concatenate([current.u, u])) for p, u in starts]
-    without, leading = base, None
+    without = base
     if len(current.u):
-        own = Model(current.parts)
-        without = cross_fit(search, [(own, current.u)], cut)[0].residual
-        # What the model has already moves little when one effect is added: its slopes are taken once for all proposals.
-        leading = None if search.problem.rugged else slopes_at(search, own, current.u)
+        without = cross_fit(search, [(Model(current.parts), current.u)], cut)[0].residual
     outcomes = cross_fit(search, models, cut, leading=leading)
     return ranked(
         [
@@ -202,10 +214,13 @@ def busiest(problem: Problem, base: Array, among: Sequence[int], share: float = 
     return sorted(chosen)
 
 
-def _quick(search: Search, scanned: Sequence[Scanned], starts: int) -> list[Fit]:
-    """The better of a few quick fits of each candidate, on all data: it only chooses who is judged."""
-    tasks = [(i, Model((s.candidate,)), u) for i, s in enumerate(scanned) for u in s.starts[:starts]]
-    fits = fit_all(search, [(m, u) for _, m, u in tasks], None, WIDTHS[1:3])
+def _quick(
+    search: Search, current: Current, scanned: Sequence[Scanned], starts: int, leading: Array | None
+) -> list[Fit]:
+    """The better of a few quick fits of each candidate with the model so far, on all data: it only chooses who is judged."""
+    tasks = [(i, s.candidate, u) for i, s in enumerate(scanned) for u in s.starts[:starts]]
+    models = [(Model((*current.parts, c)), np.concatenate([current.u, u])) for _, c, u in tasks]
+    fits = fit_all(search, models, None, WIDTHS[1:3], leading=leading)
     best: dict[int, Fit] = {}
     for (i, _, _), fit in zip(tasks, fits, strict=True):
         if i not in best or fit.energy < best[i].energy:
@@ -213,7 +228,9 @@ def _quick(search: Search, scanned: Sequence[Scanned], starts: int) -> list[Fit]
     return [best[i] for i in sorted(best)]
 
 
-def _families(screened: Sequence[Screened], quick: Sequence[Fit], least: float) -> list[tuple[Proposal, Array]]:
+def _families(
+    screened: Sequence[Screened], singles: Sequence[tuple[Proposal, Array]], least: float
+) -> list[tuple[Proposal, Array]]:
     """Effects at all joints, each joint with a value of its own, where several joints promise something: one number for
     all of them may be too few. And friction by load, linear and quadratic, which pay together."""
     out: list[tuple[float, Proposal, Array]] = []
@@ -234,12 +251,12 @@ def _families(screened: Sequence[Screened], quick: Sequence[Fit], least: float) 
     out = sorted(out, key=lambda f: -f[0])[:FAMILIES_TRIED]
     found = [(p, u) for _, p, u in out]
     by_name = {s.candidate.name: s for s in screened}
-    for f in quick:
-        c = f.model.parts[0]
+    for single, u in singles:
+        c = single.parts[0]
         other = by_name.get(f"quadratic_friction@{c.target}")
         if c.effect.name == "load_friction" and other is not None and other.reach > 0:
             start = np.where(other.candidate.upper > 0, 0.05, -0.05)
-            found.append((Proposal((c, other.candidate)), np.concatenate([f.u, start])))
+            found.append((Proposal((c, other.candidate)), np.concatenate([u, start])))
     return found
 
 

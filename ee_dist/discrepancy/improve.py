@@ -30,6 +30,8 @@ from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
+EXCHANGES = 2
+"""How often an effect may be exchanged for what was tied with it."""
 MOST = 12
 """Effects that are added at most unless told otherwise."""
 NO_MORE = "no further effect earns its place: {why}"
@@ -54,6 +56,8 @@ class Rung:
     interval: tuple[float, float] = (0.0, 0.0)
     tied_with: list[str] = field(default_factory=list)
     dropped: tuple[str, ...] = ()
+    alternatives: list[tuple[Proposal, Array]] = field(default_factory=list)
+    """What was tied with it, and the values that suited then."""
 
 
 @dataclass(eq=False)
@@ -107,18 +111,26 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             ladder.append(_rung(search, judged))
     else:
+        exchanges = 0
         stopped = f"{most} effects were added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             names = {c.name for c in current.parts}
             last = examine(search, current, [c for c in pool if c.name not in names], effort)
             best = last.best
             if best is None:
+                exchanged = _exchanged(search, current, ladder, own, len(pool))
+                if exchanged is not None and exchanges < EXCHANGES:
+                    exchanges += 1
+                    current, rung = exchanged
+                    ladder.append(rung)
+                    continue
                 nearest = last.judged[0].why_not if last.judged else LUCK
                 stopped = NO_MORE.format(why=nearest) if leftovers(problem, last.base) else NOTHING_LEFT
                 break
             fit = fit_one(search, best.model, [best.u], None, WIDTHS[2:])
             current = Current(best.model.parts, fit.u)
             rung = _rung(search, best, [j.name for j in last.tied[1:]])
+            rung.alternatives = [(j.proposal, j.own) for j in last.tied[1:] if len(j.proposal.parts) == 1]
             current, rung.dropped = _pruned(search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool))
             ladder.append(rung)
     return _finish(search, current, ladder, as_it_is, stopped, last)
@@ -212,6 +224,49 @@ def _pruned(
     name = current.parts[own + cheapest].name
     fit = fit_all(search, [(model, start)], None, WIDTHS[2:])[0]
     return Current(model.parts, fit.u), (name,)
+
+
+def _exchanged(
+    search: Search, current: Current, ladder: Sequence[Rung], own: int, tried: int
+) -> tuple[Current, Rung] | None:
+    """The model with one of its effects exchanged for what was tied with it when it was added, if later effects have
+    decided that tie: on held-out data the other is better by more than luck."""
+    problem, places = search.problem, _places(current.parts)
+    where = {c.name: k for k, c in enumerate(current.parts) if k >= own}
+    options: list[tuple[Rung, int, Proposal, Array]] = []
+    for rung in ladder:
+        for k in [where[t.name] for t in rung.added if t.name in where and len(rung.added) == 1]:
+            options += [(rung, k, p, u) for p, u in rung.alternatives if p.parts[0].name not in where]
+    if not options:
+        return None
+    models = [(Model(current.parts), current.u)]
+    for _, k, p, u in options:
+        parts = (*current.parts[:k], p.parts[0], *current.parts[k + 1 :])
+        values = np.concatenate([current.u[: places[k].start], u, current.u[places[k].stop :]])
+        models.append((Model(parts), values))
+    cut = _cut(problem)
+    now, *others = cross_fit(search, models, cut, WIDTHS[1:])
+    energies = [float((h.residual**2).sum()) for h in others]
+    best = int(np.argmin(energies))
+    energy = float((now.residual**2).sum())
+    if not energies[best] < energy - least_energy(tried) * max(1.0, energy / len(problem.floor)):
+        return None
+    _, k, proposal, _ = options[best]
+    fit = fit_one(search, models[1 + best][0], [models[1 + best][1]], None, WIDTHS[1:])
+    changed = Current(models[1 + best][0].parts, fit.u)
+    held = others[best]
+    term = changed.hypothesis[k]
+    rung = Rung(
+        proposal.name,
+        (term,),
+        (*search.fixed, *changed.hypothesis),
+        float(np.sqrt(held.seen)),
+        error(held.residual),
+        per_segment(problem, held.residual),
+        cut.name,
+        dropped=(current.parts[k].name,),
+    )
+    return changed, rung
 
 
 def _places(parts: Sequence[Candidate]) -> list[slice]:

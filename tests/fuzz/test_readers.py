@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from ee_dist.measurements.tables import read_table
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -23,6 +22,7 @@ from ee_dist.effects.catalogue import EffectError
 from ee_dist.effects.model_file import read_model
 from ee_dist.engines.drivers import Network
 from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.readers import read as read_table
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.reader import read_logs, read_run
 from ee_dist.recording.records import HARDWARE, TrialRecord
@@ -80,9 +80,9 @@ READERS: dict[str, tuple[Callable[[Path], object], ...]] = {
     "arm.yaml": (lambda p: load_robot(str(p)),),
     "arm.urdf": (lambda p: load_robot(str(p)),),
     "map.yaml": (read_mapping,),
-    "t.csv": (read_table,),
-    "t.json": (read_table,),
-    "t.parquet": (read_table,),
+    "t.csv": (lambda p: read_numbers(p),),
+    "t.json": (lambda p: read_numbers(p),),
+    "t.parquet": (lambda p: read_numbers(p),),
     "sealed.json": (opened,),
 }
 TEXTS = (b"1e999", b"-1", b"nan", b"1" * 400, b"[", b"{", b": ", b"~", b"&a *a")
@@ -121,6 +121,14 @@ def damaged(draw: st.DrawFn, name: str) -> bytes:
                 st.sampled_from((b"1e999", b"-1", b"nan", b"1" * 400, b"[", b"{", b": ", b"~", b"&a *a"))
             )
     return bytes(content)
+
+
+def read_numbers(path: Path) -> None:
+    """A table, and all numbers in it."""
+    for recorded in read_table(path):
+        for table in recorded.tables:
+            for address in table.addresses():
+                table.numbers(address, gaps=True)
 
 
 def look(path: Path, name: str, content: bytes) -> None:

@@ -63,16 +63,15 @@ def test_what_no_file_can_say_is_asked_in_one_line(tmp_path: Path, command: Comm
         f"measured={file}",
         "robot=urdf",
         f"robot.drives={tmp_path / 'arm.yaml'}",
-        f"hydra.run.dir={tmp_path / 'out'}",
     )
-    status, _, said = command(*given)
+    status, _, said = command(*given, f"hydra.run.dir={tmp_path / 'out'}")
     assert status == 2
     assert len(said.strip().splitlines()) == 1
     assert "current1 to current3 are motor currents; say task.gains=[N.m per A, one for each joint]" in said
     assert "???" in (tmp_path / "out" / "mapping.yaml").read_text()
     assert not (tmp_path / "out" / "measured.mcap").exists()
-    command(*given, "task.gains=[0.2,0.2,0.2]")
-    assert (tmp_path / "out" / "measured.mcap").exists()
+    command(*given, "task.gains=[0.2,0.2,0.2]", f"hydra.run.dir={tmp_path / 'again'}")
+    assert (tmp_path / "again" / "measured.mcap").exists()
 
 
 @pytest.mark.skipif(not (DATA / "double_pendulum").is_dir(), reason="the public data are not here")

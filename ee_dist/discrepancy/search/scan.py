@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ee_dist.discrepancy.search.candidates import Candidate
+from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.screen import Screened
 from ee_dist.discrepancy.search.search import BATCH, Search
 from ee_dist.trials.log import Array
@@ -32,8 +33,9 @@ class Scanned:
     starts: tuple[Array, ...]
 
 
-def scan(search: Search, promising: Sequence[Screened]) -> list[Scanned]:
-    """Each candidate's best points, in the order given."""
+def scan(search: Search, promising: Sequence[Screened], refit: Refit = Refit()) -> list[Scanned]:  # noqa: B008
+    """Each candidate's best points, in the order given, by the energy that is left once the model so far is fitted anew."""
+    refit = refit.among(search)
     points = [(i, u) for i, s in enumerate(promising) for u in _points(s, i)]
     found: list[list[tuple[float, Array]]] = [[] for _ in promising]
     for k in range(0, len(points), BATCH):
@@ -41,7 +43,8 @@ def scan(search: Search, promising: Sequence[Screened]) -> list[Scanned]:
         rows = search.residuals([(promising[i].candidate.term(u),) for i, u in some])
         for (i, u), r in zip(some, rows, strict=True):
             if np.isfinite(r).all():
-                found[i].append((float(r @ r), u))
+                left = refit(r)
+                found[i].append((float(left @ left), u))
         search.progress("scanning", min(1.0, (k + BATCH) / len(points)))
     out = []
     for s, mine in zip(promising, found, strict=True):

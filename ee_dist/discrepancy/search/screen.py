@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.discrepancy.search.candidates import Candidate
+from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.search import BATCH, Search
 from ee_dist.trials.log import Array
 
@@ -28,9 +29,16 @@ class Screened:
     reach: float
 
 
-def screen(search: Search, pool: Sequence[Candidate], shares: Sequence[float] = (0.1, 0.6)) -> list[Screened]:
-    """Promise of each candidate on top of what the search has fixed, in the order of the pool."""
-    base = search.base()
+def screen(
+    search: Search,
+    pool: Sequence[Candidate],
+    shares: Sequence[float] = (0.1, 0.6),
+    refit: Refit = Refit(),  # noqa: B008
+) -> list[Screened]:
+    """Promise of each candidate on top of what the search has fixed, in the order of the pool. ``refit``: what the values of
+    the model so far can make up for by themselves is no promise."""
+    refit = refit.among(search)
+    base = refit(search.base())
     points = [(i, u) for i, c in enumerate(pool) for u in c.probes(shares)]
     rows: list[list[tuple[Array, float, float, float]]] = [[] for _ in pool]
     total = float(base @ base)
@@ -39,7 +47,7 @@ def screen(search: Search, pool: Sequence[Candidate], shares: Sequence[float] = 
         found = search.residuals([(pool[i].term(u),) for i, u in some])
         for (i, u), r in zip(some, found, strict=True):
             if np.isfinite(r).all():
-                rows[i].append((u, *_promise(base, r, total, pool[i], u)))
+                rows[i].append((u, *_promise(base, refit(r), total, pool[i], u)))
         search.progress("screening", min(1.0, (k + BATCH) / len(points)))
     return [_screened(c, found) for c, found in zip(pool, rows, strict=True)]
 

@@ -56,9 +56,10 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
 
 def _ask_the_rest(v: View) -> None:
     """Nothing unknown goes without a question."""
-    for c in v.out.choices:
-        if c.sure == UNKNOWN and c.why != "not found" and not any(c.why.split("; ")[-1] in q for q in v.out.questions):
-            v.out.ask(f"{c.name} ({c.column}): {c.why.split('; ')[-1]}; write the unit into the mapping")
+    unknown = [c for c in v.out.choices if c.sure == UNKNOWN]
+    if unknown and not v.out.questions:
+        c = unknown[0]
+        v.out.ask(f"{c.name} ({c.column}): {c.why.split('; ')[-1]}; write the unit into the mapping")
 
 
 def _time_choice(v: View, table: str) -> None:
