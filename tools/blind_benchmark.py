@@ -48,7 +48,7 @@ from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.improve import calibrated
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.trial import one_trial
-from ee_dist.tasks.ways import AUTO, WAYS, problem_of
+from ee_dist.tasks.ways import AUTO, WAYS, way_of
 from ee_dist.tasks.wiring import close_evaluators, engine_maker
 from ee_dist.trials.excitation import STANDARD, Excitation
 from ee_dist.trials.noise import with_noise
@@ -116,9 +116,10 @@ class Bench:
         return self.known.model
 
     def problem(self, trials: Sequence[MeasuredTrial]) -> Problem:
+        known = replace(self.known, trials=tuple(trials))
         # What was simulated for another case is of no use for this one.
         close_evaluators()
-        return problem_of(replace(self.known, trials=tuple(trials)), self.config, self.args.by)
+        return way_of(known, self.args.by).make(known, self.config)
 
     def calibrate(self) -> None:
         """As ``task=improve task.calibrate=true`` does it, on an untouched robot of the other engine."""

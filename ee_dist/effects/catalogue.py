@@ -10,7 +10,6 @@ A user's own file does the same and takes part in everything; see docs/own_effec
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import importlib.util
 import math
@@ -23,6 +22,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ee_dist.basics.names import did_you_mean, nearest
 from ee_dist.effects.groups import common, members_of, shared_targets
 from ee_dist.effects.laws import LAWS
 from ee_dist.effects.scales import Range, Ranges
@@ -228,9 +228,7 @@ def find(name: str) -> Effect:
     """The effect of that name. Raises EffectError with the nearest names."""
     if name in _registry:
         return _registry[name]
-    near = difflib.get_close_matches(name, _registry, n=3, cutoff=0.5)
-    hint = f"did you mean {', '.join(near)}?" if near else f"there are: {', '.join(_registry)}"
-    raise EffectError(f"no effect named {name!r}; {hint}")
+    raise EffectError(f"no effect named {name!r}; {did_you_mean(name, _registry, cutoff=0.5)}")
 
 
 def term(effect_name: str, target: str = "", **values: float) -> Term:
@@ -265,7 +263,7 @@ def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
         allowed = entry.targets(robot)
         places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
         if not places:
-            near = difflib.get_close_matches(t.target, allowed, n=3, cutoff=0.4) or allowed
+            near = nearest(t.target, allowed) or allowed
             raise EffectError(
                 f"{t.effect} cannot act on {t.target!r} of {robot.name}; it can act on: {', '.join(near)}"
             )

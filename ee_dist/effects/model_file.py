@@ -15,6 +15,7 @@ from typing import Any
 
 import yaml
 
+from ee_dist.basics.files import write_whole
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot, RobotError
@@ -77,6 +78,4 @@ def write_model(path: str | Path, source: Any, folder: Path, terms: Hypothesis, 
         f"  - {yaml.safe_dump(t.as_dict(), default_flow_style=True, sort_keys=False, width=1000).strip()}"
         for t in terms
     ]
-    partial = file.with_name(file.name + ".part")
-    partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    partial.replace(file)
+    write_whole(file, "\n".join(lines) + "\n")

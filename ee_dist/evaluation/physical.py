@@ -7,7 +7,6 @@ attribute, and comes out through ``reveal`` alone, which tasks call after the se
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,20 +15,19 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Engine, EngineError, Rollout
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import SensorLog
+from ee_dist.trials.noise import with_noise
 
 
 class PhysicalRobot:
     """Implements ``ee_dist.trials.hardware.Hardware``. ``noise`` is the standard deviation of each channel's noise,
-    as a share of the channel's range (touch and angle channels: of 2)."""
+    as a share of the channel's range (see ``ee_dist.trials.noise``)."""
 
     __slots__ = ("_run", "reveal", "trials")
 
     def __init__(
         self, engine: Engine, robot: Robot, hidden: Hypothesis, seed: np.random.SeedSequence, noise: float = 0.0
     ) -> None:
-        changed = apply(robot, hidden)
-        if noise:
-            changed = _noisy(changed, noise)
+        changed = apply(with_noise(robot, noise), hidden)
         self.trials = 0
         cause = "the hidden change makes" if hidden else "with nothing hidden, these commands make"
         self._run: Callable[[Any, int, int], SensorLog] = _runner(engine, changed, seed, cause)
@@ -57,10 +55,3 @@ def _runner(
         return log
 
     return run
-
-
-def _noisy(robot: Robot, noise: float) -> Robot:
-    span = {"touch": 2.0, "angle": 2.0}
-    return replace(
-        robot, sensors=tuple(replace(s, noise=s.noise + noise * span.get(s.kind, 1.0)) for s in robot.sensors)
-    )

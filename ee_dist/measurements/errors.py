@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
+from ee_dist.basics.names import did_you_mean
 from ee_dist.trials.log import LogError
 
 
@@ -14,6 +14,4 @@ class MeasurementError(LogError):
 
 def nearest(name: str, allowed: Iterable[str]) -> str:
     """A hint for a name that does not exist."""
-    names = [str(a) for a in allowed]
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.4)
-    return f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(names) or 'none'}"
+    return did_you_mean(name, allowed)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
+from ee_dist.basics.names import did_you_mean
 from ee_dist.robots.body import Body
 from ee_dist.robots.model import COMMANDS, Drive, Joint, Robot, RobotError, Sensor, Wiring, World
 from ee_dist.robots.numbers import checked, number
@@ -170,5 +170,4 @@ def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Se
 
 def near(name: str, allowed: tuple[str, ...]) -> str:
     """The nearest names, or all, as the end of a message."""
-    found = difflib.get_close_matches(name, allowed, n=3, cutoff=0.4)
-    return f"did you mean {' or '.join(found)}?" if found else f"there are: {', '.join(allowed)}"
+    return did_you_mean(name, allowed)

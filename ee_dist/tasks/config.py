@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
+from ee_dist.basics.names import did_you_mean
 from ee_dist.effects.catalogue import Hypothesis, from_dict
 from ee_dist.evolution.ga import Budget
 from ee_dist.recovery.loop import Plan
@@ -32,9 +32,7 @@ def within(what: str, value: float, low: float, high: float) -> None:
 def one_of(what: str, value: str, allowed: tuple[str, ...]) -> str:
     """The value, if it is allowed. Raises ConfigError with the nearest names."""
     if value not in allowed:
-        near = difflib.get_close_matches(str(value), allowed, n=3, cutoff=0.4)
-        hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(allowed)}"
-        raise ConfigError(f"{what}={value}: no such choice; {hint}")
+        raise ConfigError(f"{what}={value}: no such choice; {did_you_mean(value, allowed)}")
     return value
 
 
@@ -227,8 +225,7 @@ class Handling:
 
 def unknown_key(owner: str, key: str, known: tuple[str, ...], otherwise: str = "") -> ConfigError:
     """``otherwise`` is said where no name is near; without it all are listed."""
-    near = difflib.get_close_matches(key, known, n=3, cutoff=0.6)
-    hint = f"did you mean {' or '.join(near)}?" if near else otherwise or f"there are: {', '.join(known)}"
+    hint = did_you_mean(key, known, otherwise, cutoff=0.6)
     where = f"{owner}.{key}" if owner else key
     return ConfigError(f"{where}: no such setting; {hint}")
 

@@ -17,6 +17,7 @@ from typing import Any
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig, OmegaConf
 
+from ee_dist.basics.files import write_whole
 from ee_dist.tasks.config import ConfigError
 
 LOCK = ".running"
@@ -193,17 +194,3 @@ def _restore(before: Mapping[Path, bytes | None]) -> None:
     for parent in {p.parent for p in before}:
         with suppress(OSError):
             parent.rmdir()
-
-
-def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file whole or not at all: what was there before stays until all of it is on the disk."""
-    partial = path.with_name(path.name + ".part")
-    try:
-        with partial.open("wb") as file:
-            file.write(content.encode() if isinstance(content, str) else content)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-    except OSError:
-        partial.unlink(missing_ok=True)
-        raise

@@ -52,6 +52,11 @@ def run(config: Config, options: Options, out: Path) -> None:
     """Write model.yaml, summary.json, report.html and improve.rrd into ``out``. Raises ConfigError, EffectError, LogError."""
     console, watch, measured = Console(), Stopwatch(), load(config)
     wanted = effects_of(config.effect, measured.robot)
+    for key in ("without", "only"):
+        if wanted is not None and getattr(options, key) and not options.calibrate:
+            raise ConfigError(
+                f"task.{key}: chooses among what effect=auto may add; effect={config.effect} says it already"
+            )
     way = way_of(measured, options.by)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from ee_dist.basics.names import nearest
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, from_entries
 from ee_dist.effects.catalogue import Hypothesis, apply
@@ -103,7 +103,7 @@ def files_of(measured: Any) -> list[Path]:
                 raise ConfigError(f"measured={path}: no .mcap in this folder; other formats come in with task=import")
             found += inside
         elif not path.is_file():
-            near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.mcap")], n=2, cutoff=0.3)
+            near = nearest(path.name, [p.name for p in path.parent.glob("*.mcap")], cutoff=0.3)
             hint = f"; did you mean {' or '.join(near)}?" if near else ""
             raise ConfigError(f"measured={path}: no such file{hint}")
         else:
@@ -150,7 +150,7 @@ def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
 def _names(where: str, what: str, have: Sequence[str], want: Sequence[str]) -> None:
     missing = [n for n in want if n not in have]
     if missing:
-        near = difflib.get_close_matches(missing[0], have, n=2, cutoff=0.5)
+        near = nearest(missing[0], have, cutoff=0.5)
         hint = f"; is it {' or '.join(near)}?" if near else f"; the log has: {', '.join(have[:8])}"
         raise LogError(f"{where}: no {what} {missing[0]!r}{hint}")
 

@@ -9,6 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from rich.console import Console
 
+from ee_dist.basics.files import write_whole
 from ee_dist.effects.catalogue import apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import weight_count
@@ -17,7 +18,6 @@ from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recovery.repair import network
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.folder import write_whole
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.wiring import build_robot, evaluator_of
 from ee_dist.viewing.templates import FIGURE

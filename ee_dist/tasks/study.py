@@ -17,8 +17,8 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import false_discovery_control, mannwhitneyu
 
+from ee_dist.basics.files import write_whole
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.folder import write_whole
 from ee_dist.tasks.outcome import RESTORED
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.viewing.study_figures import write_figures

@@ -14,6 +14,7 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
+from ee_dist.basics.files import write_whole
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.config import Config
 
@@ -86,9 +87,7 @@ def write_summary(
         **rest,
     }
     path = out / "summary.json"
-    partial = path.with_suffix(".json.part")
-    partial.write_text(json.dumps(_finite(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    partial.replace(path)
+    write_whole(path, json.dumps(_finite(content), indent=2, allow_nan=False) + "\n")
     return path
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.measured_trial import driver_of
 from ee_dist.discrepancy.search.candidates import candidate
@@ -24,7 +25,6 @@ from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.folder import write_whole
 from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.seal import FILE, sealed
 from ee_dist.tasks.summary import Stopwatch, package_version, write_summary

@@ -14,6 +14,7 @@ from typing import Any
 
 import yaml
 
+from ee_dist.basics.files import write_whole
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import Journal, JournaledEvaluator
 from ee_dist.evaluation.ray_actors import installed
@@ -23,7 +24,7 @@ from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.model import Robot
 from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.folder import shown, write_whole
+from ee_dist.tasks.folder import shown
 from ee_dist.tasks.summary import config_digest, config_yaml
 from ee_dist.trials.hardware import Hardware
 from ee_dist.trials.log import SensorLog

@@ -76,8 +76,3 @@ def way_of(measured: Measurements, by: str) -> Way:
             "without a calibration beside it"
         )
     return way
-
-
-def problem_of(measured: Measurements, config: Config, by: str) -> Problem:
-    """Raises MeasurementError where the logs lack what the way needs, ConfigError for a way that cannot be."""
-    return way_of(measured, by).make(measured, config)

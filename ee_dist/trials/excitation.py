@@ -6,13 +6,13 @@ begin at the middle of the range and rise over the first half second: a robot at
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.names import nearest
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import command_span
 from ee_dist.trials.log import Array, start_of
@@ -52,7 +52,7 @@ class Excitation:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            near = difflib.get_close_matches(self.kind, KINDS, n=2, cutoff=0.4) or list(KINDS)
+            near = nearest(self.kind, KINDS) or list(KINDS)
             raise ExcitationError(f"no excitation {self.kind!r}; did you mean {' or '.join(near)}?")
         if not 0.0 < self.amplitude <= 1.0:
             raise ExcitationError(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import plotly.graph_objects as go
 
+from ee_dist.basics.files import write_whole
 from ee_dist.viewing.templates import plot, rendered
 
 
@@ -48,8 +49,5 @@ def write_page(page: Page, path: str | Path) -> Path:
     """Write the page; the plotting library travels inside (about 5 MB)."""
     figures = [plot(section.figure, f"plot{k}") for k, section in enumerate(page.sections)]
     text = rendered("report.html", page=page, sections=list(zip(page.sections, figures, strict=True)))
-    path = Path(path)
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
-    return path
+    write_whole(Path(path), text)
+    return Path(path)

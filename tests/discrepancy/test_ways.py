@@ -66,7 +66,7 @@ def test_a_balance_of_forces_gives_mass_and_friction_of_a_stage() -> None:
     mass, damping = (t.values[0][1] for t in fit.hypothesis)
     assert mass == pytest.approx(0.15, abs=0.03)
     assert damping == pytest.approx(150.0, rel=0.03)
-    assert error(fit.residual) < 0.2 * error(p.residuals([()])[0])
+    assert error(fit.residual) < 0.3 * error(p.residuals([()])[0])
 
 
 def test_a_ripple_over_position_is_told_with_its_wavelength() -> None:

@@ -120,7 +120,8 @@ def test_a_sealed_trial_is_explained_improved_and_revealed(cli, by):
     shown, told = run(cli, "task=reveal", f"log={tried}", f"task.explained={explained}")
     assert json.loads((shown / "summary.json").read_text())["right"] is True
     assert "The truth: load_friction at servo" in told.out and "Right." in told.out
-    improved, _ = run(cli, "task=improve", asked, log, way, only, "task.rerun=false", *QUICK)
+    chosen = (only,) if asked == "effect=auto" else ()
+    improved, _ = run(cli, "task=improve", asked, log, way, *chosen, "task.rerun=false", *QUICK)
     shown, _ = run(cli, "task=reveal", f"log={tried}", f"task.explained={improved}")
     content = json.loads((shown / "summary.json").read_text())
     assert content["right"] is True and content["missed"] == content["invented"] == []
@@ -165,6 +166,11 @@ def test_settings_are_honoured_or_refused_by_every_way(cli, imported, by, verb, 
     assert outcome.status == 2 and said in outcome.err, outcome.err
     assert len(outcome.err.strip().splitlines()) == 1
     assert not list(outcome.folder.rglob("*.json")), "a mistake left files behind"
+
+
+def test_a_choice_among_candidates_is_for_auto(cli, imported):
+    outcome = cli("task=improve", f"effect={HIDDEN}", f"measured={imported}", "task.without=[backlash]", *QUICK)
+    assert outcome.status == 2 and "task.without: chooses among what effect=auto may add" in outcome.err
 
 
 def test_another_way_is_told_with_the_nearest_name(cli, imported):

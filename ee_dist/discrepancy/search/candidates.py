@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.basics.names import nearest
 from ee_dist.effects.catalogue import CATALOGUE, FAMILIES, Effect, EffectError, Hypothesis, Term, apply, find
 from ee_dist.effects.groups import groups, members_of
 from ee_dist.robots.model import Robot
@@ -98,7 +98,7 @@ def candidate(robot: Robot, effect: Effect | str, target: str) -> Candidate:
     allowed = entry.targets(robot)
     if target not in allowed and not members_of(robot, target, allowed):
         names = [*allowed, *entry.shared(robot)]
-        near = difflib.get_close_matches(target, names, n=3, cutoff=0.4) or names[:8]
+        near = nearest(target, names) or names[:8]
         raise EffectError(f"{entry.name} cannot act on {target!r} of {robot.name}; it can act on: {', '.join(near)}")
     worth = entry.bounds(robot, target)
     bounds = tuple(worth[p.name] for p in entry.parameters)

@@ -48,13 +48,3 @@ class Fit:
     @property
     def hypothesis(self) -> Hypothesis:
         return self.model.hypothesis(self.u)
-
-    def spread(self) -> Array:
-        """Standard deviation of each u from the curvature at the optimum; infinite where the data say nothing."""
-        if not len(self.u):
-            return np.zeros(0)
-        normal = self.slopes.T @ self.slopes
-        excess = max(1.0, self.energy / max(1, int(self.mask.sum()) - len(self.u)))
-        weak = np.diag(normal) < 1e-9
-        cov = np.linalg.pinv(normal + np.diag(np.where(weak, 1e-9, 0.0)))
-        return np.where(weak, np.inf, np.sqrt(np.maximum(np.diag(cov), 0.0) * excess))

@@ -1,0 +1,93 @@
+"""What counts as right: the place, a group as a whole, any of what is tied, and nothing besides."""
+
+from __future__ import annotations
+
+import pytest
+
+from ee_dist.effects.catalogue import Term
+from ee_dist.robots.quadruped_lab import quadruped_lab
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.tasks.config import ConfigError
+from ee_dist.tasks.reveal import score
+
+ROBOT = quadruped_lab()
+JOINTS = ROBOT.motor_names
+KNEE = "coulomb_friction@knee_front_left"
+
+
+def terms(*names: str) -> list[dict[str, str]]:
+    return [dict(zip(("effect", "target"), n.split("@"), strict=True)) for n in names]
+
+
+def hidden(*names: str) -> tuple[Term, ...]:
+    return tuple(Term(t["effect"], t["target"]) for t in terms(*names))
+
+
+def explained(*candidates: tuple[str, ...], tied: tuple[str, ...] = (), verdict: str = "effect") -> dict[str, object]:
+    ranked = [{"name": " + ".join(c), "terms": terms(*c), "tied_with": list(tied)} for c in candidates]
+    return {"task": "explain", "verdict": verdict, "candidates": ranked}
+
+
+def improved(
+    *steps: tuple[str, ...], tied: tuple[str, ...] = (), dropped: tuple[str, ...] = (), own: tuple[str, ...] = ()
+):
+    ladder = [{"added": terms(*s), "tied_with": list(tied), "dropped": list(dropped)} for s in steps]
+    left = [n for s in steps for n in s if n not in dropped]
+    return {"task": "improve", "model_terms": terms(*own, *left), "ladder": [{"added": [], "dropped": []}, *ladder]}
+
+
+ALL = "coulomb_friction@all_joints"
+NAMED = "coulomb_friction@" + "+".join(JOINTS)
+EACH = tuple(f"coulomb_friction@{j}" for j in JOINTS)
+OTHER = "motor_weak@hip_rear_left"
+
+
+@pytest.mark.parametrize(("summary", "truth", "right"), [
+    (explained((KNEE,)), (KNEE,), True),
+    (explained((OTHER,)), (KNEE,), False),
+    (explained((OTHER,), (KNEE,), tied=(KNEE,)), (KNEE,), True),
+    (explained((OTHER,), (KNEE,)), (KNEE,), False),
+    (explained((ALL,)), (KNEE,), False),
+    (explained((ALL,)), (ALL,), True),
+    (explained((NAMED,)), (ALL,), True),
+    (explained(EACH), (ALL,), True),
+    (explained((KNEE,)), (ALL,), False),
+    (explained((KNEE, OTHER)), (KNEE,), False),
+    (explained((KNEE,)), (KNEE, OTHER), True),
+    (explained((KNEE, OTHER)), (KNEE, OTHER), True),
+    (explained(verdict="nothing_missing"), (), True),
+    (explained(verdict="unexplained"), (), False),
+    (explained((KNEE,)), (), False),
+    (explained((KNEE,), verdict="unexplained"), (KNEE,), False),
+    (improved((KNEE,)), (KNEE,), True),
+    (improved((KNEE,), (OTHER,)), (KNEE,), False),
+    (improved((KNEE,), (OTHER,)), (OTHER, KNEE), True),
+    (improved((ALL,)), (KNEE,), False),
+    (improved((ALL,)), (ALL,), True),
+    (improved(EACH), (ALL,), True),
+    (improved(EACH[:3]), (ALL,), False),
+    (improved((OTHER,), tied=(KNEE,)), (KNEE,), True),
+    (improved((OTHER,), (KNEE,), dropped=(OTHER,)), (KNEE,), True),
+    (improved((KNEE,), own=(OTHER,)), (KNEE,), True),
+    (improved(), (), True),
+    (improved((KNEE,)), (), False),
+    (improved(), (KNEE,), False),
+])  # fmt: skip
+def test_right_and_not(summary, truth, right):
+    found = score(summary, hidden(*truth), ROBOT)
+    assert found.right is right, found
+    if not found.right and truth and summary["task"] == "improve":
+        assert found.missed or found.invented
+
+
+def test_what_was_missed_and_invented_is_told():
+    found = score(improved((ALL,)), hidden(KNEE), ROBOT)
+    assert found.missed == (("coulomb_friction", "knee_front_left"),)
+    assert found.invented == (("coulomb_friction", "all_joints"),)
+    one = servo_pendulum()
+    assert score(explained(("load_friction@servo",)), hidden("load_friction@servo"), one).right
+
+
+def test_a_summary_of_another_verb_is_refused():
+    with pytest.raises(ConfigError, match="task=compare; expected one of explain or improve"):
+        score({"task": "compare"}, (), ROBOT)
