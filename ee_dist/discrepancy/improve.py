@@ -30,9 +30,8 @@ from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
-EXCHANGES, LOOKED_AT, CLOSE = 2, 2, 1.1
-"""How often an effect may be exchanged for what was tied with it; how many of these are looked at, and how much worse they
-may be by themselves, as a share of the squared error."""
+EXCHANGES, LOOKED_AT = 2, 3
+"""How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
 MOST = 12
 """Effects that are added at most unless told otherwise."""
 NO_MORE = "no further effect earns its place: {why}"
@@ -257,8 +256,6 @@ def _exchanged(
     for i in order[:LOOKED_AT]:
         (k, proposal), (model, start), held = options[i], models[1 + i], others[i]
         alone = float((held.residual**2).sum())
-        if not alone < energy * CLOSE:
-            break
         changed = Current(model.parts, fit_one(search, model, [start], None, WIDTHS[1:]).u)
         if alone >= enough:
             names = {c.name for c in changed.parts}

@@ -37,7 +37,7 @@ from ee_dist.tasks.summary import (
     write_summary,
 )
 from ee_dist.tasks.unfinished import remembered
-from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_of, hardware_of
+from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_name, evaluator_of, hardware_of
 from ee_dist.viewing.story import told
 
 NEIGHBOURS = 300
@@ -97,7 +97,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         DIAGNOSIS: plan.diagnosis.population * plan.diagnosis.generations * share / 4,
         POLISHED: plan.polish * NEIGHBOURS * share / 2,
     }
-    with starting(console, WORKERS[config.evaluator.name]):
+    with starting(console, WORKERS[evaluator_name(config)]):
         evaluator = evaluator_of(config)
     with (
         RunWriter(path, robot, metadata, {"config.yaml": config_yaml(config, options).encode()}) as writer,

@@ -76,6 +76,14 @@ def hardware_of(config: Config, robot: Robot) -> SteppedRobot | None:
 _kept: dict[object, Evaluator] = {}
 
 
+def evaluator_name(config: Config) -> str:
+    """``serial`` or ``ray``: as asked for, or (``auto``) by the size of what is to be simulated."""
+    settings = config.evaluator
+    if settings.name != "auto":
+        return settings.name
+    return "serial" if config.budget.small and not settings.workers and not config.ray.address else "ray"
+
+
 def evaluator_of(config: Config, engine: str = "") -> Evaluator:
     """The evaluator of these settings, its counts at zero. Raises EvaluatorError where Ray cannot be reached.
 
@@ -83,9 +91,7 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
     simulated already. A sweep over scenarios evolves the intact robot's controllers once.
     """
     settings = config.evaluator
-    name = settings.name
-    if name == "auto":
-        name = "serial" if config.budget.small and not settings.workers and not config.ray.address else "ray"
+    name = evaluator_name(config)
     key = (
         name,
         settings.workers,
