@@ -30,7 +30,7 @@ from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
-EXCHANGES, LOOKED_AT = 2, 3
+EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
 MOST = 12
 """Effects that are added at most unless told otherwise."""
@@ -119,7 +119,8 @@ def improve(
             best = last.best
             if best is None:
                 found = None
-                if exchanges < EXCHANGES and leftovers(problem, last.base):
+                # Where fits search rather than follow slopes, a look ahead costs minutes.
+                if exchanges < EXCHANGES and not problem.rugged and leftovers(problem, last.base):
                     exchanges += 1
                     found = _exchanged(search, current, ladder, own, pool, effort)
                 if found is not None:
