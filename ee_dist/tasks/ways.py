@@ -54,7 +54,7 @@ WAYS: dict[str, Way] = {
     for w in (
         Way("open_loop", "commands were recorded: every channel is compared on them", open_loop, moves=True),
         Way("free_run", "joint positions were recorded: whole records are run freely", _free_run),
-        Way("force_balance", "torques were recorded, but no commands to simulate from", _force_balance),
+        Way("force_balance", "torques were recorded, and no commands that a simulation could be led by", _force_balance),
     )
 }
 """All ways by name. To add one is to write a ``Problem`` and put it here."""
@@ -66,7 +66,9 @@ def way_of(measured: Measurements, by: str) -> Way:
     if by == AUTO:
         driven = all(np.isfinite(t.log.commands).all(axis=1).any() for t in measured.trials)
         torques = all(t.log.torques is not None and t.log.joints is not None for t in measured.trials)
-        by = "open_loop" if driven or not torques else "force_balance"
+        # On torques alone a simulation drifts away within a second, whatever the model: forces are balanced at each instant.
+        led = any(d.command in ("position", "speed") for d in measured.robot.drives) or measured.robot.free_base
+        by = "open_loop" if (driven and led) or not torques else "force_balance"
     way = WAYS[by]
     if measured.robot.free_base and not way.moves:
         raise ConfigError(f"task.by={by}: {measured.robot.name} moves about; use task.by=open_loop")
