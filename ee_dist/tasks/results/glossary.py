@@ -12,8 +12,8 @@ TERMS = (
         "How errors of channels with different units are made comparable: each residual is divided by the size that noise, "
         "and models as good as this one, would give it. 1 is ordinary, 3 is rare, 10 is wrong.",
     ),
-    ("Error", "How large the residual is over all channels and all time, as one number; the foot of this page says how exactly. Lower is "
-     "better."),
+    ("Error", "How large the residual is over all channels and all time, as one number; the foot of this page says how "
+        "exactly. Lower is better."),
     ("Softened", "Residuals beyond a few standard deviations count less than in full, so that one spike does not decide."),
     (
         "Noise floor",
