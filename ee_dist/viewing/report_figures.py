@@ -13,8 +13,8 @@ from plotly.subplots import make_subplots
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
 
-MEASURED, PREDICTED, IMPROVED, RESIDUAL = "#3f7fbf", "#e08a00", "#2e9e62", "#cf4b3c"
-FLOOR = "#8a63c9"
+MEASURED, PREDICTED, IMPROVED, RESIDUAL = "#4a90d9", "#e08a00", "#2e9e62", "#cf4b3c"
+FLOOR = "#a678e2"
 DOTS = 700
 """Points of a cloud that are drawn; its mean is of all."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
@@ -40,6 +40,7 @@ def _styled(figure: go.Figure, height: int) -> go.Figure:
         plot_bgcolor="rgba(0,0,0,0)",
         margin={"l": 60, "r": 16, "t": 34, "b": 45},
         legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
+        modebar={"bgcolor": "rgba(0,0,0,0)", "color": "#8899aa", "activecolor": "#3f7fbf"},
         hovermode="x unified",
     )
     figure.update_annotations(font_size=12)
@@ -60,7 +61,7 @@ def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> 
         series.append((names[1], curve.improved, IMPROVED, 2.0))
     for name, values, colour, width in series:
         line = {"color": colour, "width": width}
-        figure.add_scatter(x=curve.times_s, y=values, name=name, line=line, opacity=0.6 if name == "measured" else 1.0,
+        figure.add_scatter(x=curve.times_s, y=values, name=name, line=line, opacity=0.7 if name == "measured" else 1.0,
                            legendgroup=name, mode="lines", row=1, col=1)  # fmt: skip
         if name != "measured":
             figure.add_scatter(x=curve.times_s, y=curve.measured - values, line={"color": colour, "width": 1.5}, row=2,
@@ -107,18 +108,19 @@ def heat_map(
         meta={
             "light": {"coloraxis.colorscale": light},
             "dark": {"coloraxis.colorscale": dark},
-            "narrow": _axes("tickfont.size", 8, len(tables)),
-            "wide": _axes("tickfont.size", 10, len(tables)),
+            "narrow": {**_axes("tickfont.size", 8, len(tables)), **_axes("nticks", 9, len(tables), "x")},
+            "wide": {**_axes("tickfont.size", 10, len(tables)), **_axes("nticks", 32, len(tables), "x")},
         },
     )
+    figure.update_annotations(x=0.0, xanchor="left")
     figure.update_yaxes(autorange="reversed", automargin=True, showgrid=False, dtick=1)
     figure.update_xaxes(tickangle=-60, showgrid=False, automargin=True)
     return figure
 
 
-def _axes(setting: str, value: object, count: int) -> dict[str, object]:
+def _axes(setting: str, value: object, count: int, which: str = "xy") -> dict[str, object]:
     """A setting of all axes of a figure with so many rows, as the page changes it."""
-    return {f"{axis}axis{k or ''}.{setting}": value for axis in "xy" for k in [0, *range(2, count + 1)]}
+    return {f"{axis}axis{k or ''}.{setting}": value for axis in which for k in [0, *range(2, count + 1)]}
 
 
 def ranking(
@@ -156,10 +158,8 @@ def ranking(
     )
     _styled(figure, 80 + 38 * len(names))
     least = min([100 * i[0] for i in intervals] + [0.0])
-    figure.update_xaxes(
-        title_text="of what is above the noise, taken off on held-out data (%)", range=[max(least - 3, -25), 104]
-    )
-    figure.update_yaxes(autorange="reversed", automargin=True)
+    figure.update_xaxes(title_text="gain above the noise, held out (%)", range=[max(least - 3, -25), 104])
+    figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
     figure.update_layout(margin={"l": 20, "r": 20, "t": 10, "b": 45}, hovermode="closest")
     return figure
 
@@ -181,7 +181,7 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
         x=[wrapped(n, 18) for n in names], y=list(fit), name="fitted", mode="lines+markers",
         line={"color": PREDICTED, "dash": "dot"},
     )  # fmt: skip
-    figure.add_hline(y=floor, line={"color": FLOOR, "dash": "dash"}, annotation_text=f"noise floor {floor:.2f}",
+    figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
                      annotation_position="bottom left")  # fmt: skip
     _styled(figure, 340)
     figure.update_xaxes(range=[-0.4, len(names) - 0.6], automargin=True)
@@ -204,10 +204,9 @@ def cloud(title: str, part: Cloud) -> go.Figure:
         figure.add_scatter(x=at, y=mean, mode="lines", line=line, name=f"mean {name}", hoverinfo="skip")
     figure.add_hline(y=0, line={"color": "#8899aa", "width": 1})
     _styled(figure, 250)
-    least, most = np.nanquantile(np.concatenate([y for _, y, _ in series]), [0.003, 0.997])
-    room = 0.1 * max(float(most - least), 1e-12)
-    figure.update_xaxes(title_text=part.label, title_standoff=4)
-    figure.update_yaxes(range=[float(least) - room, float(most) + room], automargin=True)
+    left, right = _most(part.x)
+    figure.update_xaxes(title_text=part.label, title_standoff=4, range=[left, right])
+    figure.update_yaxes(range=_most(np.concatenate([y for _, y, _ in series])), automargin=True)
     figure.update_layout(
         title={"text": title, "font": {"size": 12}, "x": 0.02, "y": 0.97},
         showlegend=False,
@@ -222,9 +221,19 @@ def _short(values: Array) -> list[float]:
     return [float(f"{v:.4g}") for v in values]
 
 
+def _most(values: Array) -> list[float]:
+    """A range that holds nearly all: a few far ones would squeeze the rest into a line."""
+    low, high = np.nanquantile(values, [0.004, 0.996])
+    room = 0.08 * max(float(high - low), 1e-12)
+    return [float(low) - room, float(high) + room]
+
+
 def _trend(x: Array, y: Array, bins: int = 24) -> tuple[Array, Array]:
     """Middles and means of the bins that hold anything."""
-    edges = np.linspace(float(x.min()), float(x.max()) + 1e-12, bins + 1)
+    left, right = _most(x)
+    inside = (x >= left) & (x <= right)
+    x, y = x[inside], y[inside]
+    edges = np.linspace(left, right, bins + 1)
     which = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
     count = np.bincount(which, minlength=bins)
     mean = np.bincount(which, weights=np.nan_to_num(y), minlength=bins) / np.maximum(count, 1)
@@ -244,12 +253,12 @@ def bars(
     if after is not None:
         figure.add_bar(x=list(after), y=places, orientation="h", marker_color=IMPROVED, name="after")
     if floor is not None:
-        figure.add_vline(x=floor, line={"color": FLOOR, "dash": "dash"}, annotation_text=f"noise floor {floor:.2f}")
+        figure.add_vline(x=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
+                         annotation_position="top")  # fmt: skip
     _styled(figure, 110 + (24 if after is None else 34) * len(names))
     figure.update_xaxes(title_text=label, rangemode="tozero")
-    figure.update_yaxes(autorange="reversed", automargin=True)
-    figure.update_layout(margin={"l": 20, "r": 20, "t": 34, "b": 45}, hovermode="closest", bargap=0.25)
-    if after is not None:
-        # Above the bars is the word at the floor; the key goes below.
-        figure.update_layout(showlegend=True, legend={"y": 1.0, "x": 1.0, "xanchor": "right"})
+    figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
+    figure.update_layout(
+        margin={"l": 20, "r": 20, "t": 34, "b": 45}, hovermode="closest", bargap=0.25, showlegend=False
+    )
     return figure

@@ -40,7 +40,8 @@ def compare_page(
     page = _page(problem, measured, "Compare", account, following, links)
     page.words = [*page.words, *remarks]
     page.sure = f"How sure: the noise floor is {problem.told(found.noise_floor)}, {found.floor_source}."
-    page.proof = parts.proof_section(problem, overlays, residual, models)
+    worst = found.channels[0].name if found.channels else ""
+    page.proof = parts.proof_section(problem, overlays, residual, models, channel=worst)
     page.tiles = [
         (problem.told(found.error), problem.natural_name),
         (problem.told(found.noise_floor), "noise floor"),

@@ -19,7 +19,7 @@ from ee_dist.viewing.curves import MOST as POINTS
 from ee_dist.viewing.curves import Overlay, browser, rows_of, thinned
 from ee_dist.viewing.report import Section, Table
 
-PAD_S = 0.4
+PAD_S = 0.6
 """Shown before and after the stretch that proves most, at least."""
 Models = Sequence[tuple[str, Hypothesis]]
 """(label, terms): the model as it was, and perhaps one that has what was found."""
@@ -54,25 +54,32 @@ def trial_name(problem: Problem, trial: int) -> str:
 
 
 def proof_section(
-    problem: Problem, overlays: Sequence[Overlay], residual: Array, models: Models, after: Array | None = None
+    problem: Problem,
+    overlays: Sequence[Overlay],
+    residual: Array,
+    models: Models,
+    after: Array | None = None,
+    channel: str = "",
 ) -> Section | None:
-    """The stretch of time in which a channel shows most: most of what was found, or of what is wrong."""
+    """The stretch of time in which a channel (or the one asked for) shows most: of what was found, or of what is wrong."""
     width = len(problem.channels)
     gained = residual**2 - (problem.floor if after is None else after**2)
     cell = problem.segment_of * width + problem.channel_of
     count = len(problem.segments) * width
     excess = np.bincount(cell, weights=np.where(problem.layout.reading, gained, 0.0), minlength=count)
+    asked = np.tile([not channel or name == channel for name in problem.channels], len(problem.segments))
+    excess = np.where(asked, excess, -np.inf)
     by_name = {(o.channel, o.trial): o for o in overlays}
     for k in np.argsort(-excess):
-        segment, channel = int(k) // width, int(k) % width
+        segment, place = divmod(int(k), width)
         trial = trial_name(problem, int(problem.trial_of_segment[segment]))
-        curve = by_name.get((plain(problem.channels[channel]), trial))
+        curve = by_name.get((plain(problem.channels[place]), trial))
         if curve is not None:
             break
     else:
         return None
     begin, end = span_of(problem, segment)
-    pad = max(PAD_S, end - begin)
+    pad = max(PAD_S, 1.5 * (end - begin))
     rows = np.flatnonzero((curve.times_s >= begin - pad) & (curve.times_s <= end + pad))
     shown = thinned(rows_of(curve, rows) if len(rows) > 1 else curve, POINTS)
     what = "is most wrong" if after is None else "gains most"
@@ -201,13 +208,14 @@ def channels_section(problem: Problem, found: Comparison, after: Comparison | No
     later = {} if after is None else {c.name: c for c in after.channels}
     rows, first = [], [c for c in found.channels if not later or c.name in later]
     for c in first:
-        row = [plain(c.name), f"{c.rmse:.4g} {c.unit}", f"{c.normalised:.2f}"]
+        unit = "" if c.unit == "1" else f" {c.unit}"
+        row = [plain(c.name), f"{c.rmse:.4g}{unit}", f"{c.normalised:.2f}"]
         if after is not None:
-            row += [f"{later[c.name].rmse:.4g} {c.unit}", f"{later[c.name].normalised:.2f}"]
+            row += [f"{later[c.name].rmse:.4g}{unit}", f"{later[c.name].normalised:.2f}"]
         rows.append([*row, c.worst_trial, f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
     columns = ["channel", "rmse", "error"] + ([] if after is None else ["rmse after", "error after"])
     table = Table([*columns, "worst trial", "when"], rows, tuple(range(1, len(columns))))
-    shown = first[:most]
+    shown = [c for c in first if c.normalised > 0][:most]
     figure = figures.bars(
         [plain(c.name) for c in shown],
         [c.normalised for c in shown],
@@ -216,6 +224,7 @@ def channels_section(problem: Problem, found: Comparison, after: Comparison | No
         None if after is None else [later[c.name].normalised for c in shown],
     )
     caption = "Root mean square in the channel's own unit, and in standard deviations."
-    if len(first) > len(shown):
+    if len(first) > most:
         caption += f" Bars: the {len(shown)} largest."
-    return Section("By channel", caption, figure, table)
+    legend = [] if after is None else [("before", figures.RESIDUAL), ("after", figures.IMPROVED)]
+    return Section("By channel", caption, figure, table, legend=legend)

@@ -37,7 +37,7 @@
   }
 
   // Measured over predicted, and their distance below, for any channel and trial.
-  const COLOURS = ["#3f7fbf", "#e08a00", "#2e9e62"];
+  const COLOURS = ["#4a90d9", "#e08a00", "#2e9e62"];
   function browse(part) {
     const all = JSON.parse(part.querySelector("script").textContent);
     const [channel, trial] = [part.querySelector(".channel"), part.querySelector(".trial")];
@@ -56,7 +56,7 @@
       const data = [];
       cell.y.forEach((values, k) => {
         const name = k ? all.names[k - 1] : "measured";
-        data.push({ x: cell.x, y: values, name, mode: "lines", legendgroup: name, opacity: k ? 1 : 0.6,
+        data.push({ x: cell.x, y: values, name, mode: "lines", legendgroup: name, opacity: k ? 1 : 0.7,
           line: { color: COLOURS[k], width: k ? 1.5 : 3 } });
         if (!k) return;
         const rest = values.map((v, i) => (v === null || cell.y[0][i] === null ? null : cell.y[0][i] - v));
@@ -64,7 +64,7 @@
           yaxis: "y2", line: { color: COLOURS[k], width: 1 } });
       });
       const layout = { height: 460, margin: { l: 60, r: 14, t: 34, b: 40 }, paper_bgcolor: "rgba(0,0,0,0)",
-        plot_bgcolor: "rgba(0,0,0,0)", hovermode: "x unified", showlegend: true,
+        plot_bgcolor: "rgba(0,0,0,0)", modebar: { bgcolor: "rgba(0,0,0,0)", color: "#8899aa" }, hovermode: "x unified", showlegend: true,
         legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0 },
         xaxis: { title: { text: "s" }, anchor: "y2" }, yaxis: { domain: [0.42, 1], title: { text: cell.u } },
         yaxis2: { domain: [0, 0.34], title: { text: "residual, " + cell.u } } };
