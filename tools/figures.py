@@ -26,7 +26,7 @@ VERBS = {"compare": (), "explain": (), "improve": ("effect=auto",)}
 WIDTHS = (1280, 400)
 IN_DOCS = {
     ("quadruped", "explain", 1280, False): "report_explain.png",
-    ("pendulum", "improve", 1280, True): "report_dark.png",
+    ("quadruped", "improve", 1280, True): "report_dark.png",
 }
 MOST_BYTES = 200_000
 
@@ -71,7 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
                     verb = report.parent.name
                     for width, dark in ((w, d) for w in WIDTHS for d in (False, True)):
                         label = f"{name}_{verb}_{width}_{'dark' if dark else 'light'}.png"
-                        seen = window.look(report, width, dark=dark)
+                        seen = window.look(report, width, dark=dark, height=840)
                         (options.out / label).write_bytes(seen.png)
                         wider = [f"{seen.overflow} pixels wider than the window"] if seen.overflow else []
                         wrong = [*seen.complaints, *(f"asks for {a}" for a in seen.asked), *wider]

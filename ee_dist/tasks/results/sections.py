@@ -82,11 +82,9 @@ def proof_section(
     pad = max(PAD_S, 1.5 * (end - begin))
     rows = np.flatnonzero((curve.times_s >= begin - pad) & (curve.times_s <= end + pad))
     shown = thinned(rows_of(curve, rows) if len(rows) > 1 else curve, POINTS)
-    what = "is most wrong" if after is None else "gains most"
+    what = "the model is most wrong" if after is None else "what was found takes off most"
     heading = f"Where it shows most: {curve.channel}, {trial}, {begin:.1f} to {end:.1f} s"
-    caption = (
-        f"Measured and predicted where the model {what} (shaded); below, what was measured less what was predicted."
-    )
+    caption = f"Measured and predicted where {what} (shaded); below, what was measured less what was predicted."
     return Section(heading, caption, figures.proof(shown, [n for n, _ in models], (begin, end)))
 
 
