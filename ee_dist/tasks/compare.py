@@ -15,6 +15,7 @@ from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.results.pages import compare_page
 from ee_dist.tasks.results.scenes import compare_scene
+from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_comparison
 from ee_dist.tasks.results.tables import setting, show_account, show_comparison
 from ee_dist.tasks.summary import Stopwatch, write_summary
@@ -44,10 +45,13 @@ def run(config: Config, options: Options, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     summary = {**of_comparison(problem, found, account, measured.model), "remarks": remarks}
     write_summary(out, "compare", config, options, watch, digest, summary)
-    write_page(compare_page(problem, measured, found, account, residual, remarks), out / "report.html")
+    model = [setting("model", config.model)] if config.model else []
+    following = ["task=explain", setting("measured", measured.files[0]), *model]
+    story = links(out, measured.files, config.model)
+    page = compare_page(problem, measured, found, account, residual, remarks, following, story)
+    write_page(page, out / "report.html")
     if options.rerun:
         compare_scene(problem, found, account, measured.model, out / "compare.rrd")
     show_comparison(console, problem, found)
     console.print(f"By {way.name}: {way.why}.", *remarks, sep="\n", highlight=False, markup=False)
-    model = [setting("model", config.model)] if config.model else []
-    show_account(console, account, out, ["task=explain", setting("measured", measured.files[0]), *model])
+    show_account(console, account, out, following)

@@ -18,6 +18,7 @@ from ee_dist.tasks.measurements import load
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
+from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_explanation
 from ee_dist.tasks.results.tables import setting, show_account, show_explanation
 from ee_dist.tasks.summary import Stopwatch, write_summary
@@ -62,15 +63,16 @@ def run(config: Config, options: Options, out: Path) -> None:
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead))
-    write_page(explain_page(problem, measured, found, account), out / "report.html")
-    if options.rerun:
-        explain_scene(problem, found, account, out / "explain.rrd")
-    show_explanation(console, problem, found)
-    wall, _ = watch.read()
-    console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)
     following = []
     if found.verdict in (EFFECT, UNEXPLAINED):
         model = [setting("model", config.model)] if config.model else []
         effect = setting("effect", found.best.terms[0].name if found.best else "auto")
         following = ["task=improve", setting("measured", measured.files[0]), *model, effect]
+    story = links(out, measured.files, config.model)
+    write_page(explain_page(problem, measured, found, account, following, story), out / "report.html")
+    if options.rerun:
+        explain_scene(problem, found, account, out / "explain.rrd")
+    show_explanation(console, problem, found)
+    wall, _ = watch.read()
+    console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)
     show_account(console, account, out, following)

@@ -26,6 +26,7 @@ from ee_dist.tasks.measurements import Measurements, load
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
+from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_improvement
 from ee_dist.tasks.results.tables import setting, show_account, show_candidates, show_ladder
 from ee_dist.tasks.summary import Stopwatch, write_summary
@@ -82,16 +83,16 @@ def run(config: Config, options: Options, out: Path) -> None:
         )
     digest = hashlib.sha256(repr([(r.terms, r.error_heldout) for r in found.ladder]).encode()).hexdigest()
     write_summary(out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path)))
-    write_page(improve_page(problem, measured, found, account), out / "report.html")
+    following = ["task=compare", setting("measured", measured.files[0]), setting("model", path)]
+    story = links(out, measured.files, config.model)
+    write_page(improve_page(problem, measured, found, account, following, story), out / "report.html")
     if options.rerun:
         improve_scene(problem, found, account, measured.model, out / "improve.rrd")
     show_ladder(console, problem, found)
     if found.last is not None:
         refused = [c for c in found.last.judged if not c.earned]
         show_candidates(console, problem, refused, "Tried on top of it, and refused")
-    show_account(
-        console, account, out, ["task=compare", setting("measured", measured.files[0]), setting("model", path)]
-    )
+    show_account(console, account, out, following)
 
 
 def effects_of(asked: Any, robot: Robot) -> list[Candidate] | None:

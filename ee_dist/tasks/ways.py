@@ -54,7 +54,9 @@ WAYS: dict[str, Way] = {
     for w in (
         Way("open_loop", "commands were recorded: every channel is compared on them", open_loop, moves=True),
         Way("free_run", "joint positions were recorded: whole records are run freely", _free_run),
-        Way("force_balance", "torques were recorded, and no commands that a simulation could be led by", _force_balance),
+        Way(
+            "force_balance", "torques were recorded, and no commands that a simulation could be led by", _force_balance
+        ),
     )
 }
 """All ways by name. To add one is to write a ``Problem`` and put it here."""

@@ -1,30 +1,23 @@
-"""The plots of the reports: overlay and residual, the map of where it fails, ranked effects, the ladder, signatures."""
+"""The plots of the reports: the proof, the map of where it fails, ranked effects, the ladder, bars, clouds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from ee_dist.trials.log import Array
+from ee_dist.viewing.curves import Overlay
 
-MEASURED, PREDICTED, IMPROVED, RESIDUAL = "#3f7fbf", "#e08a00", "#2e8b57", "#c0392b"
+MEASURED, PREDICTED, IMPROVED, RESIDUAL = "#4a90d9", "#e08a00", "#2e9e62", "#cf4b3c"
+FLOOR = "#a678e2"
+DOTS = 700
+"""Points of a cloud that are drawn; its mean is of all."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
-
-
-@dataclass(frozen=True, eq=False)
-class Overlay:
-    """One channel of one trial: series (T,), and with what the improved model says, if there is one."""
-
-    title: str
-    unit: str
-    times_s: Array
-    measured: Array
-    predicted: Array
-    improved: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,39 +31,47 @@ class Cloud:
 
 
 def _styled(figure: go.Figure, height: int) -> go.Figure:
+    """On the colour of the page, which draws texts and lines in what suits it."""
     figure.update_layout(
-        template="plotly_white",
+        template="none",
         font=_FONT,
         height=height,
-        margin={"l": 60, "r": 20, "t": 40, "b": 45},
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
+        margin={"l": 60, "r": 16, "t": 34, "b": 45},
         legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
+        modebar={"bgcolor": "rgba(0,0,0,0)", "color": "#8899aa", "activecolor": "#3f7fbf"},
         hovermode="x unified",
     )
+    figure.update_annotations(font_size=12)
+    figure.update_xaxes(zeroline=False)
     return figure
 
 
-def overlays(items: Sequence[Overlay]) -> go.Figure:
-    """A row for each channel: measured and predicted on the left, residual on the right."""
-    titles = [t for o in items for t in (o.title, "residual")]
-    figure = make_subplots(rows=len(items), cols=2, column_widths=[0.62, 0.38], subplot_titles=titles,
-                           vertical_spacing=0.32 / max(len(items), 1), horizontal_spacing=0.07)  # fmt: skip
-    for r, o in enumerate(items, start=1):
-        first = r == 1
-        series = [("measured", o.measured, MEASURED, 3.0), ("model", o.predicted, PREDICTED, 1.4)]
-        if o.improved is not None:
-            series.append(("improved model", o.improved, IMPROVED, 1.4))
-        for name, values, colour, width in series:
-            line = {"color": colour, "width": width}
-            opacity = 0.55 if name == "measured" else 1.0
-            figure.add_scatter(x=o.times_s, y=values, name=name, line=line, opacity=opacity, legendgroup=name,
-                               showlegend=first, mode="lines", row=r, col=1)  # fmt: skip
-            if name != "measured":
-                figure.add_scatter(x=o.times_s, y=o.measured - values, line={"color": colour, "width": 1.0}, mode="lines",
-                                   name=f"measured - {name}", legendgroup=name, showlegend=False, row=r, col=2)  # fmt: skip
-        figure.update_yaxes(title_text=o.unit, row=r, col=1)
-    figure.update_xaxes(title_text="s", row=len(items))
-    figure = _styled(figure, 90 + 190 * len(items))
-    figure.update_layout(legend={"orientation": "h", "y": 1.0 + 0.16 / len(items), "yanchor": "bottom"})
+def wrapped(name: str, width: int = 30) -> str:
+    """A label of an axis in lines of some characters."""
+    return "<br>".join(wrap(name, width))
+
+
+def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> go.Figure:
+    """Measured and predicted at the stretch of time where it matters most (shaded), and the residuals below."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.68, 0.32], vertical_spacing=0.06)
+    series = [("measured", curve.measured, MEASURED, 4.0), (names[0], curve.predicted, PREDICTED, 2.0)]
+    if curve.improved is not None:
+        series.append((names[1], curve.improved, IMPROVED, 2.0))
+    for name, values, colour, width in series:
+        line = {"color": colour, "width": width}
+        figure.add_scatter(x=curve.times_s, y=values, name=name, line=line, opacity=0.7 if name == "measured" else 1.0,
+                           legendgroup=name, mode="lines", row=1, col=1)  # fmt: skip
+        if name != "measured":
+            figure.add_scatter(x=curve.times_s, y=curve.measured - values, line={"color": colour, "width": 1.5}, row=2,
+                               col=1, mode="lines", name=f"measured - {name}", legendgroup=name, showlegend=False)  # fmt: skip
+    figure.add_vrect(x0=around[0], x1=around[1], fillcolor="#8899aa", opacity=0.14, line_width=0, layer="below")
+    figure.add_hline(y=0, line={"color": "#8899aa", "width": 1}, row=2, col=1)
+    _styled(figure, 400)
+    figure.update_yaxes(title_text=curve.unit, row=1, col=1)
+    figure.update_yaxes(title_text="residual", row=2, col=1)
+    figure.update_xaxes(title_text="s", row=2, col=1)
     return figure
 
 
@@ -94,49 +95,71 @@ def heat_map(
             row=row,
             col=1,
         )
-    _styled(figure, 140 + (20 + 17 * len(shown)) * len(tables))
-    scale = [[0, "#f7fbff"], [min(1.3 * floor / top, 0.9), "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]]
-    bar = {"title": {"text": "standard deviations", "side": "right"}, "thickness": 12}
+    _styled(figure, 170 + (20 + 17 * len(shown)) * len(tables))
+    pale = min(1.3 * floor / top, 0.9)
+    light = [[0, "#f7fbff"], [pale, "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]]
+    dark = [[0, "#1d252e"], [pale, "#2a3542"], [0.95, "#e0564c"], [1, "#ff8a7a"]]
+    bar = {"title": {"text": "standard deviations", "side": "top"}, "thickness": 10, "orientation": "h", "y": 1.0,
+           "yanchor": "bottom", "len": 0.45, "x": 1.0, "xanchor": "right"}  # fmt: skip
     figure.update_layout(
-        coloraxis={"cmin": 0.0, "cmax": top, "colorscale": scale, "colorbar": bar},
+        coloraxis={"cmin": 0.0, "cmax": top, "colorscale": light, "colorbar": bar},
         hovermode="closest",
-        margin={"l": 170, "r": 20, "t": 30, "b": 110},
+        margin={"l": 20, "r": 16, "t": 70, "b": 30},
+        meta={
+            "light": {"coloraxis.colorscale": light},
+            "dark": {"coloraxis.colorscale": dark},
+            "narrow": {**_axes("tickfont.size", 8, len(tables)), **_axes("nticks", 9, len(tables), "x")},
+            "wide": {**_axes("tickfont.size", 10, len(tables)), **_axes("nticks", 32, len(tables), "x")},
+        },
     )
-    figure.update_yaxes(autorange="reversed")
-    figure.update_xaxes(tickangle=-60, tickfont={"size": 10})
+    figure.update_annotations(x=0.0, xanchor="left")
+    figure.update_yaxes(autorange="reversed", automargin=True, showgrid=False, dtick=1)
+    figure.update_xaxes(tickangle=-60, showgrid=False, automargin=True)
     return figure
+
+
+def _axes(setting: str, value: object, count: int, which: str = "xy") -> dict[str, object]:
+    """A setting of all axes of a figure with so many rows, as the page changes it."""
+    return {f"{axis}axis{k or ''}.{setting}": value for axis in which for k in [0, *range(2, count + 1)]}
 
 
 def ranking(
     names: Sequence[str], gains: Sequence[float], intervals: Sequence[tuple[float, float]], kinds: Sequence[str]
 ) -> go.Figure:
-    """Gain on held-out data with its interval, in percent. ``kinds``: best, tied, earned or not."""
-    colours = {"best": "#1769aa", "tied": "#67a9d8", "earned": "#a9b8c6", "not": "#dde3e9"}
+    """Gain on held-out data with its interval, in percent. ``kinds``: best, tied, earned or not (hatched)."""
+    colours = {"best": "#1769aa", "tied": "#67a9d8", "earned": "#8fa3b5", "not": "rgba(136,153,170,0.12)"}
     low = [max(0.0, 100 * (g - i[0])) for g, i in zip(gains, intervals, strict=True)]
     high = [max(0.0, 100 * (i[1] - g)) for g, i in zip(gains, intervals, strict=True)]
     figure = go.Figure(
         go.Bar(
             x=[100 * g for g in gains],
-            y=list(names),
+            y=[wrapped(n) for n in names],
             orientation="h",
-            marker_color=[colours[k] for k in kinds],
+            marker={
+                "color": [colours[k] for k in kinds],
+                "pattern": {
+                    "shape": ["/" if k == "not" else "" for k in kinds],
+                    "fgcolor": "#8899aa",
+                    "fillmode": "overlay",
+                    "size": 6,
+                },
+                "line": {"color": "#8899aa", "width": [1 if k == "not" else 0 for k in kinds]},
+            },
             error_x={
                 "type": "data",
                 "array": high,
                 "arrayminus": low,
-                "color": "#5d6b7a",
+                "color": "#7d8b9a",
                 "thickness": 1.2,
                 "width": 4,
             },
             hovertemplate="%{y}: %{x:.1f} %<extra></extra>",
         )
     )
-    _styled(figure, 110 + 34 * len(names))
+    _styled(figure, 80 + 38 * len(names))
     least = min([100 * i[0] for i in intervals] + [0.0])
-    figure.update_xaxes(
-        title_text="of what is above the noise, taken off on held-out data (%)", range=[max(least - 3, -25), 104]
-    )
-    figure.update_yaxes(autorange="reversed", automargin=True)
+    figure.update_xaxes(title_text="gain above the noise, held out (%)", range=[max(least - 3, -25), 104])
+    figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
     figure.update_layout(margin={"l": 20, "r": 20, "t": 10, "b": 45}, hovermode="closest")
     return figure
 
@@ -145,7 +168,7 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
     """Error of each model from the first to the last, and the noise floor."""
     figure = go.Figure()
     figure.add_scatter(
-        x=list(names),
+        x=[wrapped(n, 18) for n in names],
         y=list(heldout),
         name="held out",
         mode="lines+markers+text",
@@ -155,46 +178,62 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
         textposition="top center",
     )
     figure.add_scatter(
-        x=list(names), y=list(fit), name="fitted", mode="lines+markers", line={"color": PREDICTED, "dash": "dot"}
-    )
-    figure.add_hline(y=floor, line={"color": IMPROVED, "dash": "dash"}, annotation_text=f"noise floor {floor:.2f}",
+        x=[wrapped(n, 18) for n in names], y=list(fit), name="fitted", mode="lines+markers",
+        line={"color": PREDICTED, "dash": "dot"},
+    )  # fmt: skip
+    figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
                      annotation_position="bottom left")  # fmt: skip
     _styled(figure, 340)
-    figure.update_xaxes(range=[-0.4, len(names) - 0.6])
+    figure.update_xaxes(range=[-0.4, len(names) - 0.6], automargin=True)
     figure.update_layout(yaxis_range=[0, 1.25 * max(max(heldout), floor)])
     figure.update_yaxes(title_text="error (standard deviations)", rangemode="tozero")
     return figure
 
 
-def signatures(panels: Sequence[tuple[str, Sequence[Cloud]]]) -> go.Figure:
-    """For each channel, residuals against position, speed, command and load, with the mean over each tenth of the range."""
-    columns = max(len(p) for _, p in panels)
-    labels = [c.label for _, p in panels for c in p]
-    figure = make_subplots(rows=len(panels), cols=columns, subplot_titles=labels, vertical_spacing=0.3 / len(panels),
-                           horizontal_spacing=0.05)  # fmt: skip
-    for r, (title, parts) in enumerate(panels, start=1):
-        for c, cloud in enumerate(parts, start=1):
-            series = [("before", cloud.before, RESIDUAL)]
-            if cloud.after is not None:
-                series.append(("after", cloud.after, IMPROVED))
-            for name, y, colour in series:
-                first = r == 1 and c == 1
-                marker = {"color": colour, "size": 4, "opacity": 0.25}
-                figure.add_scattergl(x=cloud.x, y=y, mode="markers", marker=marker, name=name, legendgroup=name,
-                                     showlegend=first and len(series) > 1, row=r, col=c)  # fmt: skip
-                at, mean = _trend(cloud.x, y)
-                line = {"color": colour, "width": 3}
-                figure.add_scatter(x=at, y=mean, mode="lines", line=line, showlegend=False, legendgroup=name,
-                                   hoverinfo="skip", row=r, col=c)  # fmt: skip
-        figure.update_yaxes(title_text=title, row=r, col=1)
-    figure = _styled(figure, 80 + 220 * len(panels))
-    figure.update_layout(hovermode="closest")
+def cloud(title: str, part: Cloud) -> go.Figure:
+    """One channel's residuals against one thing, with the mean over each stretch of its range, before and after."""
+    figure = go.Figure()
+    series = [("before", part.before, RESIDUAL)] + ([] if part.after is None else [("after", part.after, IMPROVED)])
+    thin = slice(None, None, max(1, len(part.x) // DOTS))
+    for name, y, colour in series:
+        marker = {"color": colour, "size": 4, "opacity": 0.22}
+        figure.add_scatter(x=_short(part.x[thin]), y=_short(y[thin]), mode="markers", marker=marker, name=name)
+    for name, y, colour in series:
+        at, mean = _trend(part.x, y)
+        line = {"color": colour, "width": 3.5}
+        figure.add_scatter(x=at, y=mean, mode="lines", line=line, name=f"mean {name}", hoverinfo="skip")
+    figure.add_hline(y=0, line={"color": "#8899aa", "width": 1})
+    _styled(figure, 250)
+    left, right = _most(part.x)
+    figure.update_xaxes(title_text=part.label, title_standoff=4, range=[left, right])
+    figure.update_yaxes(range=_most(np.concatenate([y for _, y, _ in series])), automargin=True)
+    figure.update_layout(
+        title={"text": title, "font": {"size": 12}, "x": 0.02, "y": 0.97},
+        showlegend=False,
+        hovermode="closest",
+        margin={"l": 40, "r": 10, "t": 30, "b": 40},
+    )
     return figure
+
+
+def _short(values: Array) -> list[float]:
+    """With as many digits as can be seen."""
+    return [float(f"{v:.4g}") for v in values]
+
+
+def _most(values: Array) -> list[float]:
+    """A range that holds nearly all: a few far ones would squeeze the rest into a line."""
+    low, high = np.nanquantile(values, [0.004, 0.996])
+    room = 0.08 * max(float(high - low), 1e-12)
+    return [float(low) - room, float(high) + room]
 
 
 def _trend(x: Array, y: Array, bins: int = 24) -> tuple[Array, Array]:
     """Middles and means of the bins that hold anything."""
-    edges = np.linspace(float(x.min()), float(x.max()) + 1e-12, bins + 1)
+    left, right = _most(x)
+    inside = (x >= left) & (x <= right)
+    x, y = x[inside], y[inside]
+    edges = np.linspace(left, right, bins + 1)
     which = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
     count = np.bincount(which, minlength=bins)
     mean = np.bincount(which, weights=np.nan_to_num(y), minlength=bins) / np.maximum(count, 1)
@@ -202,13 +241,24 @@ def _trend(x: Array, y: Array, bins: int = 24) -> tuple[Array, Array]:
     return middle[count > 2], mean[count > 2]
 
 
-def bars(names: Sequence[str], values: Sequence[float], label: str, floor: float | None = None) -> go.Figure:
-    """Horizontal bars, the longest first."""
-    figure = go.Figure(go.Bar(x=list(values), y=list(names), orientation="h", marker_color=MEASURED))
+def bars(
+    names: Sequence[str], values: Sequence[float], label: str, floor: float | None = None,
+    after: Sequence[float] | None = None,
+) -> go.Figure:  # fmt: skip
+    """Horizontal bars, before and perhaps after, and a line where noise alone would end them."""
+    places = [wrapped(n, 26) for n in names]
+    figure = go.Figure(
+        go.Bar(x=list(values), y=places, orientation="h", marker_color=RESIDUAL if after else MEASURED, name="before")
+    )
+    if after is not None:
+        figure.add_bar(x=list(after), y=places, orientation="h", marker_color=IMPROVED, name="after")
     if floor is not None:
-        figure.add_vline(x=floor, line={"color": IMPROVED, "dash": "dash"}, annotation_text="noise floor")
-    _styled(figure, 110 + 24 * len(names))
-    figure.update_xaxes(title_text=label)
-    figure.update_yaxes(autorange="reversed", automargin=True)
-    figure.update_layout(margin={"l": 20, "r": 20, "t": 20, "b": 45}, hovermode="closest")
+        figure.add_vline(x=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
+                         annotation_position="top")  # fmt: skip
+    _styled(figure, 110 + (24 if after is None else 34) * len(names))
+    figure.update_xaxes(title_text=label, rangemode="tozero")
+    figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
+    figure.update_layout(
+        margin={"l": 20, "r": 20, "t": 34, "b": 45}, hovermode="closest", bargap=0.25, showlegend=False
+    )
     return figure

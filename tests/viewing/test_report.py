@@ -20,7 +20,10 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     figure = go.Figure(go.Scatter(x=[0, 1], y=[1, 0], name=NASTY))
     table = Table(["effect", NASTY], [[NASTY, "1"], ["b", "2"]], numeric=(1,), lead=(0,))
     sections = [Section(NASTY, NASTY, figure, table), Section("Only words", "nothing to see")]
-    whole = Page(NASTY, NASTY, [NASTY, "second"], "good", [(NASTY, "tile")], sections, NASTY)
+    whole = Page(
+        NASTY, NASTY, NASTY, [NASTY, "second"], "good", NASTY, NASTY, sections[0], [(NASTY, "tile")], sections,
+        [(NASTY, "../other/report.html")], [(NASTY, NASTY)], NASTY,
+    )  # fmt: skip
     return write_page(whole, tmp_path_factory.mktemp("page") / "report.html")
 
 
@@ -32,7 +35,7 @@ def outside_scripts(text: str) -> str:
 def test_what_is_put_in_is_text(page: Path) -> None:
     text = outside_scripts(page.read_text(encoding="utf-8"))
     assert "<script>alert" not in text
-    assert text.count("&lt;script&gt;") >= 9, "title, heading, words, tile, caption, table and foot"
+    assert text.count("&lt;script&gt;") >= 18, "title, heading, words, tile, caption, table and foot"
     assert '<tr class="lead">' in text and '<td class="n">1</td>' in text
     assert not page.with_name("report.html.part").exists()
 

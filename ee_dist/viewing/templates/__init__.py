@@ -36,6 +36,14 @@ def rendered(name: str, **values: Any) -> str:
     return page.render(style=Markup(style), plotting=Markup(get_plotlyjs()), **values)
 
 
+def script(name: str) -> Markup:
+    """A script of ours, as it is."""
+    environment = _environment()
+    assert environment.loader is not None
+    source, _, _ = environment.loader.get_source(environment, name)
+    return Markup(source)
+
+
 def plot(figure: go.Figure | None, name: str) -> Markup:
     """A figure as a part of a page; nothing without one."""
     if figure is None:

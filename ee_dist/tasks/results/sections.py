@@ -1,0 +1,228 @@
+"""The parts of the pages of compare, explain and improve, from what they found, whatever the way of comparing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ee_dist.discrepancy.compare import Comparison, circumstances, heat, span_of
+from ee_dist.discrepancy.compare import rows_of as rows_at
+from ee_dist.discrepancy.evidence.judge import Judged
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import placed, plain, told_all
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.tasks.results.tables import standing
+from ee_dist.trials.log import Array
+from ee_dist.viewing import report_figures as figures
+from ee_dist.viewing.curves import MOST as POINTS
+from ee_dist.viewing.curves import Overlay, browser, rows_of, thinned
+from ee_dist.viewing.report import Section, Table
+
+PAD_S = 0.6
+"""Shown before and after the stretch that proves most, at least."""
+Models = Sequence[tuple[str, Hypothesis]]
+"""(label, terms): the model as it was, and perhaps one that has what was found."""
+
+
+def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
+    """Every channel of every trial, with the error that the first of the models leaves there."""
+    width = len(problem.channels)
+    cells = len(problem.trials) * width
+    where = problem.trial_of * width + problem.channel_of
+    energy = np.bincount(where, weights=residual**2, minlength=cells)
+    rms = np.sqrt(energy / np.maximum(np.bincount(where, minlength=cells), 1))
+    later = [{(s.trial, s.channel): s.predicted for s in problem.series(terms)} for _, terms in models[1:]]
+    return [
+        Overlay(
+            plain(problem.channels[s.channel]),
+            trial_name(problem, s.trial),
+            s.unit,
+            s.times_s,
+            s.measured,
+            s.predicted,
+            later[0].get((s.trial, s.channel)) if later else None,
+            float(rms[s.trial * width + s.channel]),
+        )
+        for s in problem.series(models[0][1])
+    ]
+
+
+def trial_name(problem: Problem, trial: int) -> str:
+    """With its number: repeats have one name."""
+    return problem.trials[trial] if len(problem.trials) == 1 else f"{trial + 1}. {problem.trials[trial]}"
+
+
+def proof_section(
+    problem: Problem,
+    overlays: Sequence[Overlay],
+    residual: Array,
+    models: Models,
+    after: Array | None = None,
+    channel: str = "",
+) -> Section | None:
+    """The stretch of time in which a channel (or the one asked for) shows most: of what was found, or of what is wrong."""
+    width = len(problem.channels)
+    gained = residual**2 - (problem.floor if after is None else after**2)
+    cell = problem.segment_of * width + problem.channel_of
+    count = len(problem.segments) * width
+    excess = np.bincount(cell, weights=np.where(problem.layout.reading, gained, 0.0), minlength=count)
+    asked = np.tile([not channel or name == channel for name in problem.channels], len(problem.segments))
+    excess = np.where(asked, excess, -np.inf)
+    by_name = {(o.channel, o.trial): o for o in overlays}
+    for k in np.argsort(-excess):
+        segment, place = divmod(int(k), width)
+        trial = trial_name(problem, int(problem.trial_of_segment[segment]))
+        curve = by_name.get((plain(problem.channels[place]), trial))
+        if curve is not None:
+            break
+    else:
+        return None
+    begin, end = span_of(problem, segment)
+    pad = max(PAD_S, 1.5 * (end - begin))
+    rows = np.flatnonzero((curve.times_s >= begin - pad) & (curve.times_s <= end + pad))
+    shown = thinned(rows_of(curve, rows) if len(rows) > 1 else curve, POINTS)
+    what = "the model is most wrong" if after is None else "what was found takes off most"
+    heading = f"Where it shows most: {curve.channel}, {trial}, {begin:.1f} to {end:.1f} s"
+    caption = f"Measured and predicted where {what} (shaded); below, what was measured less what was predicted."
+    return Section(heading, caption, figures.proof(shown, [n for n, _ in models], (begin, end)))
+
+
+def browser_section(overlays: Sequence[Overlay], models: Models) -> Section:
+    found = browser(overlays, [n for n, _ in models])
+    caption = "Pick a channel and a trial; the arrows go on to the next in the order of their error."
+    if found.left_out:
+        caption += f" The {found.left_out} with the least error had no room here."
+    return Section("Measured and predicted, every channel and trial", caption, browser=found)
+
+
+def heat_section(problem: Problem, residual: Array, after: Array | None = None) -> Section:
+    segments = [
+        f"{problem.trials[k]} {s.rsplit('@', 1)[1]}"
+        for k, s in zip(problem.trial_of_segment, problem.segments, strict=True)
+    ]
+    unique = [f"{n}{' ' * segments[:i].count(n)}" for i, n in enumerate(segments)]
+    caption = (
+        "Each cell is the error of one channel in one window of time. What is near the background is noise, red is what the "
+        "model gets wrong."
+    )
+    tables = [heat(problem, residual)] + ([] if after is None else [heat(problem, after)])
+    return Section("Where it fails, channel by time", caption, figures.heat_map(tables, unique, problem.channels))
+
+
+def signature_section(problem: Problem, residual: Array, after: Array | None = None, most: int = 3) -> Section | None:
+    """Residuals of the worst joint channels against position, speed, command and load, before and after."""
+    layout = problem.layout
+    score = np.bincount(problem.channel_of[layout.reading], weights=residual[layout.reading] ** 2)
+    worst = [int(c) for c in np.argsort(-score) if layout.joint_of_channel[c] is not None and score[c] > 0][:most]
+    raw, better = problem.raw(residual), None if after is None else problem.raw(after)
+    around = [circumstances(problem, k) for k in range(len(problem.trials))]
+    shown = []
+    for c in worst:
+        j = layout.joint_of_channel[c]
+        mine = np.flatnonzero((problem.channel_of == c) & layout.reading)
+        angle = "m" if problem.robot.joint(problem.robot.motor_names[j or 0]).kind == "slide" else "rad"
+        for label, key in (
+            (f"position ({angle})", "position"),
+            (f"commanded speed ({angle}/s)", "speed"),
+            (f"command ({angle})", "command"),
+            (f"load ({'N' if angle == 'm' else 'N.m'})", "load"),
+        ):
+            x = np.full(len(mine), np.nan)
+            for k in range(len(problem.trials)):
+                own = problem.trial_of[mine] == k
+                rows = rows_at(problem, k, layout.time_s[mine[own]])
+                x[own] = getattr(around[k], key)[rows, j]
+            if np.isfinite(x).all():
+                part = figures.Cloud(label, x, raw[mine], None if better is None else better[mine])
+                shown.append(figures.cloud(f"{plain(problem.channels[c])} ({layout.units[c]})", part))
+    if not shown:
+        return None
+    caption = (
+        "A law that is missing draws a line here: friction a step at zero speed, a spring a slope over position, "
+        "play a gap at zero load. Thick lines are means."
+    )
+    legend = [("before", figures.RESIDUAL)] + ([] if after is None else [("after", figures.IMPROVED)])
+    return Section("Residual against what the joint did", caption, figures=shown, legend=legend)
+
+
+def ranking_section(
+    problem: Problem, judged: Sequence[Judged], heading: str = "Candidate effects, ranked"
+) -> Section | None:
+    if not judged:
+        return None
+    best = judged[0]
+    kinds = [_kind(c, best) for c in judged]
+    rows = [
+        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), f"{c.gain:.1%}",
+         f"{max(c.interval[0], -9.99):.1%} to {c.interval[1]:.1%}", standing(c, best)]
+        for c in judged
+    ]  # fmt: skip
+    pale = [k for k, kind in enumerate(kinds) if kind == "not"]
+    lead = [k for k, kind in enumerate(kinds) if kind in ("best", "tied")]
+    caption = (
+        f"Share of what is above the noise that each takes off data it was not fitted to ({best.held_out}), with its 95 % "
+        "interval. Hatched: refused."
+    )
+    above = [c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0 for c in judged]
+    figure = figures.ranking(
+        [placed(c.name) for c in judged],
+        [c.explained for c in judged],
+        [(c.interval[0] * a, c.interval[1] * a) for c, a in zip(judged, above, strict=True)],
+        kinds,
+    )
+    columns = ["rank", "effect", f"{problem.natural_name}, held out", "gain", "95 % interval", "judgement"]
+    return Section(heading, caption, figure, Table(columns, rows, (0, 2, 3, 4), lead, pale))
+
+
+def _kind(c: Judged, best: Judged) -> str:
+    if not c.earned:
+        return "not"
+    return "best" if c is best else "tied" if c.name in best.tied_with else "earned"
+
+
+def trials_section(problem: Problem, found: Comparison) -> Section:
+    rows = [[t, problem.told(e)] for t, e in zip(problem.trials, found.trial_errors, strict=True)]
+    figure = figures.bars(
+        [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)],
+        found.trial_errors,
+        "error (standard deviations)",
+        found.noise_floor,
+    )
+    return Section("By trial", "", figure, Table(["trial", problem.natural_name], rows, (1,)))
+
+
+def regimes_section(problem: Problem, found: Comparison) -> Section:
+    regimes = sorted(found.regimes, key=lambda r: -r.error)
+    rows = [[r.name, f"{r.error:.2f}", f"{r.share:.0%}", f"{r.values:.0%}"] for r in regimes]
+    label = "error (standard deviations)"
+    figure = figures.bars([r.name for r in regimes], [r.error for r in regimes], label, found.noise_floor)
+    table = Table(["regime", "error", "share of the excess", "share of the data"], rows, (1, 2, 3))
+    return Section("By regime", "Joint channels, sorted by what their joint was doing at the time.", figure, table)
+
+
+def channels_section(problem: Problem, found: Comparison, after: Comparison | None = None, most: int = 14) -> Section:
+    """Errors of the channels, before and perhaps after, largest first."""
+    later = {} if after is None else {c.name: c for c in after.channels}
+    rows, first = [], [c for c in found.channels if not later or c.name in later]
+    for c in first:
+        unit = "" if c.unit == "1" else f" {c.unit}"
+        row = [plain(c.name), f"{c.rmse:.4g}{unit}", f"{c.normalised:.2f}"]
+        if after is not None:
+            row += [f"{later[c.name].rmse:.4g}{unit}", f"{later[c.name].normalised:.2f}"]
+        rows.append([*row, c.worst_trial, f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
+    columns = ["channel", "rmse", "error"] + ([] if after is None else ["rmse after", "error after"])
+    table = Table([*columns, "worst trial", "when"], rows, tuple(range(1, len(columns))))
+    shown = [c for c in first if c.normalised > 0][:most]
+    figure = figures.bars(
+        [plain(c.name) for c in shown],
+        [c.normalised for c in shown],
+        "error (standard deviations)",
+        found.noise_floor,
+        None if after is None else [later[c.name].normalised for c in shown],
+    )
+    caption = "Root mean square in the channel's own unit, and in standard deviations."
+    if len(first) > most:
+        caption += f" Bars: the {len(shown)} largest."
+    legend = [] if after is None else [("before", figures.RESIDUAL), ("after", figures.IMPROVED)]
+    return Section("By channel", caption, figure, table, legend=legend)
