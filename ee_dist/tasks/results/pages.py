@@ -22,6 +22,9 @@ from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
 from ee_dist.viewing.report import Page, Section, Table
 
+NAMED = 3
+"""Effects that the first screen names."""
+
 
 def compare_page(
     problem: Problem,
@@ -104,7 +107,10 @@ def improve_page(
     page = _page(problem, measured, "Improve", account, following, links)
     if len(found.ladder) > 1:
         share = max(0.0, min(found.explained, 1.0))
-        page.sure = f"How sure: {share:.0%} of what is above the noise is accounted for, judged on {last.held_out}."
+        page.sure = (
+            f"Added: {_added(problem, found)}. How sure: {share:.0%} of what is above the noise is accounted for, judged on "
+            f"{last.held_out}."
+        )
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name} before"),
         (problem.told(last.error_heldout), "after, held out"),
@@ -136,6 +142,14 @@ def improve_page(
     return page
 
 
+def _added(problem: Problem, found: Improvement) -> str:
+    """The first effects that were added, with their final values, and how many more there are."""
+    names = {t.name for r in found.ladder for t in r.added}
+    new = [told(t, problem.robot) for t in found.terms if t.name in names]
+    more = f"; and {len(new) - NAMED} more" if len(new) > NAMED else ""
+    return "; ".join(new[:NAMED]) + more
+
+
 def _channels(problem: Problem, before: Array, after: Array | None) -> Section:
     later = None if after is None else compare(problem, after)
     return parts.channels_section(problem, compare(problem, before), later)
@@ -149,7 +163,8 @@ def _sure_of(found: Explanation) -> str:
             return f"How sure: {found.tried} explanations were tried, and none gains more than luck."
         return f"How sure: {found.tried} explanations were tried, and none earns its place, although more than noise is left."
     low, high = _above(best)
-    alone = f"{len(best.tied_with)} others do as well" if best.tied_with else "no other does as well"
+    count = len(best.tied_with)
+    alone = f"{count} other{'s do' if count > 1 else ' does'} as well" if count else "no other does as well"
     return (
         f"How sure: on {best.held_out} it takes off {max(0.0, min(best.explained, 1.0)):.0%} of what is above the noise "
         f"(95 % interval {max(low, -9.99):.0%} to {min(high, 1.0):.0%}); of {found.tried} explanations {alone}."
