@@ -22,6 +22,9 @@ from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
 from ee_dist.viewing.report import Page, Section, Table
 
+NAMED = 3
+"""Effects that the first screen names."""
+
 
 def compare_page(
     problem: Problem,
@@ -104,7 +107,10 @@ def improve_page(
     page = _page(problem, measured, "Improve", account, following, links)
     if len(found.ladder) > 1:
         share = max(0.0, min(found.explained, 1.0))
-        page.sure = f"How sure: {share:.0%} of what is above the noise is accounted for, judged on {last.held_out}."
+        page.sure = (
+            f"Added: {_added(problem, found)}. How sure: {share:.0%} of what is above the noise is accounted for, judged on "
+            f"{last.held_out}."
+        )
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name} before"),
         (problem.told(last.error_heldout), "after, held out"),
@@ -134,6 +140,14 @@ def improve_page(
         refused = [c for c in found.last.judged if not c.earned]
         _add(page, parts.ranking_section(problem, refused, "Tried on top of it, and refused"))
     return page
+
+
+def _added(problem: Problem, found: Improvement) -> str:
+    """The first effects that were added, with their final values, and how many more there are."""
+    names = {t.name for r in found.ladder for t in r.added}
+    new = [told(t, problem.robot) for t in found.terms if t.name in names]
+    more = f"; and {len(new) - NAMED} more" if len(new) > NAMED else ""
+    return "; ".join(new[:NAMED]) + more
 
 
 def _channels(problem: Problem, before: Array, after: Array | None) -> Section:
