@@ -168,6 +168,10 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
     """Error of each model from the first to the last, and the noise floor."""
     figure = go.Figure()
     figure.add_scatter(
+        x=[wrapped(n, 18) for n in names], y=list(fit), name="fitted", mode="lines+markers",
+        line={"color": PREDICTED, "dash": "dot"},
+    )  # fmt: skip
+    figure.add_scatter(
         x=[wrapped(n, 18) for n in names],
         y=list(heldout),
         name="held out",
@@ -177,10 +181,6 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
         text=[f"{v:.2f}" for v in heldout],
         textposition="top center",
     )
-    figure.add_scatter(
-        x=[wrapped(n, 18) for n in names], y=list(fit), name="fitted", mode="lines+markers",
-        line={"color": PREDICTED, "dash": "dot"},
-    )  # fmt: skip
     figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
                      annotation_position="bottom left")  # fmt: skip
     _styled(figure, 340)
