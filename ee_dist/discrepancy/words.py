@@ -106,7 +106,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         head = "Nothing is missing: no candidate takes more off the residual than luck, and no channel stands out."
     elif found.verdict == EFFECT and best is not None:
         entry = CATALOGUE[best.terms[0].effect]
-        head = f"Missing{_doubt(found)}: {told_all(best.terms, robot)}."
+        head = f"Missing{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best)}."
         head += " Nothing else is left above the noise." if not found.left else " More than noise is left with it."
         lines.append(entry.physics)
         lines.append(f"What speaks for it: {confidence(best)}. Its mark in a residual: {entry.signature}")
@@ -132,11 +132,17 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
 
 
 def _doubt(found: Explanation) -> str:
-    best = found.best
-    assert best is not None
-    if best.tied_with:
-        return f", or one of {len(best.tied_with)} that look the same here"
     return "" if not found.left else ", as one of several things"
+
+
+def _twins(best: Judged) -> str:
+    """What it may be instead: by name, where there are few."""
+    others = best.tied_with
+    if not others:
+        return ""
+    if len(others) > 2:
+        return f", or one of {len(others)} others that look the same here"
+    return f", or {' or '.join(map(placed, others))}, which look{'s' if len(others) == 1 else ''} the same here"
 
 
 def confidence(best: Judged) -> str:

@@ -163,7 +163,8 @@ def _sure_of(found: Explanation) -> str:
             return f"How sure: {found.tried} explanations were tried, and none gains more than luck."
         return f"How sure: {found.tried} explanations were tried, and none earns its place, although more than noise is left."
     low, high = _above(best)
-    alone = f"{len(best.tied_with)} others do as well" if best.tied_with else "no other does as well"
+    count = len(best.tied_with)
+    alone = f"{count} other{'s do' if count > 1 else ' does'} as well" if count else "no other does as well"
     return (
         f"How sure: on {best.held_out} it takes off {max(0.0, min(best.explained, 1.0)):.0%} of what is above the noise "
         f"(95 % interval {max(low, -9.99):.0%} to {min(high, 1.0):.0%}); of {found.tried} explanations {alone}."
