@@ -105,7 +105,8 @@ class HeadlessBrowser:
         # Every part is opened and comes into sight once, so that whatever can go wrong in drawing it does.
         self.evaluate(
             "(async () => { const open = [...document.querySelectorAll('details:not([open])')];"
-            "const rest = () => new Promise((done) => setTimeout(done, 60));"
+            "const frame = () => new Promise((done) => requestAnimationFrame(done));"
+            "const rest = async () => { await frame(); await frame(); await new Promise((done) => setTimeout(done, 20)); };"
             "open.forEach((part) => { part.open = true; });"
             "for (let y = 0; y < document.body.scrollHeight; y += 500) { scrollTo(0, y); await rest(); }"
             "window.seenOverflow = document.documentElement.scrollWidth - innerWidth;"
