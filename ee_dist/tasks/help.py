@@ -56,6 +56,7 @@ VERBS = {
         ("robot", "engine"),
         ("hidden", "seed", "noise", "plugins"),
     ),
+    "robot": Verb("what a URDF or MJCF leaves out", "task=robot urdf=FILE.urdf", (), ("urdf", "mjcf")),
     "import": Verb(
         "your CSV, Parquet or JSON as a log",
         "task=import measured=FILE.csv",
@@ -74,6 +75,7 @@ VERBS = {
         ("robot", *_RUN),
         (*_MODEL, "effect"),
     ),
+    "export": Verb("a model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),
     "reveal": Verb("open the seal, score what was found", "task=reveal log=TRIAL", (), ("log",)),
     "view": Verb("open a run in rerun", "task=view log=RUN", (), ("log",)),
 }
