@@ -57,11 +57,12 @@ VERBS = {
         ("hidden", "seed", "noise", "plugins"),
     ),
     "import": Verb(
-        "your CSV, Parquet or JSON as a log",
+        "your logs as a recording",
         "task=import measured=FILE.csv",
         ("robot",),
         ("measured",),
     ),
+    "robot": Verb("what a robot's file says and lacks", "task=robot urdf=FILE", (), ("urdf", "mjcf")),
     "compare": Verb(
         "how far a model is off, and where", "task=compare measured=LOG model=MODEL", ("robot", *_RUN), _MODEL
     ),
@@ -74,6 +75,7 @@ VERBS = {
         ("robot", *_RUN),
         (*_MODEL, "effect"),
     ),
+    "export": Verb("the model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),
     "reveal": Verb("open the seal, score what was found", "task=reveal log=TRIAL", (), ("log",)),
     "view": Verb("open a run in rerun", "task=view log=RUN", (), ("log",)),
 }
