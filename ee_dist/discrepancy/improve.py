@@ -35,7 +35,7 @@ EXCHANGES, LOOKED_AT = 2, 2
 MOST = 12
 """Effects that are added at most unless told otherwise."""
 NO_MORE = "no further effect earns its place: {why}"
-NOTHING_LEFT = "nothing is left above the noise"
+NOTHING_LEFT = "nothing is left that counts, above the noise and above the resolution at which channels are compared"
 ASKED = "the effects asked for were added"
 REFITTED = "only the model's own values were to be fitted"
 EXPLAINED, BETTER = "explained", "better_not_explained"

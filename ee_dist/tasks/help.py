@@ -56,13 +56,13 @@ VERBS = {
         ("robot", "engine"),
         ("hidden", "seed", "noise", "plugins"),
     ),
-    "robot": Verb("what a URDF or MJCF leaves out", "task=robot urdf=FILE.urdf", (), ("urdf", "mjcf")),
     "import": Verb(
-        "your CSV, Parquet or JSON as a log",
+        "your logs as a recording",
         "task=import measured=FILE.csv",
         ("robot",),
         ("measured",),
     ),
+    "robot": Verb("what a robot's file says and lacks", "task=robot urdf=FILE", (), ("urdf", "mjcf")),
     "compare": Verb(
         "how far a model is off, and where", "task=compare measured=LOG model=MODEL", ("robot", *_RUN), _MODEL
     ),
@@ -75,7 +75,7 @@ VERBS = {
         ("robot", *_RUN),
         (*_MODEL, "effect"),
     ),
-    "export": Verb("a model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),
+    "export": Verb("the model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),
     "reveal": Verb("open the seal, score what was found", "task=reveal log=TRIAL", (), ("log",)),
     "view": Verb("open a run in rerun", "task=view log=RUN", (), ("log",)),
 }

@@ -16,8 +16,8 @@ LIMIT = 5.0
 VARIES = 1.0
 """By how much of itself what calibration left may vary from one robot to the next, as one standard deviation."""
 EVENT = 170.0
-"""Energy of a few values around a contact that comes a row early or late: a model good to the noise still misses some. For
-robots that walk; one that is bolted down makes none."""
+"""Energy of a few values that come a row early or late, at a contact or a reversal: a model good to the noise still misses
+some. It is granted where the scale of a channel is wider than its noise."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
         bias = b[mine].sum(0)
         mean_floor = np.divide(f[mine] - b[mine], n[mine], out=np.zeros_like(s[mine]), where=n[mine] > 0)
         for c in np.flatnonzero(count):
-            events = EVENT if problem.robot.free_base and floor[c] < 0.3 * count[c] else 0.0
+            events = EVENT if floor[c] < 0.3 * count[c] else 0.0
             quick_z = (energy[c] - floor[c]) / (math.sqrt(2.0 * max(floor[c], 1.0)) + events + VARIES * bias[c])
             windows = float((n[mine][:, c] > 0).sum())
             sd = math.sqrt(2.0) * math.sqrt(max(float((mean_floor[:, c] ** 2).sum()), 1.0)) + events

@@ -160,7 +160,9 @@ class MuJoCoBodies:
             if group.damping is not None and give is not None:
                 # MuJoCo takes damping at the end of the step, and so counts what the torque has of it already once more.
                 _scatter(rows, give, group.dof_of, group.damping)
-                group.torques += group.damping * group.speeds
+                # A robot that has blown up has speeds beyond the numbers; that is said of its log, not here.
+                with np.errstate(invalid="ignore", over="ignore"):
+                    group.torques += group.damping * group.speeds
             if force is not None:
                 group.force[:] = force[rows]
             group.step()
