@@ -130,7 +130,7 @@ def improve(
                 nearest = last.judged[0].why_not if last.judged else LUCK
                 stopped = NO_MORE.format(why=nearest) if leftovers(problem, last.base) else NOTHING_LEFT
                 break
-            fit = fit_one(search, best.model, [best.u], None, WIDTHS[2:])
+            fit = fit_one(search, best.model, [best.u], None, WIDTHS if problem.rugged else WIDTHS[2:])
             current = Current(best.model.parts, fit.u)
             rung = _rung(search, best, [j.name for j in last.tied[1:]])
             rung.alternatives = [(j.proposal, j.own) for j in last.tied[1:] if len(j.proposal.parts) == 1]

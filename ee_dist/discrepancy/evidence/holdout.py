@@ -23,7 +23,7 @@ WINDOWS, MOTIONS, SETTINGS = (
     "motions that were not fitted",
     "settings that were not fitted",
 )
-ONE_BY_ONE = 3
+ONE_BY_ONE = 4
 """Up to so many motions or settings each is held out by itself; more take turns in two groups."""
 SAME_MOTION, SAME_LENGTH = 0.02, 0.9
 """Two trials are one motion where their commands differ by less than this share of how much they vary, over nearly all of it."""
@@ -120,13 +120,19 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
         return one.name == other.name
     motions = []
     for log in (one.log, other.log):
-        seen = log.commands if np.isfinite(log.commands).all() or log.joints is None else log.joints
-        motions.append(np.nan_to_num(seen))
+        seen = log.commands if np.isfinite(log.commands).any() or log.joints is None else log.joints
+        motions.append(np.asarray(seen))
     rows = min(map(len, motions))
     if rows < SAME_LENGTH * max(map(len, motions)):
         return False
-    gap = np.sqrt(np.mean((motions[0][:rows] - motions[1][:rows]) ** 2))
-    return bool(gap <= SAME_MOTION * np.sqrt(np.mean(np.var(motions[0][:rows], axis=0))))
+    # Where the drives were released there is no command: nearly at the same time in repeats, and not to the row.
+    first, second = motions[0][:rows], motions[1][:rows]
+    both, either = (f(np.isfinite(first), np.isfinite(second)) for f in (np.logical_and, np.logical_or))
+    if both.sum() < SAME_LENGTH * either.sum():
+        return False
+    gap = np.sqrt(np.mean((first - second) ** 2, where=both))
+    varies = np.nan_to_num(np.nanvar(first, axis=0)) if both.any() else np.zeros(1)
+    return bool(gap <= SAME_MOTION * np.sqrt(np.mean(varies)))
 
 
 def cross_fit(

@@ -30,11 +30,11 @@ WIDTH = 0.02
 
 
 def effort_of(iterations: int, effort: float = 1.0) -> tuple[int, tuple[int, ...]]:
-    """(generations, seeds) for as many iterations of a fit by slopes: a full fit of four is tried from three seeds.
+    """(generations, seeds) for as many iterations of a fit by slopes: a full fit of four is tried from two seeds.
 
     ``effort`` below 1 shortens the search and tries one seed.
     """
-    seeds = (1, 2, 3) if iterations >= 4 and effort >= 1 else (1,)
+    seeds = (1, 2) if iterations >= 4 and effort >= 1 else (1,)
     return max(1, round(10 * iterations * effort)), seeds
 
 
