@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.table import Table
 from ee_dist.trials.log import Array
@@ -45,7 +46,7 @@ def check_times(times_s: Array, table: Table, column: str) -> Timing:
         first = float(np.median(np.abs(steps)))
         several = "; several trials in one file? add 'split: restarts'" if steps[row - 1] < -10 * first else ""
         raise MeasurementError(
-            f"{table}: row {table.line(row)}, column {column!r}: time {how} "
+            f"{table}: row {table.line(row)}, column {quoted(column)}: time {how} "
             f"({times_s[row - 1]:.9g} s, then {times_s[row]:.9g} s){several}"
         )
     median = float(np.median(steps))

@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.names import listed
 from ee_dist.robots.describe import READERS
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.texts import read_text
@@ -73,8 +74,8 @@ def agreed(model: Robot, recorded: Robot, where: str) -> tuple[Robot, tuple[str,
     ):
         if list(mine) != list(theirs):
             raise RobotError(
-                f"{where}: the {what} of {model.name} are not those of the log: {', '.join(mine)}; the log has "
-                f"{', '.join(theirs)}"
+                f"{where}: the {what} of {model.name} are not those of the log: {listed(mine)}; the log has "
+                f"{listed(theirs)}"
             )
     noise = {s.name: {n: getattr(s, n) for n in OF_THE_MEASUREMENT} for s in recorded.sensors}
     sensors = tuple(replace(s, **noise[s.name]) for s in model.sensors)

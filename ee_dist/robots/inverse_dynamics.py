@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.model import Joint, Robot, RobotError
 
@@ -75,7 +76,7 @@ def regressor(robot: Robot, position: Array, speed: Array, acceleration: Array) 
     column = {d.joint: k for k, d in enumerate(robot.drives)}
     for j in robot.present_joints:
         if j.kind != "fixed" and j.name not in column:
-            raise RobotError(f"{robot.name}: joint {j.name!r} has no drive, so its motion was not measured")
+            raise RobotError(f"{robot.name}: joint {quoted(j.name)} has no drive, so its motion was not measured")
     course = course_of(robot, position, speed, acceleration)
     carrier = {j.child: j for j in course.order}
     out = np.zeros((*acceleration.shape, 10 * len(course.order)))
@@ -159,7 +160,7 @@ def _parents_first(robot: Robot) -> list[Joint]:
         ready = [j for j in waiting if j.parent in placed]
         if not ready:
             raise RobotError(
-                f"{robot.name}: joint {waiting[0].name!r} hangs on {waiting[0].parent!r}, which no joint carries"
+                f"{robot.name}: joint {quoted(waiting[0].name)} hangs on {quoted(waiting[0].parent)}, which no joint carries"
             )
         order += ready
         placed |= {j.child for j in ready}

@@ -16,6 +16,9 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
+from ee_dist.basics.names import listed
+from ee_dist.basics.quoted import quoted
+
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
 """Unit quaternion, scalar last (x, y, z, w)."""
@@ -329,8 +332,8 @@ def _find(items: tuple[Any, ...], key: str, value: str, what: str) -> Any:
     for item in items:
         if getattr(item, key) == value:
             return item
-    names = ", ".join(getattr(item, key) for item in items)
-    raise RobotError(f"no {what} named {value!r}; there are: {names}")
+    names = listed(getattr(item, key) for item in items)
+    raise RobotError(f"no {what} named {quoted(value)}; there are: {names}")
 
 
 def _changed(items: tuple[Any, ...], key: str, value: str, what: str, changes: dict[str, Any]) -> tuple[Any, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 import yaml
 
 from ee_dist.basics.names import nearest
+from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, from_entries
 from ee_dist.effects.catalogue import Hypothesis, apply
@@ -121,7 +122,8 @@ def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
     for k, sensor in zip(order, robot.sensors, strict=True):
         if log.sensor_units[k] != sensor.unit:
             raise LogError(
-                f"{where}: {sensor.name} is in {log.sensor_units[k]!r}, the model has it in {sensor.unit!r}; convert it"
+                f"{where}: {sensor.name} is in {quoted(log.sensor_units[k])}, the model has it "
+                f"in {quoted(sensor.unit)}; convert it"
             )
         bad = ~np.isfinite(log.sensors[:, k])
         if bad.any():
@@ -152,7 +154,7 @@ def _names(where: str, what: str, have: Sequence[str], want: Sequence[str]) -> N
     if missing:
         near = nearest(missing[0], have, cutoff=0.5)
         hint = f"; is it {' or '.join(near)}?" if near else f"; the log has: {', '.join(have[:8])}"
-        raise LogError(f"{where}: no {what} {missing[0]!r}{hint}")
+        raise LogError(f"{where}: no {what} {quoted(missing[0])}{hint}")
 
 
 def _same_robot(file: Path, run: RunRecord, robot: Robot) -> None:
