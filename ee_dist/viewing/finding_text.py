@@ -22,20 +22,11 @@ def plain(name: str) -> str:
 
 
 def headline(found: Finding) -> list[str]:
-    """Verdict, error and floor, and what to do next."""
-    floor = "" if found.floor is None else f"; noise alone would leave {found.floor:.3g}"
-    return [
-        f"### {found.title}",
-        "",
-        f"**{found.verdict}**",
-        "",
-        f"Error {found.error:.3g} {found.error_unit}{floor}.",
-        "",
-    ]
-
-
-def ending(found: Finding) -> list[str]:
-    return ["", f"Next: `{found.next_command}`"] if found.next_command else []
+    """Verdict, how large the error is and how sure all of it, and what to do next."""
+    lines = [f"### {found.title}", "", f"**{found.verdict}**", ""]
+    for line in found.lines:
+        lines += [line, ""]
+    return [*lines, f"Next: `{found.next_command}`", ""] if found.next_command else lines
 
 
 def colours(found: Finding) -> list[str]:

@@ -13,8 +13,9 @@ from plotly.subplots import make_subplots
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
 
-MEASURED, PREDICTED, IMPROVED, RESIDUAL = "#4a90d9", "#e08a00", "#2e9e62", "#cf4b3c"
-FLOOR = "#a678e2"
+MEASURED, PREDICTED, IMPROVED = "#4a90d9", "#e08a00", "#2e9e62"
+"""What was measured, what the model says, and the improved one: the same in every figure."""
+FLOOR, MARK = "#a678e2", "#d0409a"
 DOTS = 700
 """Points of a cloud that are drawn; its mean is of all."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
@@ -22,7 +23,7 @@ _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size":
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Residuals (n,) over something (n,), before and perhaps after."""
+    """Residuals (n,) over something (n,), of the model and perhaps of the improved one."""
 
     label: str
     x: Array
@@ -76,13 +77,17 @@ def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> 
 
 
 def heat_map(
-    tables: Sequence[Array], segments: Sequence[str], channels: Sequence[str], floor: float = 1.0
+    tables: Sequence[Array],
+    segments: Sequence[str],
+    channels: Sequence[str],
+    floor: float = 1.0,
+    titles: Sequence[str] = ("model", "improved model"),
 ) -> go.Figure:
-    """(segments, channels) root mean squares, one table or before and after; white is the noise."""
+    """(segments, channels) root mean squares, one table or two below each other; white is the noise."""
     shown = [k for k in range(tables[0].shape[1]) if any(t[:, k].any() for t in tables)]
     top = max(4.0, float(np.quantile(tables[0][:, shown], 0.98)))
-    titles = ["before", "after"] if len(tables) > 1 else None
-    figure = make_subplots(rows=len(tables), cols=1, shared_xaxes=True, subplot_titles=titles, vertical_spacing=0.06)
+    named = list(titles) if len(tables) > 1 else None
+    figure = make_subplots(rows=len(tables), cols=1, shared_xaxes=True, subplot_titles=named, vertical_spacing=0.06)
     for row, table in enumerate(tables, start=1):
         figure.add_trace(
             go.Heatmap(
@@ -191,22 +196,25 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
 
 
 def cloud(title: str, part: Cloud) -> go.Figure:
-    """One channel's residuals against one thing, with the mean over each stretch of its range, before and after."""
+    """One channel's residuals against one thing, with their means over each stretch of its range; dashed, the mark that the
+    effect promises: what the improved model predicts there less what the model does, whatever was measured."""
     figure = go.Figure()
-    series = [("before", part.before, RESIDUAL)] + ([] if part.after is None else [("after", part.after, IMPROVED)])
+    series = [(part.before, PREDICTED)] + ([] if part.after is None else [(part.after, IMPROVED)])
     thin = slice(None, None, max(1, len(part.x) // DOTS))
-    for name, y, colour in series:
+    for y, colour in series:
         marker = {"color": colour, "size": 4, "opacity": 0.22}
-        figure.add_scatter(x=_short(part.x[thin]), y=_short(y[thin]), mode="markers", marker=marker, name=name)
-    for name, y, colour in series:
+        figure.add_scatter(x=_short(part.x[thin]), y=_short(y[thin]), mode="markers", marker=marker, hoverinfo="x+y")
+    lines = [(y, {"color": colour, "width": 4}) for y, colour in series]
+    if part.after is not None:
+        lines.append((part.before - part.after, {"color": MARK, "width": 2.5, "dash": "5px,3px"}))
+    for y, line in lines:
         at, mean = _trend(part.x, y)
-        line = {"color": colour, "width": 3.5}
-        figure.add_scatter(x=at, y=mean, mode="lines", line=line, name=f"mean {name}", hoverinfo="skip")
+        figure.add_scatter(x=_short(at), y=_short(mean), mode="lines", line=line, hoverinfo="skip")
     figure.add_hline(y=0, line={"color": "#8899aa", "width": 1})
     _styled(figure, 250)
     left, right = _most(part.x)
     figure.update_xaxes(title_text=part.label, title_standoff=4, range=[left, right])
-    figure.update_yaxes(range=_most(np.concatenate([y for _, y, _ in series])), automargin=True)
+    figure.update_yaxes(range=_most(np.concatenate([y for y, _ in series])), automargin=True)
     figure.update_layout(
         title={"text": title, "font": {"size": 12}, "x": 0.02, "y": 0.97},
         showlegend=False,
@@ -245,13 +253,11 @@ def bars(
     names: Sequence[str], values: Sequence[float], label: str, floor: float | None = None,
     after: Sequence[float] | None = None,
 ) -> go.Figure:  # fmt: skip
-    """Horizontal bars, before and perhaps after, and a line where noise alone would end them."""
+    """Horizontal bars, of the model and perhaps the improved one, and a line where noise alone would end them."""
     places = [wrapped(n, 26) for n in names]
-    figure = go.Figure(
-        go.Bar(x=list(values), y=places, orientation="h", marker_color=RESIDUAL if after else MEASURED, name="before")
-    )
+    figure = go.Figure(go.Bar(x=list(values), y=places, orientation="h", marker_color=PREDICTED, name="model"))
     if after is not None:
-        figure.add_bar(x=list(after), y=places, orientation="h", marker_color=IMPROVED, name="after")
+        figure.add_bar(x=list(after), y=places, orientation="h", marker_color=IMPROVED, name="improved model")
     if floor is not None:
         figure.add_vline(x=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
                          annotation_position="top")  # fmt: skip

@@ -21,7 +21,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     table = Table(["effect", NASTY], [[NASTY, "1"], ["b", "2"]], numeric=(1,), lead=(0,))
     sections = [Section(NASTY, NASTY, figure, table), Section("Only words", "nothing to see")]
     whole = Page(
-        NASTY, NASTY, NASTY, [NASTY, "second"], "good", NASTY, NASTY, sections[0], [(NASTY, "tile")], sections,
+        NASTY, NASTY, NASTY, [NASTY, "second"], "good", [NASTY], NASTY, sections[0], [(NASTY, "tile")], sections,
         [(NASTY, "../other/report.html")], [(NASTY, NASTY)], NASTY,
     )  # fmt: skip
     return write_page(whole, tmp_path_factory.mktemp("page") / "report.html")

@@ -45,7 +45,7 @@ def full_page() -> Page:
         f"Missing: {LONG}. Nothing else is left above the noise.",
         ["first", "second"],
         "good",
-        "How sure: 93 %",
+        ["Error: model 1.12", "How sure: 93 %"],
         "python -m ee_dist task=improve measured='logs/with a space/and/a/very/long/name/trial.mcap' effect=auto",
         Section("Where", "what", figures.proof(curves[1], ["model", "improved"], (1.0, 2.0))),
         [("1.12", "error"), ("position knee front right", "worst channel"), ("0.8", "noise floor")],
