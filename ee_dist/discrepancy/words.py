@@ -22,9 +22,12 @@ NAMED = 3
 """Effects that a headline names."""
 CLOSE = 1.1
 """Times the noise floor up to which a model is nearly right."""
+GRANTED = "What is above the floor is no more than chance, and what contacts and reversals leave that come a row early or late."
 NOTHING_ELSE = "Nothing else is left above the noise."
-CONTENT = "Nothing has to be done: the model explains these measurements. Other motions may show what these do not."
-STUCK = "Try other motions, or write the effect that is missing: docs/own_effect.md."
+CONTENT = (
+    "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
+)
+STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
 
 @dataclass(frozen=True)
@@ -125,15 +128,17 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
         place = left[0].channel if left and ratio < CLOSE else found.channels[0].name if found.channels else ""
         where = f", most of all at {plain(place)}" if place else ""
         how = "The model is nearly right, and more than noise is left" if ratio < CLOSE else "The model is off"
-        head = f"{how}{where}: {problem.natural_name} {off}, {_times(ratio)} what noise alone would leave."
+        least = problem.natural(found.noise_floor)
+        times = _times(problem.natural(found.error) / least) if least else "far more than"
+        head = f"{how}{where}: {problem.natural_name} {off}, {times} what noise alone would leave."
     floor = problem.told(found.noise_floor)
-    error = f"{_capital(problem.natural_name)}: model {off}, noise floor {floor}."
-    channels = len({(g.trial, g.channel) for g in left})
-    of = f"{len(found.channels)} channel{'s' if len(found.channels) > 1 else ''} in {_count(len(problem.trials), 'trial')}"
+    error = f"{_error(problem)}: model {off}, noise floor {floor}."
+    places = _count(len(found.channels) * len(problem.trials), "curve")
+    of = f"{places} ({_count(len(found.channels), 'channel')} in {_count(len(problem.trials), 'trial')})"
     sure = (
-        f"How sure: more than noise stands out in {channels} places, of {of}"
+        f"How sure: more than noise stands out in {_places(left)} of {of}"
         if left
-        else f"How sure: of {of} none stands out"
+        else f"How sure: none of {of} stands out"
     )
     sure += f"; the noise floor is {found.floor_source}."
     settled = ratio < CLOSE and not left
@@ -161,7 +166,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     """The verdict, what it is, what speaks for it, what stays open, what to do next."""
     robot, best = problem.robot, found.best
     lines = [f"Noise floor: {found.floor_source}. {_count(found.tried, 'explanation')} {_were(found.tried)} tried."]
-    error = f"{_capital(problem.natural_name)}: model {problem.told(found.baseline_error)}"
+    error = f"{_error(problem)}: model {problem.told(found.baseline_error)}"
     error += f", noise floor {problem.told(found.noise_floor)}."
     last, advice = found.baseline_error, ""
     if found.refitted_error != found.baseline_error:
@@ -169,6 +174,8 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         last = found.refitted_error
     if found.verdict == NOTHING_MISSING:
         head = "Nothing is missing: no candidate takes more off the residual than luck, and no channel stands out."
+        if found.baseline_error > 1.03 * found.noise_floor:
+            lines.append(GRANTED)
         sure = (
             f"How sure: {_count(found.tried, 'explanation')} {_were(found.tried)} tried, and none gains more than luck."
         )
@@ -210,6 +217,12 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     return Account(head, error, sure, tuple(lines), good, advice)
 
 
+def _error(problem: Problem) -> str:
+    """Its name; with its unit, where that is not told behind each number."""
+    unit = f" ({problem.natural_unit})" if problem.natural_unit == "standard deviations" else ""
+    return _capital(problem.natural_name) + unit
+
+
 def _were(count: int) -> str:
     return "was" if count == 1 else "were"
 
@@ -217,7 +230,7 @@ def _were(count: int) -> str:
 def _errors(problem: Problem, before: float, after: float, floor: float, held_out: str) -> str:
     """The model, the improved one and noise in one line."""
     return (
-        f"{_capital(problem.natural_name)}: model {problem.told(before)}, improved model {problem.told(after)} held out "
+        f"{_error(problem)}: model {problem.told(before)}, improved model {problem.told(after)} held out "
         f"({held_out}), noise floor {problem.told(floor)}."
     )
 
@@ -276,7 +289,7 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
     share = f"{percent(max(0.0, min(found.explained, 1.0)))} of what is above the noise is accounted for"
     if len(found.ladder) == 1:
         head = f"Nothing was added: {found.stopped}."
-        error = f"{_capital(problem.natural_name)}: model {problem.told(last.error_heldout)}, noise floor "
+        error = f"{_error(problem)}: model {problem.told(last.error_heldout)}, noise floor "
         error += f"{problem.told(found.noise_floor)}."
         tried = found.last.tried if found.last else 0
         sure = f"How sure: {_count(tried, 'explanation')} {_were(tried)} tried, and none earns its place."
@@ -340,5 +353,9 @@ def tie_text(what: str, others: Sequence[str]) -> str:
 
 def left_text(left: Sequence[Leftover], after: bool) -> str:
     head = "Even with it, more than noise is left in" if after else "It sits in"
-    count = len({(g.trial, g.channel) for g in left})
-    return f"{head} {count} channel{'s' if count > 1 else ''}; worst: {'; '.join(map(str, left[:3]))}."
+    return f"{head} {_count(_places(left), 'curve')}; worst: {'; '.join(map(str, left[:3]))}."
+
+
+def _places(left: Sequence[Leftover]) -> int:
+    """Channels of trials: one may stand out for two reasons."""
+    return len({(g.trial, g.channel) for g in left})

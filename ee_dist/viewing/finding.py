@@ -68,7 +68,8 @@ class Rung:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """One result. ``verdict`` is a sentence; ``lines`` say below it how large the error is and how sure all of it.
+    """One result. ``verdict`` is a sentence; ``lines`` say below it how large the error is and how sure all of it; errors and
+    ``floor`` are in ``unit``.
 
     ``model`` is the model as it was given, ``better`` that with what was found (improve, or the best candidate).
     """
@@ -80,6 +81,7 @@ class Finding:
     model: Account
     lines: tuple[str, ...] = ()
     floor: float | None = None
+    unit: str = "standard deviations"
     channels: tuple[ChannelError, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     ladder: tuple[Rung, ...] = ()

@@ -82,12 +82,16 @@ def heat_map(
     channels: Sequence[str],
     floor: float = 1.0,
     titles: Sequence[str] = ("model", "improved model"),
+    label: str = "error (standard deviations)",
 ) -> go.Figure:
-    """(segments, channels) root mean squares, one table or two below each other; white is the noise."""
+    """(segments, channels) errors, one table or two below each other; what ``floor`` noise leaves is near the background."""
     shown = [k for k in range(tables[0].shape[1]) if any(t[:, k].any() for t in tables)]
-    top = max(4.0, float(np.quantile(tables[0][:, shown], 0.98)))
+    top = max(4.0 * floor, float(np.quantile(tables[0][:, shown], 0.98)))
     named = list(titles) if len(tables) > 1 else None
-    figure = make_subplots(rows=len(tables), cols=1, shared_xaxes=True, subplot_titles=named, vertical_spacing=0.06)
+    # Room for a title between two tables, however few rows they have.
+    tall = 17 * max(len(shown), 3)
+    gap = 30 / (30 + 2 * tall) if len(tables) > 1 else 0.0
+    figure = make_subplots(rows=len(tables), cols=1, shared_xaxes=True, subplot_titles=named, vertical_spacing=gap)
     for row, table in enumerate(tables, start=1):
         figure.add_trace(
             go.Heatmap(
@@ -95,21 +99,21 @@ def heat_map(
                 x=list(segments),
                 y=[channels[k].replace("_", " ") for k in shown],
                 coloraxis="coloraxis",
-                hovertemplate="%{y}<br>%{x}<br>%{z:.2f} standard deviations<extra></extra>",
+                hovertemplate="%{y}<br>%{x}<br>%{z:.3g}<extra></extra>",
             ),
             row=row,
             col=1,
         )
-    _styled(figure, 170 + (20 + 17 * len(shown)) * len(tables))
+    _styled(figure, 190 + (30 + tall) * len(tables))
     pale = min(1.3 * floor / top, 0.9)
     light = [[0, "#f7fbff"], [pale, "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]]
     dark = [[0, "#1d252e"], [pale, "#2a3542"], [0.95, "#e0564c"], [1, "#ff8a7a"]]
-    bar = {"title": {"text": "standard deviations", "side": "top"}, "thickness": 10, "orientation": "h", "y": 1.0,
-           "yanchor": "bottom", "len": 0.45, "x": 1.0, "xanchor": "right"}  # fmt: skip
+    bar = {"title": {"text": label, "side": "top"}, "thickness": 10, "orientation": "h", "y": 1.0,
+           "yanchor": "bottom", "ypad": 24, "len": 0.45, "x": 1.0, "xanchor": "right"}  # fmt: skip
     figure.update_layout(
         coloraxis={"cmin": 0.0, "cmax": top, "colorscale": light, "colorbar": bar},
         hovermode="closest",
-        margin={"l": 20, "r": 16, "t": 70, "b": 30},
+        margin={"l": 20, "r": 16, "t": 90, "b": 30},
         meta={
             "light": {"coloraxis.colorscale": light},
             "dark": {"coloraxis.colorscale": dark},
@@ -169,7 +173,13 @@ def ranking(
     return figure
 
 
-def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float], floor: float) -> go.Figure:
+def ladder(
+    names: Sequence[str],
+    fit: Sequence[float],
+    heldout: Sequence[float],
+    floor: float,
+    label: str = "error (standard deviations)",
+) -> go.Figure:
     """Error of each model from the first to the last, and the noise floor."""
     figure = go.Figure()
     figure.add_scatter(
@@ -183,15 +193,15 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
         mode="lines+markers+text",
         line={"color": MEASURED, "width": 3},
         marker={"size": 10},
-        text=[f"{v:.2f}" for v in heldout],
+        text=[f"{v:.3g}" for v in heldout],
         textposition="top center",
     )
-    figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
+    figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
                      annotation_position="bottom left")  # fmt: skip
     _styled(figure, 340)
     figure.update_xaxes(range=[-0.4, len(names) - 0.6], automargin=True)
     figure.update_layout(yaxis_range=[0, 1.25 * max(max(heldout), floor)])
-    figure.update_yaxes(title_text="error (standard deviations)", rangemode="tozero")
+    figure.update_yaxes(title_text=label, rangemode="tozero")
     return figure
 
 
@@ -259,7 +269,7 @@ def bars(
     if after is not None:
         figure.add_bar(x=list(after), y=places, orientation="h", marker_color=IMPROVED, name="improved model")
     if floor is not None:
-        figure.add_vline(x=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
+        figure.add_vline(x=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
                          annotation_position="top")  # fmt: skip
     _styled(figure, 110 + (24 if after is None else 34) * len(names))
     figure.update_xaxes(title_text=label, rangemode="tozero")

@@ -27,7 +27,7 @@ def headline(tied: list[str]) -> str:
         floor_source="told",
         tried=9,
     )
-    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error")
+    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="")
     return explain_account(problem, found, None).headline  # type: ignore[arg-type]
 
 

@@ -12,7 +12,7 @@ from ee_dist.discrepancy.words import Account, added, named, plain, told
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
 from ee_dist.tasks.results.glossary import TERMS
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, step_name
 from ee_dist.tasks.results.story import Link
 from ee_dist.tasks.results.tables import command
 from ee_dist.trials.log import Array
@@ -67,7 +67,7 @@ def explain_page(
     page = _page(problem, measured, "Explain", account, following, links)
     page.tiles = [
         (problem.told(found.baseline_error), f"{problem.natural_name}, {MODEL}"),
-        (problem.told(best.error_heldout) if best else "-", f"{IMPROVED}, held out"),
+        *([(problem.told(best.error_heldout), f"{IMPROVED}, held out")] if best else []),
         (problem.told(found.noise_floor), "noise floor"),
         (str(found.tried), "explanations tried"),
     ]
@@ -96,7 +96,7 @@ def improve_page(
     page = _page(problem, measured, "Improve", account, following, links)
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name}, {MODEL}"),
-        (problem.told(last.error_heldout), f"{IMPROVED}, held out"),
+        *([(problem.told(last.error_heldout), f"{IMPROVED}, held out")] if len(found.ladder) > 1 else []),
         (problem.told(found.noise_floor), "noise floor"),
         (str(len(found.terms)), "effects in the model"),
     ]
@@ -108,7 +108,11 @@ def improve_page(
     if changed:
         steps = [f"{k}. {step_name(r)}" if k else step_name(r) for k, r in enumerate(found.ladder)]
         figure = figures.ladder(
-            steps, [r.error_fit for r in found.ladder], [r.error_heldout for r in found.ladder], found.noise_floor
+            steps,
+            [drawn(problem, r.error_fit) for r in found.ladder],
+            [drawn(problem, r.error_heldout) for r in found.ladder],
+            drawn(problem, found.noise_floor),
+            axis_of(problem),
         )
         caption = f"Error of each model on {last.held_out}. Everything is fitted anew at each step."
         page.sections.append(Section("The ladder", caption, figure))

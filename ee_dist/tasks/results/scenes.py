@@ -15,7 +15,8 @@ from ee_dist.discrepancy.improve import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
 from ee_dist.discrepancy.words import Account, above, told_all
 from ee_dist.effects.catalogue import Hypothesis, apply
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, unit_of
+from ee_dist.tasks.results.labels import drawn as in_unit
 from ee_dist.tasks.results.tables import TIED_STANDING, command, standing
 from ee_dist.trials.log import SensorLog
 from ee_dist.viewing import finding as drawn
@@ -48,7 +49,9 @@ def improve_scene(
 ) -> None:
     """Before, after, and the ladder between them."""
     finding = _finding(problem, compare(problem, found.base), account, model, following)
-    ladder = tuple(drawn.Rung(step_name(r), r.error_heldout, r.error_fit) for r in found.ladder)
+    ladder = tuple(
+        drawn.Rung(step_name(r), in_unit(problem, r.error_heldout), in_unit(problem, r.error_fit)) for r in found.ladder
+    )
     better = said(problem, IMPROVED, found.terms)
     write_improve_rrd(replace(finding, ladder=ladder, better=better), path)
 
@@ -97,7 +100,13 @@ def _finding(
     of_trial = dict(zip(problem.trials, names, strict=False))
     channels = tuple(
         drawn.ChannelError(
-            c.name, c.unit, c.normalised, c.rmse, of_trial.get(c.worst_trial, ""), c.worst_from_s, c.worst_to_s
+            c.name,
+            c.unit,
+            in_unit(problem, c.normalised),
+            c.rmse,
+            of_trial.get(c.worst_trial, ""),
+            c.worst_from_s,
+            c.worst_to_s,
         )
         for c in where.channels
     )
@@ -121,7 +130,8 @@ def _finding(
         tuple(cases),
         mine,
         tuple(account.first),
-        where.noise_floor,
+        in_unit(problem, where.noise_floor),
+        unit_of(problem),
         channels,
         next_command=command(following) if following else "",
     )

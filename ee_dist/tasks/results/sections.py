@@ -12,7 +12,7 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import above, percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
-from ee_dist.tasks.results.labels import IMPROVED, MODEL
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn
 from ee_dist.tasks.results.tables import standing
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
@@ -86,8 +86,9 @@ def proof_section(
     pad = max(PAD_S, 1.5 * (end - begin))
     rows = np.flatnonzero((curve.times_s >= begin - pad) & (curve.times_s <= end + pad))
     shown = thinned(rows_of(curve, rows) if len(rows) > 1 else curve, POINTS)
-    what = "the model is most wrong" if after is None else "what was found takes off most"
-    heading = f"Where it shows most: {curve.channel}, {trial}, {begin:.1f} to {end:.1f} s"
+    what = "the error is largest" if after is None else "what was found takes off most"
+    shows = "Where the error is largest" if after is None else "Where it shows most"
+    heading = f"{shows}: {curve.channel}, {trial}, {begin:.1f} to {end:.1f} s"
     caption = f"Measured and predicted where {what} (shaded); below, what was measured less what was predicted."
     return Section(heading, caption, figures.proof(shown, [n for n, _ in models], (begin, end)))
 
@@ -110,12 +111,11 @@ def heat_section(problem: Problem, residual: Array, after: Array | None = None) 
         "Each cell is the error of one channel in one window of time. What is near the background is noise, red is what the "
         "model gets wrong."
     )
-    tables = [heat(problem, residual)] + ([] if after is None else [heat(problem, after)])
-    return Section(
-        "Where it fails, channel by time",
-        caption,
-        figures.heat_map(tables, unique, problem.channels, titles=(MODEL, IMPROVED)),
+    tables = [drawn(problem, heat(problem, r)) for r in (residual, after) if r is not None]
+    figure = figures.heat_map(
+        tables, unique, problem.channels, drawn(problem, 1.0), (MODEL, IMPROVED), axis_of(problem)
     )
+    return Section("Where it fails, channel by time", caption, figure)
 
 
 def signature_section(
@@ -211,18 +211,18 @@ def trials_section(problem: Problem, found: Comparison) -> Section:
     rows = [[t, problem.told(e)] for t, e in zip(problem.trials, found.trial_errors, strict=True)]
     figure = figures.bars(
         [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)],
-        found.trial_errors,
-        "error (standard deviations)",
-        found.noise_floor,
+        [drawn(problem, e) for e in found.trial_errors],
+        axis_of(problem),
+        drawn(problem, found.noise_floor),
     )
     return Section("By trial", "", figure, Table(["trial", problem.natural_name], rows, (1,)))
 
 
 def regimes_section(problem: Problem, found: Comparison) -> Section:
     regimes = sorted(found.regimes, key=lambda r: -r.error)
-    rows = [[r.name, f"{r.error:.2f}", percent(r.share), percent(r.values)] for r in regimes]
-    label = "error (standard deviations)"
-    figure = figures.bars([r.name for r in regimes], [r.error for r in regimes], label, found.noise_floor)
+    rows = [[r.name, problem.told(r.error), percent(r.share), percent(r.values)] for r in regimes]
+    errors = [drawn(problem, r.error) for r in regimes]
+    figure = figures.bars([r.name for r in regimes], errors, axis_of(problem), drawn(problem, found.noise_floor))
     table = Table(["regime", "error", "share of the excess", "share of the data"], rows, (1, 2, 3))
     return Section("By regime", "Joint channels, sorted by what their joint was doing at the time.", figure, table)
 
@@ -233,21 +233,21 @@ def channels_section(problem: Problem, found: Comparison, after: Comparison | No
     rows, first = [], [c for c in found.channels if not later or c.name in later]
     for c in first:
         unit = "" if c.unit == "1" else f" {c.unit}"
-        row = [plain(c.name), f"{c.rmse:.4g}{unit}", f"{c.normalised:.2f}"]
+        row = [plain(c.name), f"{c.rmse:.4g}{unit}", problem.told(c.normalised)]
         if after is not None:
-            row += [f"{later[c.name].rmse:.4g}{unit}", f"{later[c.name].normalised:.2f}"]
+            row += [f"{later[c.name].rmse:.4g}{unit}", problem.told(later[c.name].normalised)]
         rows.append([*row, c.worst_trial, f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
     columns = ["channel", "rmse", "error"] + ([] if after is None else [f"rmse, {IMPROVED}", f"error, {IMPROVED}"])
     table = Table([*columns, "worst trial", "when"], rows, tuple(range(1, len(columns))))
     shown = [c for c in first if c.normalised > 0][:most]
     figure = figures.bars(
         [plain(c.name) for c in shown],
-        [c.normalised for c in shown],
-        "error (standard deviations)",
-        found.noise_floor,
-        None if after is None else [later[c.name].normalised for c in shown],
+        [drawn(problem, c.normalised) for c in shown],
+        axis_of(problem),
+        drawn(problem, found.noise_floor),
+        None if after is None else [drawn(problem, later[c.name].normalised) for c in shown],
     )
-    caption = "Root mean square in the channel's own unit, and in standard deviations."
+    caption = f"Root mean square in the channel's own unit, and {axis_of(problem)}."
     if len(first) > most:
         caption += f" Bars: the {len(shown)} largest."
     legend = [] if after is None else [(MODEL, figures.PREDICTED), (IMPROVED, figures.IMPROVED)]

@@ -34,13 +34,13 @@ def _table(title: str, columns: Sequence[Column], rows: Sequence[Sequence[str]])
 
 def show_comparison(console: Console, problem: Problem, found: Comparison) -> None:
     rows = [
-        (plain(c.name), f"{c.rmse:.3g} {c.unit}", f"{c.normalised:.2f}",
+        (plain(c.name), f"{c.rmse:.3g} {c.unit}", problem.told(c.normalised),
          f"{c.worst_trial}, {c.worst_from_s:.1f} to {c.worst_to_s:.1f} s") for c in found.channels[:8]
     ]  # fmt: skip
     columns = (("channel", False), ("rmse", True), ("error", True), ("worst", False))
     console.print(_table("Where it fails: channels", columns, rows))
     ordered = sorted(found.regimes, key=lambda r: -r.error)
-    rows2 = [(r.name, f"{r.error:.2f}", percent(r.share), percent(r.values)) for r in ordered]
+    rows2 = [(r.name, problem.told(r.error), percent(r.share), percent(r.values)) for r in ordered]
     columns = (("regime", False), ("error", True), ("share of excess", True), ("of data", True))
     console.print(_table("Where it fails: regimes", columns, rows2))
 
