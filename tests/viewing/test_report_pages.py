@@ -131,6 +131,19 @@ def test_a_button_turns_the_light_off_and_on(window: HeadlessBrowser, page: Path
     assert [window.evaluate(click) for _ in range(2)] == ["dark", "light"]
 
 
+def test_the_mark_of_an_effect_is_what_the_models_differ_by() -> None:
+    x = np.linspace(-1, 1, 2000)
+    law, noise = 0.3 * np.sign(x), np.random.default_rng(0).normal(0, 0.02, len(x))
+    figure = figures.cloud("torque", figures.Cloud("speed", x, law + noise, noise))
+    (mark,) = [t for t in figure.data if t.mode == "lines" and t.line.color == figures.MARK]
+    (model,) = [t for t in figure.data if t.mode == "lines" and t.line.color == figures.PREDICTED]
+    assert mark.line.dash and len(mark.x) > 15
+    at = np.array(mark.x)
+    away = np.abs(at) > 0.1
+    np.testing.assert_allclose(np.array(mark.y)[away], 0.3 * np.sign(at[away]), atol=1e-9)
+    np.testing.assert_allclose(np.array(model.y), np.array(mark.y), atol=0.02)  # it lies on what was measured
+
+
 def test_no_peak_is_lost_when_curves_are_thinned() -> None:
     long = curve(1, 100_000)
     long.measured[31_234] = 50.0
