@@ -116,7 +116,7 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     ratio = found.error / found.noise_floor if found.noise_floor else float("inf")
     off = problem.told(found.error)
     lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}."]
-    lines += _below(found.error, found.noise_floor)
+    lines += _beside(found.error, found.noise_floor, bool(left))
     parted = [f"{t} at {s:.2f} s" for t, s in found.parted_s.items() if s is not None]
     lines.append("Prediction and measurement part: " + ("; ".join(parted) or "nowhere") + ".")
     if left:
@@ -153,13 +153,13 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-def _below(error: float, floor: float) -> list[str]:
-    """An error that is less than noise would leave needs a word."""
-    if error >= floor:
-        return []
-    if error > 0.97 * floor:
+def _beside(error: float, floor: float, left: bool) -> list[str]:
+    """An error that is less than noise would leave needs a word, and one that is more although nothing is ``left``."""
+    if error < 0.97 * floor:
+        return ["The error is below the floor: the noise was estimated too high, and the floor is an upper bound."]
+    if error < floor:
         return ["The error is at the floor, within chance."]
-    return ["The error is below the floor: the noise was estimated too high, and the floor is an upper bound."]
+    return [GRANTED] if error > 1.03 * floor and not left else []
 
 
 def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None) -> Account:
@@ -174,8 +174,6 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         last = found.refitted_error
     if found.verdict == NOTHING_MISSING:
         head = "Nothing is missing: no candidate takes more off the residual than luck, and no channel stands out."
-        if found.baseline_error > 1.03 * found.noise_floor:
-            lines.append(GRANTED)
         sure = (
             f"How sure: {_count(found.tried, 'explanation')} {_were(found.tried)} tried, and none gains more than luck."
         )
@@ -202,7 +200,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         lines += [
             f"Nearest, but not good enough: {told_all(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]
         ]
-    lines += _below(last, found.noise_floor)
+    lines += _beside(last, found.noise_floor, bool(found.left))
     if found.left:
         lines.append(left_text(found.left, found.verdict == EFFECT))
     if ahead is not None and ahead.separation < ENOUGH:
@@ -282,7 +280,7 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
     lines.append("The model: " + ("; ".join(told(t, robot) for t in found.terms) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
-    lines += _below(last.error_heldout, found.noise_floor)
+    lines += _beside(last.error_heldout, found.noise_floor, bool(found.left))
     if found.left:
         lines.append(left_text(found.left, bool(steps)))
     error = _errors(problem, first.error_heldout, last.error_heldout, found.noise_floor, last.held_out)
@@ -316,19 +314,19 @@ def _listed(names: Sequence[str]) -> str:
 
 def _ranges(found: Improvement, new: Sequence[Term], robot: Robot) -> str:
     """The 95 % intervals of the values that a headline names."""
-    told_of = {t.name for t in new[:NAMED]}
-    several = len(told_of) > 1
-    out = []
+    told_of: dict[str, list[str]] = {t.name: [] for t in new[:NAMED]}
     for p in found.parameters:
         term = found.terms[p.term]
-        if term.name not in told_of:
-            continue
-        what = (f"{named(term)}: " if several else "") + _quantity(term, p.name, robot)
-        if p.flag or not np.isfinite(p.high - p.low):
-            out.append(f"{what} {p.flag or 'not determined'}")
-        else:
-            out.append(f"{what} {p.low:.3g} to {p.high:.3g}{_unit(term, p.name, robot)}")
-    return f"; 95 % intervals: {', '.join(out)}" if out else ""
+        if term.name in told_of:
+            range_ = f"{p.low:.3g} to {p.high:.3g}{_unit(term, p.name, robot)}"
+            sure = not p.flag and np.isfinite(p.high - p.low)
+            told_of[term.name].append(f"{_quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}")
+    out = [
+        (f"{placed(name)}: " if len(told_of) > 1 else "") + ", ".join(values)
+        for name, values in told_of.items()
+        if values
+    ]
+    return f"; 95 % intervals: {'; '.join(out)}" if out else ""
 
 
 def _told_from(steps: Sequence[Rung]) -> str:

@@ -18,6 +18,8 @@ MEASURED, PREDICTED, IMPROVED = "#4a90d9", "#e08a00", "#2e9e62"
 FLOOR, MARK = "#a678e2", "#d0409a"
 DOTS = 700
 """Points of a cloud that are drawn; its mean is of all."""
+FEWEST = 5
+"""Points that a mean is drawn of."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
 
 
@@ -104,16 +106,16 @@ def heat_map(
             row=row,
             col=1,
         )
-    _styled(figure, 190 + (30 + tall) * len(tables))
+    _styled(figure, 176 + (30 + tall) * len(tables))
     pale = min(1.3 * floor / top, 0.9)
     light = [[0, "#f7fbff"], [pale, "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]]
     dark = [[0, "#1d252e"], [pale, "#2a3542"], [0.95, "#e0564c"], [1, "#ff8a7a"]]
     bar = {"title": {"text": label, "side": "top"}, "thickness": 10, "orientation": "h", "y": 1.0,
-           "yanchor": "bottom", "ypad": 24, "len": 0.45, "x": 1.0, "xanchor": "right"}  # fmt: skip
+           "yanchor": "bottom", "ypad": 20, "len": 0.45, "x": 1.0, "xanchor": "right"}  # fmt: skip
     figure.update_layout(
         coloraxis={"cmin": 0.0, "cmax": top, "colorscale": light, "colorbar": bar},
         hovermode="closest",
-        margin={"l": 20, "r": 16, "t": 90, "b": 30},
+        margin={"l": 20, "r": 16, "t": 76, "b": 30},
         meta={
             "light": {"coloraxis.colorscale": light},
             "dark": {"coloraxis.colorscale": dark},
@@ -247,7 +249,7 @@ def _most(values: Array) -> list[float]:
 
 
 def _trend(x: Array, y: Array, bins: int = 24) -> tuple[Array, Array]:
-    """Middles and means of the bins that hold anything."""
+    """Middles and means of the bins that hold enough."""
     left, right = _most(x)
     inside = (x >= left) & (x <= right)
     x, y = x[inside], y[inside]
@@ -256,7 +258,8 @@ def _trend(x: Array, y: Array, bins: int = 24) -> tuple[Array, Array]:
     count = np.bincount(which, minlength=bins)
     mean = np.bincount(which, weights=np.nan_to_num(y), minlength=bins) / np.maximum(count, 1)
     middle = (edges[:-1] + edges[1:]) / 2
-    return middle[count > 2], mean[count > 2]
+    told = count >= FEWEST
+    return middle[told], mean[told]
 
 
 def bars(
