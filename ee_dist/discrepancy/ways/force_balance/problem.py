@@ -31,7 +31,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import LowPass, decimated
 from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.instruments import MOTOR_TORQUE
-from ee_dist.robots.inverse_dynamics import parameters, regressor, rotors
+from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, parameters, regressor, rotors
 from ee_dist.robots.model import DRIVE_NUMBERS, Drive, Robot
 from ee_dist.trials.log import Array, SensorLog
 
@@ -65,6 +65,18 @@ class Processing:
         return self.low_pass or LowPass(cutoff_hz=PASSED / step_s)
 
 
+@dataclass(eq=False)
+class Moved:
+    """The regressor (T, M, 10 P) of one geometry along a motion, under gravity ``pull`` (3,); what other gravity adds to it
+    for each m/s^2 along x, y, z, once that is asked for."""
+
+    all_of_it: Array
+    pull: Array
+    by_pull: Array | None = None
+    last: tuple[bytes, Array] | None = None
+    """Masses and gravity asked for last, and the torque (T, M)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A measured motion (T, M): positions, speeds, accelerations; ``torque`` that the drives gave; ``rest``: where a joint
@@ -75,16 +87,26 @@ class Motion:
     acceleration: Array
     torque: Array
     rest: Mask
-    known: dict[tuple[object, ...], Array] = field(default_factory=dict)
+    known: dict[tuple[object, ...], Moved] = field(default_factory=dict)
 
     def needed(self, robot: Robot) -> Array:
-        """(T, M) torque that the motion needs. What depends on the geometry is computed once for each."""
-        key = (robot.present_joints, robot.world, robot.start_rotation)
-        if key not in self.known:
+        """(T, M) torque that the motion needs. What depends on geometry and gravity is computed once for each."""
+        shape, pull, masses = geometry(robot), gravity(robot), parameters(robot)
+        if shape not in self.known:
             if len(self.known) >= KEPT:
                 self.known.pop(next(iter(self.known)))
-            self.known[key] = regressor(robot, self.position, self.speed, self.acceleration)
-        return self.known[key] @ parameters(robot) + rotors(robot) * self.acceleration
+            self.known[shape] = Moved(regressor(robot, self.position, self.speed, self.acceleration), pull)
+        known = self.known[shape]
+        # Most hypotheses change the drives alone.
+        asked = masses.tobytes() + pull.tobytes()
+        if known.last is None or known.last[0] != asked:
+            torque = known.all_of_it @ masses
+            if (pull != known.pull).any():
+                if known.by_pull is None:
+                    known.by_pull = gravity_regressor(robot, self.position)
+                torque = torque + np.tensordot(pull - known.pull, known.by_pull @ masses, 1)
+            known.last = asked, torque
+        return np.asarray(known.last[1] + rotors(robot) * self.acceleration)
 
 
 def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
