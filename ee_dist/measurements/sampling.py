@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy import signal
@@ -116,6 +117,12 @@ class LowPass:
         return np.gradient(self(positions, step_s), step_s)
 
 
+@lru_cache(maxsize=16)
+def _anti_alias(keep_every: int) -> tuple[Array, Array]:
+    b, a = signal.cheby1(8, 0.05, 0.8 / keep_every)
+    return b, a
+
+
 def decimated(values: Array, keep_every: int) -> Array:
     """Every n-th sample after an anti-alias filter (Chebyshev I, order 8, 0.05 dB, at 0.8 of the new Nyquist frequency,
     forward and backward), along the first axis; the last sample is kept when n divides the length.
@@ -124,7 +131,7 @@ def decimated(values: Array, keep_every: int) -> Array:
     """
     if keep_every <= 1:
         return values
-    b, a = signal.cheby1(8, 0.05, 0.8 / keep_every)
+    b, a = _anti_alias(keep_every)
     smooth = signal.filtfilt(b, a, values, axis=0, padlen=min(len(values) - 1, 3 * 8))
     first = keep_every - (keep_every * int(np.ceil(len(values) / keep_every)) - len(values)) - 1
     return np.asarray(smooth[first::keep_every])

@@ -28,6 +28,7 @@ SENSOR_KINDS = (
     "position",
     "velocity",
     "torque",
+    "motor_torque",
     "height",
     "roll",
     "pitch",
@@ -43,7 +44,10 @@ UNITS = {
     ("velocity", "slide"): "m/s",
     ("torque", "hinge"): "N.m",
     ("torque", "slide"): "N",
+    ("motor_torque", "hinge"): "N.m",
+    ("motor_torque", "slide"): "N",
 }
+OF_JOINT = ("angle", *dict.fromkeys(kind for kind, _ in UNITS))
 TIME_STEP_S = 0.002
 GRAVITY_M_S2 = 9.81
 
@@ -155,9 +159,7 @@ def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Se
         kind, target = str(entry["kind"]), str(entry.get("target", ""))
         if kind not in SENSOR_KINDS:
             raise RobotError(f"{here}: no sensor kind {quoted(kind)}; {near(kind, SENSOR_KINDS)}")
-        allowed = (
-            parts if kind == "touch" else tuple(joints) if kind in ("angle", "position", "velocity", "torque") else None
-        )
+        allowed = parts if kind == "touch" else tuple(joints) if kind in OF_JOINT else None
         if allowed is not None and target not in allowed:
             what = "part" if kind == "touch" else "driven joint"
             raise RobotError(f"{here}: no {what} named {quoted(target)}; {near(target, allowed)}")

@@ -149,7 +149,9 @@ DRIVE_NUMBERS = tuple(f.name for f in fields(Drive) if f.name not in ("joint", "
 @dataclass(frozen=True)
 class Sensor:
     """One channel. ``kind``: touch (of a part), angle (scaled to [-1, 1] by the joint's range), position, velocity,
-    torque (of a joint), height or tilt of the root part."""
+    torque (of a joint: what moves it, friction taken off), motor_torque (what the motor's current stands for, friction and
+    all that comes after the motor left in), height or tilt of the root part. Torques are those of the step before the
+    reading."""
 
     name: str
     kind: str

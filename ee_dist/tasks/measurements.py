@@ -19,7 +19,7 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import HARDWARE, RunRecord
-from ee_dist.robots.agree import agreed, changed_sources
+from ee_dist.robots.agree import agreed, changed_sources, differences
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
@@ -69,7 +69,9 @@ def load(config: Config) -> Measurements:
             trials.append(MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup))
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
     if config.model is None:
-        source = robot.name if robot.name in BUILT_IN else robot
+        # By name only where the name says all: a log may bring sensors of its own, or a body with other numbers.
+        named = robot.name in BUILT_IN and not differences(BUILT_IN[robot.name](), robot)
+        source = robot.name if named else robot
         return Measurements(robot, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks))
     believed = read_model(config.model)
     robot, different = agreed(believed.robot, robot, f"model={config.model}")

@@ -145,11 +145,13 @@ def test_auto_takes_the_first_way_that_the_channels_allow(cli, imported):
     assert "By open_loop: commands were recorded" in said.out
 
 
-@pytest.mark.parametrize("by", ["open_loop", "free_run"])
+@pytest.mark.parametrize("by", WAYS)
 def test_a_sealed_trial_is_explained_improved_and_revealed(cli, by):
     plan = "task.excitations=['multisine:seconds=1.6,amplitude=0.2,seed=1','steps:seconds=1.6,amplitude=0.15,seed=2']"
     hidden = "+hidden=[{effect: load_friction, target: servo, share: 0.3}]"
-    tried, _ = run(cli, "task=trial", "robot=servo_pendulum", "engine=mujoco", hidden, plan, "task.noise=0.0005")
+    # What a balance of forces needs: the currents of the motors, and readings that can be differentiated twice.
+    read = ("task.motor_torque=true", "task.noise=0.0001") if by == "force_balance" else ("task.noise=0.0005",)
+    tried, _ = run(cli, "task=trial", "robot=servo_pendulum", "engine=mujoco", hidden, plan, *read)
     log, way, only = f"measured={tried}", f"task.by={by}", "task.only=[load_friction,parallel_spring]"
     explained, _ = run(cli, "task=explain", log, way, only, "task.rerun=false", *QUICK)
     shown, told = run(cli, "task=reveal", f"log={tried}", f"task.explained={explained}")
