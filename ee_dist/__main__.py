@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from ee_dist import leaving
+import sys
+
+from ee_dist import beginning, leaving
 
 if __name__ == "__main__":
     leaving.arm(unwinds=False)  # what is imported below takes a second or two, and Ctrl-C may come in it
+    beginning.announce(sys.argv[1:], sys.stderr)
 
 import multiprocessing
 import os
-import sys
 from pathlib import Path
 from typing import Any, NoReturn
 

@@ -1,8 +1,8 @@
-"""Pictures of the reports of four robots, narrow and wide, light and dark: python tools/figures.py OUT
+"""Pictures of the reports and rerun scenes of four robots, narrow and wide, light and dark: python tools/figures.py OUT
 
-Each robot is measured with something hidden, compared, explained and improved. Reports that are there already in OUT are
-looked at as they are; ``--docs`` puts the best pictures into docs/figures. Ends with status 1 if a page complains, asks for
-anything outside, or is wider than its window. Some ten minutes on two cores.
+Each robot is measured with something hidden, compared, explained and improved. Runs that are there already in OUT are
+looked at as they are; ``--docs`` puts the best pictures into docs/figures. Ends with status 1 if a page or a view complains,
+a page asks for anything outside or is wider than its window. Some ten minutes on two cores.
 """
 
 from __future__ import annotations
@@ -11,24 +11,39 @@ import argparse
 import os
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ee_dist.viewing.browser import BrowserError, HeadlessBrowser
+from ee_dist.viewing.headless import ViewerError
+from ee_dist.viewing.screenshot import take_pictures
+
+Shot = tuple[str, bytes, Sequence[str]]
+"""Name of a picture, the PNG, and what was wrong with what it shows."""
 
 ROOT = Path(__file__).resolve().parent.parent
+TWO = "task.excitations=['multisine:seconds=2,amplitude=0.3,seed=1','steps:seconds=2,amplitude=0.3,seed=2']"
 STORIES = {
     "quadruped": ("+hidden=random", "seed=5"),
-    "arm": ("robot=urdf", f"robot.drives={ROOT / 'docs' / 'examples' / 'arm.yaml'}", "+hidden=random", "seed=3"),
-    "stage": ("robot=linear_stage", "+hidden=random", "seed=1"),
-    "pendulum": ("robot=servo_pendulum", "+hidden=[{effect: load_friction, target: servo, share: 0.3}]"),
+    "arm": (
+        "robot=urdf",
+        f"robot.drives={ROOT / 'docs' / 'examples' / 'arm.yaml'}",
+        "+hidden=[{effect: coulomb_friction, target: turn, torque_nm: 0.3}]",
+        TWO,
+    ),
+    "stage": ("robot=linear_stage", "+hidden=[{effect: coulomb_friction, target: carriage, torque_nm: 20}]", TWO),
+    "pendulum": ("robot=servo_pendulum", "+hidden=[{effect: load_friction, target: servo, share: 0.3}]", TWO),
 }
 VERBS = {"compare": (), "explain": (), "improve": ("effect=auto",)}
 WIDTHS = (1280, 400)
+TALL = 840
 IN_DOCS = {
-    ("quadruped", "explain", 1280, False): "report_explain.png",
-    ("quadruped", "improve", 1280, True): "report_dark.png",
+    "quadruped_explain_1280_light.png": "report_explain.png",
+    "quadruped_improve_1280_dark.png": "report_dark.png",
+    "pendulum_improve_400_light.png": "report_narrow.png",
+    "arm_explain_1280_scene.png": "scene_explain.png",
 }
-MOST_BYTES = 200_000
+MOST_BYTES = 250_000
 
 
 def told(*words: str) -> None:
@@ -41,17 +56,35 @@ def told(*words: str) -> None:
 
 
 def story(name: str, out: Path) -> list[Path]:
-    """The reports of one robot; those that are there already stay."""
+    """The folders of one robot's runs, the trial first; those that are there already stay."""
     trial = out / name / "trial"
     if not (trial / "trial.mcap").is_file():
         told("task=trial", *STORIES[name], f"hydra.run.dir={trial}")
-    reports = []
+    folders = [trial]
     for verb, more in VERBS.items():
         folder = out / name / verb
         if not (folder / "report.html").is_file():
-            told(f"task={verb}", f"measured={trial}", "task.rerun=false", *more, f"hydra.run.dir={folder}")
-        reports.append(folder / "report.html")
-    return reports
+            told(f"task={verb}", f"measured={trial}", *more, f"hydra.run.dir={folder}")
+        folders.append(folder)
+    return folders
+
+
+def pages(window: HeadlessBrowser, folder: Path) -> Iterator[Shot]:
+    """A report narrow and wide, light and dark."""
+    for width in WIDTHS:
+        for dark in (False, True):
+            seen = window.look(folder / "report.html", width, dark=dark, height=TALL)
+            wider = [f"{seen.overflow} pixels wider than the window"] if seen.overflow else []
+            wrong = [*seen.complaints, *(f"asks for {a}" for a in seen.asked), *wider]
+            yield f"{folder.parent.name}_{folder.name}_{width}_{'dark' if dark else 'light'}.png", seen.png, wrong
+
+
+def scene(folder: Path) -> Iterator[Shot]:
+    """A rerun recording narrow and wide, as its own viewer shows it: that is dark."""
+    (recording,) = folder.glob("*.rrd")
+    for width in WIDTHS:
+        (seen,) = take_pictures(recording, [0.0], size=(width, TALL))
+        yield f"{folder.parent.name}_{folder.name}_{width}_scene.png", seen.png, seen.reports
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -67,20 +100,15 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         with HeadlessBrowser() as window:
             for name in options.only:
-                for report in story(name, options.out.resolve()):
-                    verb = report.parent.name
-                    for width, dark in ((w, d) for w in WIDTHS for d in (False, True)):
-                        label = f"{name}_{verb}_{width}_{'dark' if dark else 'light'}.png"
-                        seen = window.look(report, width, dark=dark, height=840)
-                        (options.out / label).write_bytes(seen.png)
-                        wider = [f"{seen.overflow} pixels wider than the window"] if seen.overflow else []
-                        wrong = [*seen.complaints, *(f"asks for {a}" for a in seen.asked), *wider]
+                for folder in story(name, options.out.resolve()):
+                    report = pages(window, folder) if (folder / "report.html").is_file() else ()
+                    for label, png, wrong in (*report, *scene(folder)):
+                        (options.out / label).write_bytes(png)
                         print(label, *wrong, sep="\n  ", flush=True)
                         faults += len(wrong)
-                        shown = IN_DOCS.get((name, verb, width, dark))
-                        if options.docs and shown and len(seen.png) < MOST_BYTES:
-                            (ROOT / "docs" / "figures" / shown).write_bytes(seen.png)
-    except BrowserError as error:
+                        if options.docs and label in IN_DOCS and len(png) < MOST_BYTES:
+                            (ROOT / "docs" / "figures" / IN_DOCS[label]).write_bytes(png)
+    except (BrowserError, ViewerError) as error:
         print(f"no pictures: {error}", file=sys.stderr)
         return 1
     return 1 if faults else 0

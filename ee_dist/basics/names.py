@@ -8,15 +8,36 @@ from collections.abc import Iterable
 CUTOFF = 0.4
 """Likeness, from 0 to 1, from which a name is worth proposing."""
 MOST = 3
+LISTED = 400
+"""Characters of a list of names; a file of somebody's may have thousands."""
+LONGEST = 100
+"""Characters of a name that is looked for: likeness costs the square of them."""
 
 
 def nearest(name: str, allowed: Iterable[str], cutoff: float = CUTOFF) -> list[str]:
     """Names like it, the most alike first; none where none is near."""
-    return difflib.get_close_matches(str(name), [str(a) for a in allowed], n=MOST, cutoff=cutoff)
+    return difflib.get_close_matches(str(name)[:LONGEST], [str(a) for a in allowed], n=MOST, cutoff=cutoff)
+
+
+def listed(names: Iterable[str], otherwise: str = "none") -> str:
+    """The names with commas, as many as a message bears."""
+    every = [str(n) for n in names]
+    text = ", ".join(every)
+    if len(text) <= LISTED:
+        return text or otherwise
+    whole = text[:LISTED].rpartition(", ")[0]
+    if not whole:
+        return f"{text[:LISTED]} ..."
+    return f"{whole} and {len(every) - whole.count(', ') - 1} more"
 
 
 def did_you_mean(name: str, allowed: Iterable[str], otherwise: str = "", cutoff: float = CUTOFF) -> str:
     """``did you mean a or b?``; where nothing is near ``otherwise``, or all names."""
     names = [str(a) for a in allowed]
     near = nearest(name, names, cutoff)
-    return f"did you mean {' or '.join(near)}?" if near else otherwise or f"there are: {', '.join(names) or 'none'}"
+    return f"did you mean {listed_or(near)}?" if near else otherwise or f"there are: {listed(names)}"
+
+
+def listed_or(names: list[str]) -> str:
+    """A few names with "or"."""
+    return " or ".join(n if len(n) <= LONGEST else f"{n[:LONGEST]}..." for n in names)

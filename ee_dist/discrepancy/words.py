@@ -5,26 +5,53 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
-from ee_dist.discrepancy.improve import BETTER, EXPLAINED, Improvement
+from ee_dist.discrepancy.improve import Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.robots.model import Robot
 
+NAMED = 3
+"""Effects that a headline names."""
+CLOSE = 1.1
+"""Times the noise floor up to which a model is nearly right."""
+GRANTED = "What is above the floor is no more than chance, and what contacts and reversals leave that come a row early or late."
+NOTHING_ELSE = "Nothing else is left above the noise."
+CONTENT = (
+    "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
+)
+STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
+
 
 @dataclass(frozen=True)
 class Account:
-    """``headline``: the finding in one sentence, with how sure it is. ``lines``: what speaks for it and what stays open.
-    ``good``: whether the question is settled."""
+    """``headline``: what was found, where, how much of it, and whether more is left. ``error``: of the models, beside the
+    noise floor. ``sure``: how sure it is. ``advice``: what to do next, where a command does not say it. ``lines``: what speaks
+    for it and what stays open. ``good``: whether the question is settled."""
 
     headline: str
+    error: str
+    sure: str
     lines: tuple[str, ...]
     good: bool
+    advice: str = ""
+
+    @property
+    def first(self) -> list[str]:
+        """What comes below the headline before anything else."""
+        return [line for line in (self.error, self.sure, self.advice) if line]
+
+    @property
+    def words(self) -> list[str]:
+        """All of it, the headline first."""
+        return [self.headline, *self.first, *self.lines]
 
 
 def plain(name: str) -> str:
@@ -47,14 +74,26 @@ def without_unit(key: str, unit: str) -> str:
 
 def told(term: Term, robot: Robot | None = None) -> str:
     """``coulomb friction at knee front left (torque 0.3 N.m)``."""
-    entry = CATALOGUE[term.effect]
-    shown = []
-    for key, value in term.values:
-        unit = entry.unit(key, robot, term.target) if robot is not None else entry.parameter(key).unit
-        shown.append(
-            f"{plain(without_unit(key, unit))} {value:.3g}" + (f" {unit}" if unit not in ("", "1", "channel") else "")
-        )
+    shown = [f"{_quantity(term, key, robot)} {value:.3g}{_unit(term, key, robot)}" for key, value in term.values]
     return named(term) + (f" ({', '.join(shown)})" if shown else "")
+
+
+def _quantity(term: Term, key: str, robot: Robot | None) -> str:
+    """A parameter's name without its unit, which is told behind the value."""
+    entry = CATALOGUE[term.effect]
+    own = entry.parameter(key).unit  # that of a hinge, which names carry on slides too
+    other = entry.unit(key, robot, term.target) if robot is not None else own
+    return plain(without_unit(without_unit(key, other), own))
+
+
+def _unit(term: Term, key: str, robot: Robot | None) -> str:
+    entry = CATALOGUE[term.effect]
+    unit = entry.unit(key, robot, term.target) if robot is not None else entry.parameter(key).unit
+    return f" {unit}" if unit not in ("", "1", "channel") else ""
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
 
 
 def named(term: Term) -> str:
@@ -67,68 +106,137 @@ def told_all(terms: Hypothesis, robot: Robot | None = None) -> str:
     effects = {t.effect for t in terms}
     if len(terms) > 1 and len(effects) == 1 and all(len(t.values) == 1 for t in terms):
         key = terms[0].values[0][0]
-        unit = CATALOGUE[terms[0].effect].unit(key, robot, terms[0].target) if robot is not None else ""
         each = ", ".join(f"{plain(t.target)} {t.values[0][1]:.3g}" for t in terms)
-        return f"{plain(terms[0].effect)}, each joint by itself ({each}{f' {unit}' if unit not in ('', '1') else ''})"
+        return f"{plain(terms[0].effect)}, each joint by itself ({each}{_unit(terms[0], key, robot)})"
     return "; ".join(told(t, robot) for t in terms)
 
 
-def compare_account(problem: Problem, found: Comparison) -> Account:
-    """What compare has to say."""
+def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover]) -> Account:
+    """What compare has to say; ``left``: where more than noise is."""
     ratio = found.error / found.noise_floor if found.noise_floor else float("inf")
-    off, floor = problem.told(found.error), problem.told(found.noise_floor)
+    off = problem.told(found.error)
     lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}."]
-    if found.error < found.noise_floor:
-        lines.append("The error is below the floor: the noise was estimated too high, and the floor is an upper bound.")
+    lines += _beside(found.error, found.noise_floor, bool(left))
     parted = [f"{t} at {s:.2f} s" for t, s in found.parted_s.items() if s is not None]
     lines.append("Prediction and measurement part: " + ("; ".join(parted) or "nowhere") + ".")
-    if ratio < 1.1:
-        head = f"The model agrees with the measurements: {problem.natural_name} {off}, noise alone would leave {floor}."
+    if left:
+        lines.append(left_text(left, False))
+    if ratio < CLOSE and not left:
+        head = "The model agrees with the measurements: nothing is left above the noise."
     else:
-        worst = f", most of all at {plain(found.channels[0].name)}" if found.channels else ""
-        head = (
-            f"The model is off{worst}: {problem.natural_name} {off}, {ratio:.3g} times what noise alone would leave "
-            f"({floor})."
-        )
-    return Account(head, tuple(lines), ratio < 1.1)
+        # The largest error, or, where the errors are all small, the place that noise explains least.
+        place = left[0].channel if left and ratio < CLOSE else found.channels[0].name if found.channels else ""
+        where = f", most of all at {plain(place)}" if place else ""
+        how = "The model is nearly right, and more than noise is left" if ratio < CLOSE else "The model is off"
+        least = problem.natural(found.noise_floor)
+        times = _times(problem.natural(found.error) / least) if least else "far more than"
+        head = f"{how}{where}: {problem.natural_name} {off}, {times} what noise alone would leave."
+    floor = problem.told(found.noise_floor)
+    error = f"{_error(problem)}: model {off}, noise floor {floor}."
+    places = _count(len(found.channels) * len(problem.trials), "curve")
+    of = f"{places} ({_count(len(found.channels), 'channel')} in {_count(len(problem.trials), 'trial')})"
+    sure = (
+        f"How sure: more than noise stands out in {_places(left)} of {of}"
+        if left
+        else f"How sure: none of {of} stands out"
+    )
+    sure += f"; the noise floor is {found.floor_source}."
+    settled = ratio < CLOSE and not left
+    return Account(head, error, sure, tuple(lines), settled, CONTENT if settled else "")
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.3g} times" if abs(ratio - 1) >= 0.005 else "about"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _beside(error: float, floor: float, left: bool) -> list[str]:
+    """An error that is less than noise would leave needs a word, and one that is more although nothing is ``left``."""
+    if error < 0.97 * floor:
+        return ["The error is below the floor: the noise was estimated too high, and the floor is an upper bound."]
+    if error < floor:
+        return ["The error is at the floor, within chance."]
+    return [GRANTED] if error > 1.03 * floor and not left else []
 
 
 def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None) -> Account:
     """The verdict, what it is, what speaks for it, what stays open, what to do next."""
     robot, best = problem.robot, found.best
-    lines = [
-        f"The model is off by {problem.told(found.baseline_error)} ({problem.natural_name}); noise alone would leave "
-        f"{problem.told(found.noise_floor)} ({found.floor_source}). {found.tried} explanations were tried."
-    ]
+    lines = [f"Noise floor: {found.floor_source}. {_count(found.tried, 'explanation')} {_were(found.tried)} tried."]
+    error = f"{_error(problem)}: model {problem.told(found.baseline_error)}"
+    error += f", noise floor {problem.told(found.noise_floor)}."
+    last, advice = found.baseline_error, ""
     if found.refitted_error != found.baseline_error:
         lines.append(f"Its own values fitted anew leave {problem.told(found.refitted_error)}.")
+        last = found.refitted_error
     if found.verdict == NOTHING_MISSING:
         head = "Nothing is missing: no candidate takes more off the residual than luck, and no channel stands out."
+        sure = (
+            f"How sure: {_count(found.tried, 'explanation')} {_were(found.tried)} tried, and none gains more than luck."
+        )
+        advice = CONTENT
     elif found.verdict == EFFECT and best is not None:
-        entry = CATALOGUE[best.terms[0].effect]
+        entry, last = CATALOGUE[best.terms[0].effect], best.error_heldout
         head = f"Missing{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best)}."
-        head += " Nothing else is left above the noise." if not found.left else " More than noise is left with it."
+        head += f" {NOTHING_ELSE}" if not found.left else " More than noise is left with it."
+        error = _errors(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
+        sure = f"How sure: it takes off {confidence(best)}; {_rivals(found.tried, best.tied_with)}."
         lines.append(entry.physics)
-        lines.append(f"What speaks for it: {confidence(best)}. Its mark in a residual: {entry.signature}")
+        lines.append(f"Its mark in a residual: {entry.signature}")
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:
         head = "Unexplained: something is left, and no effect of the catalogue earns its place."
+        if found.left:
+            head = (
+                f"Unexplained: more than noise is left, most at {plain(found.left[0].channel)}, and no effect of the "
+                "catalogue earns its place."
+            )
+        sure = f"How sure: {_count(found.tried, 'explanation')} {_were(found.tried)} tried, and none earns its place."
+        advice = STUCK
         lines += [
             f"Nearest, but not good enough: {told_all(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]
         ]
+    lines += _beside(last, found.noise_floor, bool(found.left))
     if found.left:
         lines.append(left_text(found.left, found.verdict == EFFECT))
     if ahead is not None and ahead.separation < ENOUGH:
-        lines.append("No trial of the library would separate them either: on all of them they do the same.")
+        advice = "No trial of the library would tell them apart either: on all of them they do the same."
     elif ahead is not None:
         e = ahead.excitation
-        lines.append(
-            f"The trial that would separate them best: {e.kind} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}, "
-            f"on the {e.fixture} (predicted distance {ahead.separation:.0f} standard deviations)."
+        advice = (
+            f"To tell them apart: {e.kind} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}, on the {e.fixture} "
+            f"(predicted distance {ahead.separation:.0f} standard deviations)."
         )
     good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
-    return Account(head, tuple(lines), good)
+    return Account(head, error, sure, tuple(lines), good, advice)
+
+
+def _error(problem: Problem) -> str:
+    """Its name; with its unit, where that is not told behind each number."""
+    unit = f" ({problem.natural_unit})" if problem.natural_unit == "standard deviations" else ""
+    return _capital(problem.natural_name) + unit
+
+
+def _were(count: int) -> str:
+    return "was" if count == 1 else "were"
+
+
+def _errors(problem: Problem, before: float, after: float, floor: float, held_out: str) -> str:
+    """The model, the improved one and noise in one line."""
+    return (
+        f"{_error(problem)}: model {problem.told(before)}, improved model {problem.told(after)} held out "
+        f"({held_out}), noise floor {problem.told(floor)}."
+    )
+
+
+def _rivals(tried: int, tied: Sequence[str]) -> str:
+    if not tied:
+        return f"of {_count(tried, 'explanation')} no other does as well"
+    return f"of {_count(tried, 'explanation')} {len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well"
 
 
 def _doubt(found: Explanation) -> str:
@@ -145,11 +253,18 @@ def _twins(best: Judged) -> str:
     return f", or {' or '.join(map(placed, others))}, which look{'s' if len(others) == 1 else ''} the same here"
 
 
+def above(c: Judged) -> tuple[float, float]:
+    """The interval of a candidate's gain as a share of what is above the noise."""
+    scale = c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0
+    return c.interval[0] * scale, c.interval[1] * scale
+
+
 def confidence(best: Judged) -> str:
-    low, high = best.interval
+    """What it takes off held-out data, as a share of what is not noise, with its interval."""
+    low, high = above(best)
     return (
-        f"on {best.held_out} it takes {best.gain:.0%} off the squared residual (95 % interval {max(low, -9.99):.0%} to "
-        f"{min(high, 1.0):.0%}), {max(0.0, min(best.explained, 1.0)):.0%} of what is above the noise"
+        f"{percent(max(0.0, min(best.explained, 1.0)))} of what is above the noise (95 % interval {percent(max(low, -9.99))} "
+        f"to {percent(min(high, 1.0))}), judged on {best.held_out}"
     )
 
 
@@ -158,28 +273,68 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
     robot, first, last = problem.robot, found.ladder[0], found.ladder[-1]
     steps = [r for r in found.ladder if r.added]
     lines = []
-    floor = problem.told(found.noise_floor)
-    if not steps:
-        head = f"Nothing was added: {found.stopped}."
-        lines.append(f"{_capital(problem.natural_name)} {problem.told(last.error_heldout)}, noise floor {floor}.")
-    else:
-        many = "effect" if len(steps) == 1 else "effects"
-        how = {
-            EXPLAINED: "and nothing is left above the noise",
-            BETTER: f"better, and not explained: {found.explained:.0%} of what is above the noise is accounted for",
-        }.get(found.verdict, "")
-        head = (
-            f"{len(steps)} {many} added; {problem.natural_name} on {last.held_out} {problem.told(first.error_heldout)} -> "
-            f"{problem.told(last.error_heldout)} (noise floor {floor}), {how}."
-        )
+    if len(steps) > 1:
         lines.append("Added, in this order: " + "; ".join(told_all(r.added, robot) for r in steps) + ".")
-        lines += [tie_text(placed(r.name), r.tied_with) for r in steps if r.tied_with]
-        lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for r in steps for d in r.dropped]
+    lines += [tie_text(placed(r.name), r.tied_with) for r in steps if r.tied_with]
+    lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for r in steps for d in r.dropped]
     lines.append("The model: " + ("; ".join(told(t, robot) for t in found.terms) or "the robot as described") + ".")
-    lines.append(f"Stopped because {found.stopped}.")
+    lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
-    lines.append(left_text(found.left, True) if found.left else "Nothing is left above the noise.")
-    return Account(head, tuple(lines), not found.left)
+    lines += _beside(last.error_heldout, found.noise_floor, bool(found.left))
+    if found.left:
+        lines.append(left_text(found.left, bool(steps)))
+    error = _errors(problem, first.error_heldout, last.error_heldout, found.noise_floor, last.held_out)
+    share = f"{percent(max(0.0, min(found.explained, 1.0)))} of what is above the noise is accounted for"
+    if len(found.ladder) == 1:
+        head = f"Nothing was added: {found.stopped}."
+        error = f"{_error(problem)}: model {problem.told(last.error_heldout)}, noise floor "
+        error += f"{problem.told(found.noise_floor)}."
+        tried = found.last.tried if found.last else 0
+        sure = f"How sure: {_count(tried, 'explanation')} {_were(tried)} tried, and none earns its place."
+    else:
+        new = added(found)
+        what = _listed([told(t, robot) for t in new]) if new else "nothing; the model's own values were fitted anew"
+        head = f"Added: {what}."
+        head += f" {NOTHING_ELSE}" if not found.left else f" More than noise is left: {share}."
+        sure = f"How sure: {share}, judged on {last.held_out}{_ranges(found, new, robot)}{_told_from(steps)}."
+    advice = "" if len(found.ladder) > 1 else STUCK if found.left else CONTENT
+    return Account(head, error, sure, tuple(lines), not found.left, advice)
+
+
+def added(found: Improvement) -> list[Term]:
+    """What was added and is there at the end, with its final values."""
+    names = {t.name for r in found.ladder for t in r.added}
+    return [t for t in found.terms if t.name in names]
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f"; and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return "; ".join(names[:NAMED]) + more
+
+
+def _ranges(found: Improvement, new: Sequence[Term], robot: Robot) -> str:
+    """The 95 % intervals of the values that a headline names."""
+    told_of: dict[str, list[str]] = {t.name: [] for t in new[:NAMED]}
+    for p in found.parameters:
+        term = found.terms[p.term]
+        if term.name in told_of:
+            range_ = f"{p.low:.3g} to {p.high:.3g}{_unit(term, p.name, robot)}"
+            sure = not p.flag and np.isfinite(p.high - p.low)
+            told_of[term.name].append(f"{_quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}")
+    out = [
+        (f"{placed(name)}: " if len(told_of) > 1 else "") + ", ".join(values)
+        for name, values in told_of.items()
+        if values
+    ]
+    return f"; 95 % intervals: {'; '.join(out)}" if out else ""
+
+
+def _told_from(steps: Sequence[Rung]) -> str:
+    """Whether others would have done as well."""
+    others = sorted({t for r in steps for t in r.tied_with})
+    if not others:
+        return ""
+    return f"; not told from {' or '.join(map(placed, others)) if len(others) < 3 else f'{len(others)} others'}"
 
 
 def _capital(text: str) -> str:
@@ -196,5 +351,9 @@ def tie_text(what: str, others: Sequence[str]) -> str:
 
 def left_text(left: Sequence[Leftover], after: bool) -> str:
     head = "Even with it, more than noise is left in" if after else "It sits in"
-    count = len({(g.trial, g.channel) for g in left})
-    return f"{head} {count} channel{'s' if count > 1 else ''}; worst: {'; '.join(map(str, left[:3]))}."
+    return f"{head} {_count(_places(left), 'curve')}; worst: {'; '.join(map(str, left[:3]))}."
+
+
+def _places(left: Sequence[Leftover]) -> int:
+    """Channels of trials: one may stand out for two reasons."""
+    return len({(g.trial, g.channel) for g in left})

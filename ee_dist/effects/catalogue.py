@@ -22,7 +22,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ee_dist.basics.names import did_you_mean, nearest
+from ee_dist.basics.names import did_you_mean, listed, nearest
+from ee_dist.basics.quoted import quoted
 from ee_dist.effects.groups import common, members_of, shared_targets
 from ee_dist.effects.laws import LAWS
 from ee_dist.effects.scales import Range, Ranges
@@ -110,7 +111,7 @@ class Effect:
             if p.name == name:
                 return p
         raise EffectError(
-            f"{self.name} has no parameter {name!r}; it has: {', '.join(p.name for p in self.parameters)}"
+            f"{self.name} has no parameter {quoted(name)}; it has: {', '.join(p.name for p in self.parameters)}"
         )
 
     def neutral_values(self) -> dict[str, float]:
@@ -130,7 +131,7 @@ class Effect:
             low, high = own.get(p.name, (p.lower, p.upper))
             found[p.name] = (max(p.lower, min(low, p.neutral)), min(p.upper, max(high, p.neutral)))
             if not all(map(math.isfinite, found[p.name])):
-                raise EffectError(f"{self.name}: {p.name} has no finite range at {target!r} of {robot.name}")
+                raise EffectError(f"{self.name}: {p.name} has no finite range at {quoted(target)} of {robot.name}")
         return found
 
     def unit(self, parameter: str, robot: Robot, target: str) -> str:
@@ -195,12 +196,12 @@ def effect(
 
     def register(transform: Transform) -> Transform:
         if name in _registry and _registry[name].transform.__module__ != transform.__module__:
-            raise EffectError(f"an effect named {name!r} exists already")
+            raise EffectError(f"an effect named {quoted(name)} exists already")
         if family not in FAMILIES:
-            raise EffectError(f"{name}: no family {family!r}; there are: {', '.join(FAMILIES)}")
+            raise EffectError(f"{name}: no family {quoted(family)}; there are: {', '.join(FAMILIES)}")
         for p in parameters:
             if not p.name.isidentifier() or p.name in RESERVED:
-                raise EffectError(f"{name}: {p.name!r} cannot be the name of a parameter")
+                raise EffectError(f"{name}: {quoted(p.name)} cannot be the name of a parameter")
             if not p.lower <= p.neutral <= p.upper or not math.isfinite(p.neutral):
                 raise EffectError(f"{name}: the neutral value of {p.name} lies outside its bounds")
             if ranges is None and not (math.isfinite(p.lower) and math.isfinite(p.upper)):
@@ -228,7 +229,7 @@ def find(name: str) -> Effect:
     """The effect of that name. Raises EffectError with the nearest names."""
     if name in _registry:
         return _registry[name]
-    raise EffectError(f"no effect named {name!r}; {did_you_mean(name, _registry, cutoff=0.5)}")
+    raise EffectError(f"no effect named {quoted(name)}; {did_you_mean(name, _registry, cutoff=0.5)}")
 
 
 def term(effect_name: str, target: str = "", **values: float) -> Term:
@@ -237,7 +238,7 @@ def term(effect_name: str, target: str = "", **values: float) -> Term:
     for key, value in values.items():
         p = entry.parameter(key)
         if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-            raise EffectError(f"{effect_name}: {key} must be a number ({p.unit}), not {value!r}")
+            raise EffectError(f"{effect_name}: {key} must be a number ({p.unit}), not {quoted(value)}")
         if not p.lower <= value <= p.upper:
             raise EffectError(f"{effect_name}: {key} = {value:g} lies outside [{p.lower:g}, {p.upper:g}] {p.unit}")
     filled = entry.neutral_values() | {k: float(v) for k, v in values.items()}
@@ -247,9 +248,11 @@ def term(effect_name: str, target: str = "", **values: float) -> Term:
 def from_dict(entry: Mapping[str, Any]) -> Term:
     """A term from ``{effect, target, <parameter>: value}``. Raises EffectError."""
     if not isinstance(entry, Mapping):
-        raise EffectError(f"an effect is written {{effect: ..., target: ..., <parameter>: <value>}}, not {entry!r}")
+        raise EffectError(
+            f"an effect is written {{effect: ..., target: ..., <parameter>: <value>}}, not {quoted(entry)}"
+        )
     if "effect" not in entry:
-        raise EffectError(f"an entry without 'effect': {dict(entry)!r}")
+        raise EffectError(f"an entry without 'effect': {quoted(dict(entry))}")
     name, values = str(entry["effect"]), {str(k): v for k, v in entry.items() if k not in ("effect", "target")}
     for key in values:
         find(name).parameter(key)
@@ -265,7 +268,7 @@ def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
         if not places:
             near = nearest(t.target, allowed) or allowed
             raise EffectError(
-                f"{t.effect} cannot act on {t.target!r} of {robot.name}; it can act on: {', '.join(near)}"
+                f"{t.effect} cannot act on {quoted(t.target)} of {robot.name}; it can act on: {listed(near)}"
             )
         try:
             for place in places:

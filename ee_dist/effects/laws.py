@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.quoted import quoted
+
 Array = NDArray[np.float64]
 
 
@@ -46,7 +48,7 @@ def drive_law(name: str) -> Callable[[LawFunction], LawFunction]:
 
     def register(function: LawFunction) -> LawFunction:
         if name in LAWS and LAWS[name].__module__ != function.__module__:
-            raise LawError(f"a drive law named {name!r} exists already")
+            raise LawError(f"a drive law named {quoted(name)} exists already")
         LAWS[name] = function
         return function
 
@@ -56,5 +58,5 @@ def drive_law(name: str) -> Callable[[LawFunction], LawFunction]:
 def find_law(name: str) -> LawFunction:
     """The drive law of that name. Raises LawError."""
     if name not in LAWS:
-        raise LawError(f"no drive law named {name!r}; there are: {', '.join(sorted(LAWS)) or 'none'}")
+        raise LawError(f"no drive law named {quoted(name)}; there are: {', '.join(sorted(LAWS)) or 'none'}")
     return LAWS[name]

@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 
 from ee_dist.basics.files import write_whole
+from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot, RobotError
@@ -45,11 +46,11 @@ def read_model(path: str | Path) -> ModelFile:
         raise RobotError(f"{file}: a model file is a mapping with 'robot' and 'effects'")
     for key in data:
         if key not in ("robot", "effects"):
-            raise RobotError(f"{file}: unknown key {key!r}; there are: robot, effects")
+            raise RobotError(f"{file}: unknown key {quoted(key)}; there are: robot, effects")
     robot, _ = load_robot(data["robot"], file.parent)
     entries = data.get("effects") or []
     if not isinstance(entries, list):
-        raise EffectError(f"{file}: effects: expected a list, not {entries!r}")
+        raise EffectError(f"{file}: effects: expected a list, not {quoted(entries)}")
     try:
         terms = tuple(from_dict(e) for e in entries)
         apply(robot, terms)

@@ -66,6 +66,9 @@ class DrivePath:
         limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
         self.all_torque = np.maximum(np.where(limited, p["torque_limit"], 0.0).sum(axis=1, keepdims=True), 1e-300)
         self.last_active = np.zeros(shape)
+        self.current = np.zeros(shape)
+        """Torque (B, M) that the current of each motor stands for in the last step, by its nominal constant: before a weak motor,
+        the gear and any friction take their part of it."""
         self._prepare_delay(shape)
         self._prepare_joints(robots, shape)
         self._prepare_laws(robots)
@@ -208,7 +211,7 @@ class DrivePath:
         stiffness, damping = (np.empty(shape), np.empty(shape)) if sloped else (active, active)
         _drive(
             self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, sloped,
-            self.integral, self.last_active, active, stiffness, damping,
+            self.integral, self.last_active, self.current, active, stiffness, damping,
         )  # fmt: skip
         return active, stiffness, damping
 
@@ -232,6 +235,7 @@ def _drive(
     elastic: bool,
     integral: Array,
     last_active: Array,
+    current: Array,
     active: Array,
     stiffness: Array,
     damping: Array,
@@ -265,7 +269,8 @@ def _drive(
             torque = _within(asked, torque_limit[i, j]) * scale[i, j] * closed[i, j]
             last_active[i, j] = torque
             back_emf = own_emf[i, j] * closed[i, j]
-            active[i, j] = (torque * left[i, j] - back_emf * speed[i, j]) * strength[i, j]
+            current[i, j] = torque * left[i, j] - back_emf * speed[i, j]
+            active[i, j] = current[i, j] * strength[i, j]
             if elastic:
                 free = 1.0 if abs(asked) < torque_limit[i, j] else 0.0
                 free = free * (scale[i, j] * left[i, j]) * closed[i, j]

@@ -73,7 +73,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
         truth = bodies.read(touch, always_pose or step == 0 or last, twist)
         if begin is None:
             begin = truth.base_pose
-        reported = sensing.step(step, truth_to_channels(truth, torque))
+        reported = sensing.step(step, truth_to_channels(truth, torque, drive.current))
         command = control.step(step, step * dt, reported)
         torque = drive.step(
             step * dt,
@@ -148,8 +148,14 @@ def _started(rollout: Rollout) -> Rollout:
     return replace(rollout, start=State(joints, np.zeros(len(joints)))) if joints.any() else rollout
 
 
-POSITION, VELOCITY, TORQUE, ANGLE, TOUCH, OF_BASE = range(6)
-OF_JOINT = {"position": POSITION, "velocity": VELOCITY, "torque": TORQUE, "angle": ANGLE}
+POSITION, VELOCITY, TORQUE, MOTOR_TORQUE, ANGLE, TOUCH, OF_BASE = range(7)
+OF_JOINT = {
+    "position": POSITION,
+    "velocity": VELOCITY,
+    "torque": TORQUE,
+    "motor_torque": MOTOR_TORQUE,
+    "angle": ANGLE,
+}
 
 
 class _Channels:
@@ -174,10 +180,11 @@ class _Channels:
         self.half = np.array([s[1] for s in scales])
         self.untouched = np.zeros((len(robots), 0), dtype=bool)
 
-    def __call__(self, truth: Truth, torque: Array) -> Array:
+    def __call__(self, truth: Truth, torque: Array, current: Array) -> Array:
         out = np.empty(self.shape)
         touch = self.untouched if truth.touch is None else truth.touch
-        _fill(self.kinds, self.places, truth.joints, truth.speeds, torque, touch, self.middle, self.half, out)
+        at_joint = truth.joints, truth.speeds, torque, current
+        _fill(self.kinds, self.places, *at_joint, touch, self.middle, self.half, out)
         for k, kind in self.of_base:
             out[:, k] = _of_base(kind, truth)
         return out
@@ -190,6 +197,7 @@ def _fill(
     joints: Array,
     speeds: Array,
     torque: Array,
+    current: Array,
     touch: NDArray[np.bool_],
     middle: Array,
     half: Array,
@@ -205,6 +213,8 @@ def _fill(
                 out[i, k] = speeds[i, j]
             elif kind == TORQUE:
                 out[i, k] = torque[i, j]
+            elif kind == MOTOR_TORQUE:
+                out[i, k] = current[i, j]
             elif kind == ANGLE:
                 out[i, k] = (joints[i, j] - middle[i, j]) / half[i, j]
             elif kind == TOUCH:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Even
 from ee_dist.measurements.sampling import Timing, check_times
@@ -57,8 +58,8 @@ def clocked(table: Table, time: Column | Even | None, where: str) -> Clocked:
     worst = int(np.argmax(steps))
     if len(steps) > 10 and steps[worst] > TORN * length and steps[worst] > max(60.0, 1000 * timing.median_s):
         raise MeasurementError(
-            f"{table}: row {table.line(worst + 1)}, column {name!r}: time jumps by {steps[worst]:.4g} s, the other rows are "
-            f"{timing.median_s:.4g} s apart; a wrong time stamp? drop the rows on one side of it"
+            f"{table}: row {table.line(worst + 1)}, column {quoted(name)}: time jumps by {steps[worst]:.4g} s, the other rows "
+            f"are {timing.median_s:.4g} s apart; a wrong time stamp? drop the rows on one side of it"
         )
     return Clocked(table, times_s, timing)
 
@@ -85,12 +86,12 @@ def check_grid(found: Clocked, step_s: float, rate_stated: bool, unit: str) -> N
     if length < step_s or (rows < KEPT * len(table) and median < FASTEST_S and not rate_stated):
         raise MeasurementError(
             f"{table}: the times of {len(table)} rows cover {length:.4g} s, {1e6 * median:.4g} us a row, so that steps of "
-            f"{step_s:g} s would keep {int(rows) + 1}; if the times are not in {unit!r}{_cure(median, unit)}; "
+            f"{step_s:g} s would keep {int(rows) + 1}; if the times are not in {quoted(unit)}{_cure(median, unit)}; "
             "if they are, set rate_hz"
         )
     if median >= SLOW_S:
         raise MeasurementError(
-            f"{table}: a row every {median:.4g} s; if the times are not in {unit!r}{_cure(median, unit)}; "
+            f"{table}: a row every {median:.4g} s; if the times are not in {quoted(unit)}{_cure(median, unit)}; "
             "slower than one row a second tells nothing about a robot's motion"
         )
     if rows > MOST_ROWS:
@@ -104,4 +105,4 @@ def _cure(median_s: float, unit: str) -> str:
     """The unit in which such steps would be those of a robot's log, as advice."""
     raw = median_s / UNITS[unit][1]
     fits = [u for u in ("s", "ms", "us", "ns") if FASTEST_S <= raw * UNITS[u][1] <= SLOWEST_S and u != unit]
-    return f", say unit: {fits[0]!r}" if fits else ""
+    return f", say unit: {quoted(fits[0])}" if fits else ""

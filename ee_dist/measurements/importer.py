@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.clocks import Clocked, check_grid
@@ -96,7 +97,7 @@ class _Import:
         except (KeyError, IndexError, ValueError, AttributeError):
             keys = ", ".join(self.header) or "none"
             raise MeasurementError(
-                f"{self.where}: trial: {self.mapping.trial!r} names an entry that the header of {self.report.file} "
+                f"{self.where}: trial: {quoted(self.mapping.trial)} names an entry that the header of {self.report.file} "
                 f"does not have; there are: {keys}"
             ) from None
 
@@ -145,7 +146,7 @@ class _Import:
         if np.isnan(raw).any():
             good = np.flatnonzero(np.isfinite(raw))
             if len(good) < 2:
-                raise MeasurementError(f"{own.table}: column {column.column!r}: nearly all cells are empty")
+                raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty")
             self.report.done.append(f"{name}: {len(raw) - len(good)} empty cells filled by straight lines")
             raw = np.interp(np.arange(len(raw)), good, raw[good])
         if column.signed_bits:
@@ -157,7 +158,7 @@ class _Import:
             )
         values = (column.sign * column.scale * raw + column.offset) * size
         if not np.isfinite(values).all():
-            raise MeasurementError(f"{own.table}: column {column.column!r}: too large a number to be {name}")
+            raise MeasurementError(f"{own.table}: column {quoted(column.column)}: too large a number to be {name}")
         if column.unwrap:
             values = np.unwrap(values)
         if not self._same_rows(own):
@@ -194,7 +195,7 @@ class _Import:
             if isinstance(column, Estimated):
                 if column.speed_of not in self.channels:
                     raise MeasurementError(
-                        f"{self.where}: sensors: {name}: speed_of: no channel {column.speed_of!r}; "
+                        f"{self.where}: sensors: {name}: speed_of: no channel {quoted(column.speed_of)}; "
                         f"{nearest(column.speed_of, self.channels)}"
                     )
                 low_pass = LowPass(column.cutoff_hz, column.order)
@@ -234,7 +235,7 @@ class _Import:
         on = self._column(self.mapping.enabled, "1", "enabled", True, quiet=True) > 0.5
         if not on.any():
             raise MeasurementError(
-                f"{self.where}: enabled: {self.mapping.enabled.column!r} is 0 in every row: the drives never obeyed"
+                f"{self.where}: enabled: {quoted(self.mapping.enabled.column)} is 0 in every row: the drives never obeyed"
             )
         if not on.all():
             commands[~on] = math.nan
@@ -278,7 +279,8 @@ class _Import:
                     entry = self.header.get(name)
                     if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not math.isfinite(entry):
                         raise MeasurementError(
-                            f"{self.report.file}: header entry {name!r} for {s.effect} is {entry!r}; expected a number"
+                            f"{self.report.file}: header entry {quoted(name)} for {s.effect} is {quoted(entry)}; "
+                            "expected a number"
                         )
                     value = float(entry) * scale
                 values[key] = value

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.readers.options import Options
 from ee_dist.measurements.units import UNITS
@@ -152,7 +153,7 @@ def mapping_of(data: Any, file: Path) -> Mapping:
         raise MeasurementError(f"{where}: expected a mapping with 'robot', 'time', 'sensors' and 'commands'")
     for key in data:
         if key not in _KEYS:
-            raise MeasurementError(f"{where}: unknown key {key!r}; {nearest(str(key), _KEYS)}")
+            raise MeasurementError(f"{where}: unknown key {quoted(key)}; {nearest(str(key), _KEYS)}")
     if "sensors" not in data:
         raise MeasurementError(f"{where}: missing key 'sensors'")
     sensors: dict[str, Column | Estimated] = {}
@@ -208,7 +209,7 @@ def _check_once(mapping: Mapping) -> None:
 
 def _same(mapping: Mapping, column: Column, one: tuple[str, str], two: tuple[str, str]) -> str:
     return (
-        f"{mapping.source}: column {column.column!r} is {one[0]} {one[1]} and also {two[0]} {two[1]}; "
+        f"{mapping.source}: column {quoted(column.column)} is {one[0]} {one[1]} and also {two[0]} {two[1]}; "
         "one column is one channel: name the right column for each, or leave out what was not recorded"
     )
 
@@ -222,7 +223,7 @@ def _check_files(mapping: Mapping) -> None:
         if "{trial}" not in clock.file:
             raise MeasurementError(
                 f"{mapping.source}: tables: {name}: file: expected a name with {{trial}} in it, such as "
-                f"'{{trial}}_{name}.csv', not {clock.file!r}"
+                f"'{{trial}}_{name}.csv', not {quoted(clock.file)}"
             )
     for group, name, c in mapping.columns():
         if c.table not in mapping.tables:
@@ -259,7 +260,9 @@ def _clock(value: Any, where: str) -> Clock:
         raise MeasurementError(f"{where}: expected {{file: ..., time: ..., offset_s: ...}}, not {shown(value)}")
     for key in entry:
         if key not in ("file", "time", "offset_s"):
-            raise MeasurementError(f"{where}: unknown key {key!r}; {nearest(str(key), ('file', 'time', 'offset_s'))}")
+            raise MeasurementError(
+                f"{where}: unknown key {quoted(key)}; {nearest(str(key), ('file', 'time', 'offset_s'))}"
+            )
     offset = entry.get("offset_s")
     return Clock(
         str(entry.get("file", "")),
@@ -308,13 +311,13 @@ def _column(value: Any, where: str, unit: str = "1") -> Column:
         value = {"column": value, "unit": unit}
     column: Column = _made(Column, value, where)
     if UNKNOWN in (column.column, column.unit):
-        raise MeasurementError(f"{where}: still {UNKNOWN!r}: fill in what only you can know")
+        raise MeasurementError(f"{where}: still {quoted(UNKNOWN)}: fill in what only you can know")
     if column.unit not in UNITS:
-        raise MeasurementError(f"{where}: no unit {column.unit!r}; {nearest(column.unit, UNITS)}")
+        raise MeasurementError(f"{where}: no unit {quoted(column.unit)}; {nearest(column.unit, UNITS)}")
     if column.sign not in (1.0, -1.0):
         raise MeasurementError(f"{where}: sign: expected 1 or -1, not {column.sign:g}")
     if column.gaps not in ("error", "interpolate"):
-        raise MeasurementError(f"{where}: gaps: expected 'error' or 'interpolate', not {column.gaps!r}")
+        raise MeasurementError(f"{where}: gaps: expected 'error' or 'interpolate', not {quoted(column.gaps)}")
     if column.scale == 0:
         raise MeasurementError(f"{where}: scale: 0 makes every value the same; expected another number")
     if not 0 <= column.signed_bits <= 64:
@@ -348,7 +351,7 @@ def _made(kind: Any, value: Any, where: str) -> Any:
     made: dict[str, Any] = {}
     for key, entry in value.items():
         if key not in known:
-            raise MeasurementError(f"{where}: unknown key {key!r}; {nearest(str(key), known)}")
+            raise MeasurementError(f"{where}: unknown key {quoted(key)}; {nearest(str(key), known)}")
         default = known[key].default
         if isinstance(default, bool):
             if not isinstance(entry, bool):
@@ -365,7 +368,7 @@ def _made(kind: Any, value: Any, where: str) -> Any:
             raise MeasurementError(f"{where}: {key}: cannot be {shown(entry)}")
     first = fields(kind)[0].name
     if first not in made:
-        raise MeasurementError(f"{where}: missing key {first!r}")
+        raise MeasurementError(f"{where}: missing key {quoted(first)}")
     return kind(**made)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Mapping
 from ee_dist.robots import ranges
@@ -40,16 +41,18 @@ def check_names(mapping: Mapping, robot: Robot) -> None:
     ):
         for name in names:
             if name not in allowed:
-                raise MeasurementError(f"{where}: {group}: {robot.name} has no {name!r}; {nearest(name, allowed)}")
+                raise MeasurementError(
+                    f"{where}: {group}: {robot.name} has no {quoted(name)}; {nearest(name, allowed)}"
+                )
     for group, names in (("commands", mapping.commands), ("torques", mapping.torques)):
         driven = command_units(robot) if group == "commands" else motors
         missing = [m for m in driven if m not in names]
         # A log without any command is of use to a balance of forces, which needs the torques.
         if missing and (names or (group == "commands" and not mapping.torques)):
-            raise MeasurementError(f"{where}: {group}: no column for joint {missing[0]!r} of {robot.name}")
+            raise MeasurementError(f"{where}: {group}: no column for joint {quoted(missing[0])} of {robot.name}")
     absent = [s for s in robot.sensor_names if s not in mapping.sensors]
     if absent:
         raise MeasurementError(
-            f"{where}: sensors: no column for {absent[0]!r} of {robot.name}; add one, or for a speed 'speed_of: <position>', "
-            "or take the sensor out of the robot's description"
+            f"{where}: sensors: no column for {quoted(absent[0])} of {robot.name}; add one, or for a speed "
+            "'speed_of: <position>', or take the sensor out of the robot's description"
         )

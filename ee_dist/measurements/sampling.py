@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy import signal
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.table import Table
 from ee_dist.trials.log import Array
@@ -45,7 +47,7 @@ def check_times(times_s: Array, table: Table, column: str) -> Timing:
         first = float(np.median(np.abs(steps)))
         several = "; several trials in one file? add 'split: restarts'" if steps[row - 1] < -10 * first else ""
         raise MeasurementError(
-            f"{table}: row {table.line(row)}, column {column!r}: time {how} "
+            f"{table}: row {table.line(row)}, column {quoted(column)}: time {how} "
             f"({times_s[row - 1]:.9g} s, then {times_s[row]:.9g} s){several}"
         )
     median = float(np.median(steps))
@@ -115,6 +117,12 @@ class LowPass:
         return np.gradient(self(positions, step_s), step_s)
 
 
+@lru_cache(maxsize=16)
+def _anti_alias(keep_every: int) -> tuple[Array, Array]:
+    b, a = signal.cheby1(8, 0.05, 0.8 / keep_every)
+    return b, a
+
+
 def decimated(values: Array, keep_every: int) -> Array:
     """Every n-th sample after an anti-alias filter (Chebyshev I, order 8, 0.05 dB, at 0.8 of the new Nyquist frequency,
     forward and backward), along the first axis; the last sample is kept when n divides the length.
@@ -123,7 +131,7 @@ def decimated(values: Array, keep_every: int) -> Array:
     """
     if keep_every <= 1:
         return values
-    b, a = signal.cheby1(8, 0.05, 0.8 / keep_every)
+    b, a = _anti_alias(keep_every)
     smooth = signal.filtfilt(b, a, values, axis=0, padlen=min(len(values) - 1, 3 * 8))
     first = keep_every - (keep_every * int(np.ceil(len(values) / keep_every)) - len(values)) - 1
     return np.asarray(smooth[first::keep_every])

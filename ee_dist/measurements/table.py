@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.trials.log import Array
 
@@ -93,7 +94,7 @@ class Table:
         if column in self.twice:
             places = [f"'#{i + 1}'" for i, c in enumerate(self.columns) if c == column or c.startswith(f"{column} #")]
             raise MeasurementError(
-                f"{self}: {len(places)} columns are named {column!r}; say which: {' or '.join(places)}"
+                f"{self}: {len(places)} columns are named {quoted(column)}; say which: {' or '.join(places)}"
             )
         cells = self._cells(column)
         out = self._floats(cells, column)
@@ -102,12 +103,12 @@ class Table:
             raw = cells[int(bad[0])]
             known = "empty" if raw is None or raw == "" else f"{raw}"
             raise MeasurementError(
-                f"{self}: row {self.line(int(bad[0]))}, column {column!r} is {known}; "
+                f"{self}: row {self.line(int(bad[0]))}, column {quoted(column)} is {known}; "
                 "fill the gap, drop the row, or set 'gaps: interpolate' for the column"
             )
         if np.isinf(out).any():
             row = int(np.flatnonzero(np.isinf(out))[0])
-            raise MeasurementError(f"{self}: row {self.line(row)}, column {column!r} is infinite; drop the row")
+            raise MeasurementError(f"{self}: row {self.line(row)}, column {quoted(column)} is infinite; drop the row")
         return out
 
     def texts(self, column: str) -> list[str]:
@@ -122,7 +123,7 @@ class Table:
             width = self._width(column, cells)
             if width is not None:
                 raise MeasurementError(
-                    f"{self}: column {column!r} holds {width} numbers in each row; say which, such as "
+                    f"{self}: column {quoted(column)} holds {width} numbers in each row; say which, such as "
                     f"'{column}[{(self.parts.get(column) or ('0',))[0]}]'"
                 )
             return cells
@@ -131,14 +132,14 @@ class Table:
         found = _PLACE.match(column)
         if found and found["name"] in self.columns:
             return self._inside(found["name"], found["part"])
-        raise MeasurementError(f"{self}: no column {column!r}; {nearest(column, self.addresses())}")
+        raise MeasurementError(f"{self}: no column {quoted(column)}; {nearest(column, self.addresses())}")
 
     def _inside(self, name: str, part: str) -> Any:
         cells, named = self.columns[name], self.parts.get(name, ())
         width = self._width(name, cells)
         if width is None:
             raise MeasurementError(
-                f"{self}: column {name!r} holds one number in each row, not a list: leave out [{part}]"
+                f"{self}: column {quoted(name)} holds one number in each row, not a list: leave out [{part}]"
             )
         if part in named:
             place = named.index(part)
@@ -146,7 +147,7 @@ class Table:
             place = int(part)
         else:
             there = ", ".join(named) if named else f"[0] to [{width - 1}]"
-            raise MeasurementError(f"{self}: column {name!r} has no [{part}]; there are: {there}")
+            raise MeasurementError(f"{self}: column {quoted(name)} has no [{part}]; there are: {there}")
         if isinstance(cells, np.ndarray):
             return cells[:, place]
         out: list[Any] = []
@@ -154,7 +155,7 @@ class Table:
             inner = _listed(cell)
             if inner is None or place >= len(inner):
                 has = "is no list" if inner is None else f"holds {len(inner)} numbers, so there is no [{part}]"
-                raise MeasurementError(f"{self}: row {self.line(row)}, column {name!r} {has}")
+                raise MeasurementError(f"{self}: row {self.line(row)}, column {quoted(name)} {has}")
             out.append(inner[place])
         return out
 
@@ -170,7 +171,9 @@ class Table:
         if isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiub":
             return cells.astype(np.float64)
         if isinstance(cells, np.ndarray) and cells.ndim > 1:
-            raise MeasurementError(f"{self}: column {column!r} has the shape {cells.shape}; expected (T,) or (T, n)")
+            raise MeasurementError(
+                f"{self}: column {quoted(column)} has the shape {cells.shape}; expected (T,) or (T, n)"
+            )
         try:
             return np.array(cells, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
@@ -182,7 +185,7 @@ class Table:
             except (TypeError, ValueError, OverflowError):
                 comma = "; a decimal comma? add 'decimal: \",\"'" if _COMMA.match(str(value)) else ""
                 raise MeasurementError(
-                    f"{self}: row {self.line(i)}, column {column!r}: {str(value)[:40]!r} is not a number{comma}"
+                    f"{self}: row {self.line(i)}, column {quoted(column)}: {quoted(str(value))} is not a number{comma}"
                 ) from None
         return out
 
@@ -212,5 +215,5 @@ class Recorded:
             if t.name == name:
                 return t
         raise MeasurementError(
-            f"{where}: no table {name!r} in {self.tables[0].path}; {nearest(name, [t.name for t in self.tables])}"
+            f"{where}: no table {quoted(name)} in {self.tables[0].path}; {nearest(name, [t.name for t in self.tables])}"
         )

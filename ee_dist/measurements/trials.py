@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Clock, Mapping
 from ee_dist.measurements.readers import read
@@ -59,7 +60,8 @@ def _split(recorded: Recorded, mapping: Mapping) -> list[Recorded]:
         if len(set(labels)) < len(labels):
             again = next(v for k, v in enumerate(labels) if v in labels[:k])
             raise MeasurementError(
-                f"{table}: column {mapping.split.column!r} comes back to {again!r}; the rows of a trial must stand together"
+                f"{table}: column {quoted(mapping.split.column)} comes back to {quoted(again)}; "
+                "the rows of a trial must stand together"
             )
     if len(first) > len(table) / FEWEST_ROWS:
         raise MeasurementError(
@@ -90,7 +92,7 @@ def _joined(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
             if found:
                 several = read(file, mapping.reading)
                 if len(several) > 1 or len(several[0].tables) > 1:
-                    raise MeasurementError(f"{file}: holds several tables or trials; expected one for {name!r}")
+                    raise MeasurementError(f"{file}: holds several tables or trials; expected one for {quoted(name)}")
                 trial = found["trial"]
                 tables.setdefault(trial, {})[name] = replace(several[0].tables[0], name=name)
                 break
@@ -103,8 +105,8 @@ def _joined(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
             if name not in parts:
                 there = next(iter(parts.values())).path
                 raise MeasurementError(
-                    f"{there}: its other half is missing: no {clock.file.replace('{trial}', trial)} beside it for {name!r}; "
-                    "name the folder, or both files"
+                    f"{there}: its other half is missing: no {clock.file.replace('{trial}', trial)} beside it "
+                    f"for {quoted(name)}; name the folder, or both files"
                 )
         out.append(Recorded(trial.strip("_- .") or trial or "trial", tuple(parts[n] for n in mapping.tables)))
     return out

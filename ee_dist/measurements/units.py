@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError, nearest
 
 TURN = 2 * math.pi
@@ -48,7 +49,7 @@ UNITS: dict[str, tuple[str, float]] = {
 def factor(unit: str, expected: str, where: str) -> float:
     """What to multiply by to get from ``unit`` to ``expected``. Raises MeasurementError for a unit of something else."""
     if unit not in UNITS:
-        raise MeasurementError(f"{where}: no unit {unit!r}; {nearest(unit, UNITS)}")
+        raise MeasurementError(f"{where}: no unit {quoted(unit)}; {nearest(unit, UNITS)}")
     kind, size = UNITS[unit]
     wanted, base = UNITS[expected]
     if kind != wanted:
@@ -58,5 +59,5 @@ def factor(unit: str, expected: str, where: str) -> float:
                 f"with the {expected} of one {unit}"
             )
         fitting = ", ".join(u for u, (k, _) in UNITS.items() if k == wanted)
-        raise MeasurementError(f"{where}: unit {unit!r} is a unit of {kind}; expected one of {wanted}: {fitting}")
+        raise MeasurementError(f"{where}: unit {quoted(unit)} is a unit of {kind}; expected one of {wanted}: {fitting}")
     return size / base

@@ -9,6 +9,8 @@ from typing import Any
 
 import yaml
 
+from ee_dist.basics.quoted import quoted
+
 shown = reprlib.repr
 """A value in an error message: short, however deep or often aliased the value is."""
 
@@ -20,7 +22,9 @@ class _Loader(yaml.SafeLoader):
             name = str(getattr(key, "value", key))
             if name in seen and name != "<<":
                 line = key.start_mark.line + 1
-                raise yaml.constructor.ConstructorError(None, None, f"the key {name!r} stands twice (line {line})")
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key {quoted(name)} stands twice (line {line})"
+                )
             seen.add(name)
         return super().construct_mapping(node, deep)
 

@@ -21,6 +21,7 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, McapRecord
 from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError, frame_content_size
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.recording import topics
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.untrusted import UntrustedError, check_file
@@ -89,7 +90,7 @@ def _read(path: Path, file: BinaryIO, size: int) -> Contents:
     if not isinstance(header, Header) or header.profile != topics.PROFILE:
         shown = header.profile if isinstance(header, Header) else ""
         raise RecordingError(
-            f"{path}: an MCAP file of something else (profile {shown!r}); expected profile {topics.PROFILE!r}"
+            f"{path}: an MCAP file of something else (profile {quoted(shown)}); expected profile {quoted(topics.PROFILE)}"
         )
     found = Contents()
     names: dict[int, str] = {}
@@ -136,7 +137,7 @@ def _read(path: Path, file: BinaryIO, size: int) -> Contents:
 def _unpacked_size(chunk: Chunk) -> int:
     """Bytes that a chunk will take. Raises ValueError where it is packed as none of ours is, or claims too much."""
     if chunk.compression not in ("", "zstd"):
-        raise ValueError(f"compression {chunk.compression!r}")
+        raise ValueError(f"compression {quoted(chunk.compression)}")
     size = int(chunk.uncompressed_size)
     if chunk.compression:
         size = max(size, frame_content_size(chunk.data))

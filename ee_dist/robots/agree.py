@@ -9,7 +9,9 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.names import listed
 from ee_dist.robots.describe import READERS
+from ee_dist.robots.instruments import MOTOR_TORQUE
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.texts import read_text
 
@@ -61,9 +63,11 @@ def _shown(value: Any) -> str:
 def agreed(model: Robot, recorded: Robot, where: str) -> tuple[Robot, tuple[str, ...]]:
     """The robot to compare with a log: the ``model``'s, with the noise that the recorded robot's sensors have.
 
-    And what it has otherwise than the log, for people. Raises RobotError where the two cannot be one robot: other joints,
+    Meters of motor torque that only the log has are added: they say nothing of the robot. And what it has otherwise than the
+    log, for people. Raises RobotError where the two cannot be one robot: other joints,
     sensors, units, commands or time step.
     """
+    model = _instrumented(model, recorded)
     for what, mine, theirs in (
         ("drives", model.motor_names, recorded.motor_names),
         ("sensors", model.sensor_names, recorded.sensor_names),
@@ -73,12 +77,17 @@ def agreed(model: Robot, recorded: Robot, where: str) -> tuple[Robot, tuple[str,
     ):
         if list(mine) != list(theirs):
             raise RobotError(
-                f"{where}: the {what} of {model.name} are not those of the log: {', '.join(mine)}; the log has "
-                f"{', '.join(theirs)}"
+                f"{where}: the {what} of {model.name} are not those of the log: {listed(mine)}; the log has "
+                f"{listed(theirs)}"
             )
     noise = {s.name: {n: getattr(s, n) for n in OF_THE_MEASUREMENT} for s in recorded.sensors}
     sensors = tuple(replace(s, **noise[s.name]) for s in model.sensors)
     return replace(model, sensors=sensors), differences(model, recorded)
+
+
+def _instrumented(model: Robot, recorded: Robot) -> Robot:
+    more = tuple(s for s in recorded.sensors if s.kind == MOTOR_TORQUE and s.name not in model.sensor_names)
+    return replace(model, sensors=(*model.sensors, *more)) if more else model
 
 
 def source_digests(source: Any, folder: str | Path = ".") -> dict[str, str]:

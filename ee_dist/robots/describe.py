@@ -26,6 +26,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.described import KEYS, near, robot_of_body
 from ee_dist.robots.linear_stage import linear_stage
@@ -63,7 +64,7 @@ def load_robot(source: str | Path | Mapping[str, Any], folder: str | Path = ".")
         return _described({kind_of(path): str(path)}, Path("."), str(path))
     if path.suffix.lower() in (".yaml", ".yml", ".json"):
         return _described(_yaml(path), path.parent, str(path))
-    raise RobotError(f"no robot named {text!r}; there are: {', '.join(BUILT_IN)}, or a file (.urdf, .xml, .yaml)")
+    raise RobotError(f"no robot named {quoted(text)}; there are: {', '.join(BUILT_IN)}, or a file (.urdf, .xml, .yaml)")
 
 
 def kind_of(path: Path) -> str:
@@ -96,9 +97,12 @@ def _described(data: Mapping[str, Any], folder: Path, where: str) -> tuple[Robot
     for kind in READERS:
         if kind in data:
             return _of_file(kind, data, folder, where)
-    name = str(data.get("robot", ""))
+    named = data.get("robot", "")
+    name = named if isinstance(named, str) else ""
     if name not in BUILT_IN:
-        raise RobotError(f"{where}: no robot named {name!r}; {near(name, tuple(BUILT_IN))}, or give 'urdf' or 'mjcf'")
+        raise RobotError(
+            f"{where}: no robot named {quoted(named)}; {near(name, tuple(BUILT_IN))}, or give 'urdf' or 'mjcf'"
+        )
     make = BUILT_IN[name]
     allowed = tuple(inspect.signature(make).parameters)
     numbers = {}
@@ -106,7 +110,7 @@ def _described(data: Mapping[str, Any], folder: Path, where: str) -> tuple[Robot
         if key == "robot":
             continue
         if key not in allowed:
-            raise RobotError(f"{where}: {name} has no {key!r}; {near(str(key), allowed)}")
+            raise RobotError(f"{where}: {name} has no {quoted(key)}; {near(str(key), allowed)}")
         numbers[str(key)] = number(value, f"{where}: {key}")
         if key.endswith("samples"):
             numbers[str(key)] = int(numbers[str(key)])
@@ -116,7 +120,7 @@ def _described(data: Mapping[str, Any], folder: Path, where: str) -> tuple[Robot
 def _of_file(kind: str, data: Mapping[str, Any], folder: Path, where: str) -> tuple[Robot, tuple[str, ...]]:
     for key in data:
         if key not in (kind, *KEYS):
-            raise RobotError(f"{where}: unknown key {key!r}; {near(str(key), (kind, *KEYS))}")
+            raise RobotError(f"{where}: unknown key {quoted(key)}; {near(str(key), (kind, *KEYS))}")
     return robot_of_body(read_body(kind, folder / str(data[kind])), data, where)
 
 

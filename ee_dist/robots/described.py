@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ee_dist.basics.names import did_you_mean
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.model import COMMANDS, Drive, Joint, Robot, RobotError, Sensor, Wiring, World
 from ee_dist.robots.numbers import checked, number
@@ -27,6 +28,7 @@ SENSOR_KINDS = (
     "position",
     "velocity",
     "torque",
+    "motor_torque",
     "height",
     "roll",
     "pitch",
@@ -42,7 +44,10 @@ UNITS = {
     ("velocity", "slide"): "m/s",
     ("torque", "hinge"): "N.m",
     ("torque", "slide"): "N",
+    ("motor_torque", "hinge"): "N.m",
+    ("motor_torque", "slide"): "N",
 }
+OF_JOINT = ("angle", *dict.fromkeys(kind for kind, _ in UNITS))
 TIME_STEP_S = 0.002
 GRAVITY_M_S2 = 9.81
 
@@ -59,13 +64,13 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     sensors = body.sensors if given is None and body.sensors else _sensors(given, driven, body, where)
     free = data.get("free_base", bool(body.free_base))
     if not isinstance(free, bool):
-        raise RobotError(f"{where}: free_base: expected true or false, not {free!r}")
+        raise RobotError(f"{where}: free_base: expected true or false, not {quoted(free)}")
     floor = data.get("has_floor", free if body.has_floor is None else body.has_floor)
     if not isinstance(floor, bool):
-        raise RobotError(f"{where}: has_floor: expected true or false, not {floor!r}")
+        raise RobotError(f"{where}: has_floor: expected true or false, not {quoted(floor)}")
     start = data.get("start_position_m", body.start_position_m)
     if not isinstance(start, (list, tuple)) or len(start) != 3:
-        raise RobotError(f"{where}: start_position_m: expected three numbers, not {start!r}")
+        raise RobotError(f"{where}: start_position_m: expected three numbers, not {quoted(start)}")
     gravity = GRAVITY_M_S2 if body.gravity_m_s2 is None else body.gravity_m_s2
     step = TIME_STEP_S if body.time_step_s is None else body.time_step_s
     notes = list(body.notes)
@@ -73,7 +78,7 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     if passive:
         notes.append(f"joints without a drive swing freely: {', '.join(passive)}")
     if free and body.root_without_mass:
-        notes.append(f"the base {body.parts[0].name!r} has no mass in the file: 1 kg is assumed")
+        notes.append(f"the base {quoted(body.parts[0].name)} has no mass in the file: 1 kg is assumed")
     robot = Robot(
         name=str(data.get("name", body.name)),
         parts=body.parts,
@@ -94,20 +99,20 @@ def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:
     """Drives of the joints that the description or the file itself gives one, in the order of the joints."""
     given = {} if data is None else data
     if not isinstance(given, Mapping):
-        raise RobotError(f"{where}: drives: expected 'joint: {{kp: ...}}', not {data!r}")
+        raise RobotError(f"{where}: drives: expected 'joint: {{kp: ...}}', not {quoted(data)}")
     moving = tuple(j.name for j in body.moving)
     known = tuple(f.name for f in fields(Drive) if f.name != "joint")
     for name, entry in given.items():
         here = f"{where}: drives: {name}"
         if name not in moving:
-            raise RobotError(f"{where}: drives: no moving joint named {name!r}; {near(str(name), moving)}")
+            raise RobotError(f"{where}: drives: no moving joint named {quoted(name)}; {near(str(name), moving)}")
         if not isinstance(entry, Mapping):
             raise RobotError(f"{here}: expected at least 'kp' (torque per position error) or 'command: torque'")
         for key in entry:
             if key not in known:
-                raise RobotError(f"{here}: unknown key {key!r}; {near(str(key), known)}")
+                raise RobotError(f"{here}: unknown key {quoted(key)}; {near(str(key), known)}")
         if entry.get("command", "position") not in COMMANDS:
-            raise RobotError(f"{here}: command: {entry['command']!r}; expected one of {', '.join(COMMANDS)}")
+            raise RobotError(f"{here}: command: {quoted(entry['command'])}; expected one of {', '.join(COMMANDS)}")
     return tuple(
         _drive(name, given.get(name) or {}, body.drives.get(name, {}), where)
         for name in moving
@@ -139,7 +144,7 @@ def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Se
             for j in driven
         )
     if not isinstance(data, list):
-        raise RobotError(f"{where}: sensors: expected a list of {{name, kind, target}}, not {data!r}")
+        raise RobotError(f"{where}: sensors: expected a list of {{name, kind, target}}, not {quoted(data)}")
     known = tuple(f.name for f in fields(Sensor))
     joints = {j.name: j for j in driven}
     parts = tuple(p.name for p in body.parts)
@@ -147,19 +152,17 @@ def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Se
     for i, entry in enumerate(data):
         here = f"{where}: sensors[{i}]"
         if not isinstance(entry, Mapping) or not {"name", "kind"} <= set(entry):
-            raise RobotError(f"{here}: expected {{name, kind, target}}, not {entry!r}")
+            raise RobotError(f"{here}: expected {{name, kind, target}}, not {quoted(entry)}")
         for key in entry:
             if key not in known:
-                raise RobotError(f"{here}: unknown key {key!r}; {near(str(key), known)}")
+                raise RobotError(f"{here}: unknown key {quoted(key)}; {near(str(key), known)}")
         kind, target = str(entry["kind"]), str(entry.get("target", ""))
         if kind not in SENSOR_KINDS:
-            raise RobotError(f"{here}: no sensor kind {kind!r}; {near(kind, SENSOR_KINDS)}")
-        allowed = (
-            parts if kind == "touch" else tuple(joints) if kind in ("angle", "position", "velocity", "torque") else None
-        )
+            raise RobotError(f"{here}: no sensor kind {quoted(kind)}; {near(kind, SENSOR_KINDS)}")
+        allowed = parts if kind == "touch" else tuple(joints) if kind in OF_JOINT else None
         if allowed is not None and target not in allowed:
             what = "part" if kind == "touch" else "driven joint"
-            raise RobotError(f"{here}: no {what} named {target!r}; {near(target, allowed)}")
+            raise RobotError(f"{here}: no {what} named {quoted(target)}; {near(target, allowed)}")
         unit = str(entry.get("unit", UNITS.get((kind, joints[target].kind if target in joints else ""), "1")))
         numbers = {
             str(k): number(v, f"{here}: {k}") for k, v in entry.items() if k not in ("name", "kind", "target", "unit")

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.model import Joint, Robot, RobotError
 
 Array = NDArray[np.float64]
@@ -172,7 +173,9 @@ def _parents_first(robot: Robot) -> list[Joint]:
     while waiting:
         ready = [j for j in waiting if j.parent in placed]
         if not ready:
-            raise RobotError(f"joint {waiting[0].name!r} hangs on {waiting[0].parent!r}, which no joint carries")
+            raise RobotError(
+                f"joint {quoted(waiting[0].name)} hangs on {quoted(waiting[0].parent)}, which no joint carries"
+            )
         order += ready
         placed |= {j.child for j in ready}
         waiting = [j for j in waiting if j.child not in placed]

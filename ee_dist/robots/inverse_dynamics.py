@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.model import Joint, Robot, RobotError
 
@@ -65,9 +66,25 @@ def rotors(robot: Robot) -> Array:
     return np.array([d.rotor_inertia for d in robot.drives])
 
 
+def geometry(robot: Robot) -> tuple[object, ...]:
+    """What a ``regressor`` depends on beside motion and gravity: equal for robots that share one."""
+    placed = tuple((j.name, j.kind, j.parent, j.child, j.position_m, j.rotation, j.axis) for j in robot.present_joints)
+    return robot.root.name, robot.start_rotation, robot.motor_names, placed
+
+
+def gravity_regressor(robot: Robot, position: Array) -> Array:
+    """(3, T, M, 10 P): what gravity of 1 m/s^2 along x, y and z of the floor adds to a ``regressor``, which is linear in it."""
+    still = np.zeros_like(position)
+    down = robot.with_world(gravity_m_s2=1.0, tilt_x_rad=0.0, tilt_y_rad=0.0)
+    # gravity() points along -z without a tilt, along x and along -y with a quarter of a turn about y and about x.
+    along = (down.with_world(tilt_y_rad=math.pi / 2), down.with_world(tilt_x_rad=math.pi / 2), down)
+    signs = (1.0, -1.0, -1.0)
+    return np.stack([s * regressor(r, position, still, still) for s, r in zip(signs, along, strict=True)])
+
+
 def regressor(robot: Robot, position: Array, speed: Array, acceleration: Array) -> Array:
     """(T, M, 10 P): what each of the ``parameters`` adds to the torques, which are linear in them (Atkeson, An, Hollerbach
-    1986). It depends on the robot's geometry and gravity only. Raises RobotError as ``joint_torques`` does."""
+    1986). It depends on the robot's ``geometry`` and gravity only. Raises RobotError as ``joint_torques`` does."""
     if robot.free_base:
         raise RobotError(
             f"{robot.name}: its base moves freely: the torques of its joints alone do not decide its motion"
@@ -75,7 +92,7 @@ def regressor(robot: Robot, position: Array, speed: Array, acceleration: Array) 
     column = {d.joint: k for k, d in enumerate(robot.drives)}
     for j in robot.present_joints:
         if j.kind != "fixed" and j.name not in column:
-            raise RobotError(f"{robot.name}: joint {j.name!r} has no drive, so its motion was not measured")
+            raise RobotError(f"{robot.name}: joint {quoted(j.name)} has no drive, so its motion was not measured")
     course = course_of(robot, position, speed, acceleration)
     carrier = {j.child: j for j in course.order}
     out = np.zeros((*acceleration.shape, 10 * len(course.order)))
@@ -159,7 +176,7 @@ def _parents_first(robot: Robot) -> list[Joint]:
         ready = [j for j in waiting if j.parent in placed]
         if not ready:
             raise RobotError(
-                f"{robot.name}: joint {waiting[0].name!r} hangs on {waiting[0].parent!r}, which no joint carries"
+                f"{robot.name}: joint {quoted(waiting[0].name)} hangs on {quoted(waiting[0].parent)}, which no joint carries"
             )
         order += ready
         placed |= {j.child for j in ready}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.model import Joint, Robot
 
 Array = NDArray[np.float64]
@@ -61,7 +62,9 @@ def part_poses(robot: Robot, base_pose: Array, joints: Array) -> dict[str, Array
     while waiting:
         ready = [j for j in waiting if j.parent in poses]
         if not ready:
-            raise ValueError(f"joint {waiting[0].name!r} hangs on {waiting[0].parent!r}, which no joint carries")
+            raise ValueError(
+                f"joint {quoted(waiting[0].name)} hangs on {quoted(waiting[0].parent)}, which no joint carries"
+            )
         for joint in ready:
             position = joints[:, column[joint.name]] if joint.name in column else np.zeros(rows)
             poses[joint.child] = compose(poses[joint.parent], joint_pose(joint, position))

@@ -16,6 +16,9 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
+from ee_dist.basics.names import listed
+from ee_dist.basics.quoted import quoted
+
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
 """Unit quaternion, scalar last (x, y, z, w)."""
@@ -146,7 +149,9 @@ DRIVE_NUMBERS = tuple(f.name for f in fields(Drive) if f.name not in ("joint", "
 @dataclass(frozen=True)
 class Sensor:
     """One channel. ``kind``: touch (of a part), angle (scaled to [-1, 1] by the joint's range), position, velocity,
-    torque (of a joint), height or tilt of the root part."""
+    torque (of a joint: what moves it, friction taken off), motor_torque (what the motor's current stands for, friction and
+    all that comes after the motor left in), height or tilt of the root part. Torques are those of the step before the
+    reading."""
 
     name: str
     kind: str
@@ -329,8 +334,8 @@ def _find(items: tuple[Any, ...], key: str, value: str, what: str) -> Any:
     for item in items:
         if getattr(item, key) == value:
             return item
-    names = ", ".join(getattr(item, key) for item in items)
-    raise RobotError(f"no {what} named {value!r}; there are: {names}")
+    names = listed(getattr(item, key) for item in items)
+    raise RobotError(f"no {what} named {quoted(value)}; there are: {names}")
 
 
 def _changed(items: tuple[Any, ...], key: str, value: str, what: str, changes: dict[str, Any]) -> tuple[Any, ...]:

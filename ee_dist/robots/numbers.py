@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.model import COMMANDS, DRIVE_NUMBERS, Robot, RobotError
 
 Bounds = tuple[float, float]
@@ -54,9 +55,9 @@ def number(value: Any, where: str) -> float:
         try:
             value = float(value)
         except ValueError:
-            raise RobotError(f"{where}: expected a number, not {value!r}") from None
+            raise RobotError(f"{where}: expected a number, not {quoted(value)}") from None
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise RobotError(f"{where}: expected a number, not {value!r}")
+        raise RobotError(f"{where}: expected a number, not {quoted(value)}")
     try:
         return float(value)
     except OverflowError:
@@ -73,12 +74,12 @@ def checked(robot: Robot, where: str) -> Robot:
             "(seconds, not milliseconds)"
         )
     for p in robot.parts:
-        _within(p.mass_kg, AT_LEAST_0, f"{where}: part {p.name!r}: mass_kg")
+        _within(p.mass_kg, AT_LEAST_0, f"{where}: part {quoted(p.name)}: mass_kg")
         for what, values in (("com_m", p.com_m), ("inertia_kg_m2", p.inertia_kg_m2)):
             for v in values:
-                _within(v, ANY, f"{where}: part {p.name!r}: {what}")
+                _within(v, ANY, f"{where}: part {quoted(p.name)}: {what}")
     for j in robot.joints:
-        here = f"{where}: joint {j.name!r}"
+        here = f"{where}: joint {quoted(j.name)}"
         for v in (*j.position_m, *j.axis, *j.rotation):
             _within(v, ANY, f"{here}: place or axis")
         if j.kind != "fixed" and not (j.lower < j.upper and any(j.axis)):
@@ -89,7 +90,7 @@ def checked(robot: Robot, where: str) -> Robot:
     for d in robot.drives:
         here = f"{where}: drives: {d.joint}"
         if d.command not in COMMANDS:
-            raise RobotError(f"{here}: command: {d.command!r}; expected one of {', '.join(COMMANDS)}")
+            raise RobotError(f"{here}: command: {quoted(d.command)}; expected one of {', '.join(COMMANDS)}")
         for name, bounds in DRIVE.items():
             _within(getattr(d, name), bounds, f"{here}: {name}")
     for s in robot.sensors:
@@ -123,25 +124,25 @@ def _connected(robot: Robot, where: str) -> None:
     ):
         for name in names:
             if names.count(name) > 1:
-                raise RobotError(f"{where}: {what}: two are named {name!r}")
+                raise RobotError(f"{where}: {what}: two are named {quoted(name)}")
     parts = {p.name for p in robot.parts}
     children = [j.child for j in robot.joints]
     for j in robot.joints:
         for end in (j.parent, j.child):
             if end not in parts:
-                raise RobotError(f"{where}: joint {j.name!r}: no part named {end!r}")
+                raise RobotError(f"{where}: joint {quoted(j.name)}: no part named {quoted(end)}")
         if children.count(j.child) > 1:
-            raise RobotError(f"{where}: part {j.child!r} hangs on two joints")
+            raise RobotError(f"{where}: part {quoted(j.child)} hangs on two joints")
     reached = set(robot.subtree(robot.root.name)) if robot.root.name not in children else set()
     if reached != parts:
         lost = next(p.name for p in robot.parts if p.name not in reached)
         raise RobotError(
-            f"{where}: part {lost!r} does not hang on the root {robot.root.name!r}: the joints form a loop"
+            f"{where}: part {quoted(lost)} does not hang on the root {quoted(robot.root.name)}: the joints form a loop"
         )
     moving = {j.name for j in robot.joints if j.kind != "fixed"}
     for d in robot.drives:
         if d.joint not in moving:
-            raise RobotError(f"{where}: drives: no moving joint named {d.joint!r}")
+            raise RobotError(f"{where}: drives: no moving joint named {quoted(d.joint)}")
     if len(robot.wiring.source) != len(robot.drives) or any(
         not 0 <= k < len(robot.drives) for k in robot.wiring.source
     ):

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 
+from ee_dist.basics.names import listed
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.model import Drive, Joint, Robot, RobotError
 
@@ -21,7 +23,7 @@ def drive_of(robot: Robot, joint: str) -> Drive:
     for d in robot.drives:
         if d.joint == joint:
             return d
-    raise RobotError(f"no drive named {joint!r}; there are: {', '.join(robot.motor_names)}")
+    raise RobotError(f"no drive named {quoted(joint)}; there are: {listed(robot.motor_names)}")
 
 
 def span(joint: Joint) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.untrusted import UntrustedError, json_of
 
@@ -34,10 +35,10 @@ def robot_to_dict(robot: Robot) -> dict[str, Any]:
 def robot_from_dict(data: Any) -> Robot:
     """The robot that ``robot_to_dict`` was given. Raises RobotFormatError."""
     if not isinstance(data, Mapping):
-        raise RobotFormatError(f"robot: expected a mapping with 'version' and 'robot', not {_shown(data)}")
+        raise RobotFormatError(f"robot: expected a mapping with 'version' and 'robot', not {quoted(data)}")
     _check_keys(data, required={"version", "robot"}, allowed={"version", "robot"}, where="file")
     if data["version"] != VERSION:
-        raise RobotFormatError(f"version: expected {VERSION}, not {_shown(data['version'])}")
+        raise RobotFormatError(f"version: expected {VERSION}, not {quoted(data['version'])}")
     return cast(Robot, _build(Robot, data["robot"], "robot"))
 
 
@@ -78,7 +79,7 @@ def _build(kind: Any, value: Any, where: str) -> Any:
     if is_dataclass(kind):
         types, required = _fields_of(cast(type, kind))
         if not isinstance(value, Mapping):
-            raise RobotFormatError(f"{where}: expected a mapping, not {_shown(value)}")
+            raise RobotFormatError(f"{where}: expected a mapping, not {quoted(value)}")
         _check_keys(value, required, types.keys(), where)
         return cast(type, kind)(**{k: _build(types[k], v, f"{where}.{k}") for k, v in value.items()})
     if get_origin(kind) is tuple:
@@ -95,13 +96,13 @@ def _build(kind: Any, value: Any, where: str) -> Any:
         raise TypeError(f"{where}: no rule for a field of type {kind}")
     if not accepted:
         expected = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}[kind]
-        raise RobotFormatError(f"{where}: expected {expected}, not {_shown(value)}")
+        raise RobotFormatError(f"{where}: expected {expected}, not {quoted(value)}")
     return value
 
 
 def _build_tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
     if not isinstance(value, (list, tuple)):
-        raise RobotFormatError(f"{where}: expected a list, not {_shown(value)}")
+        raise RobotFormatError(f"{where}: expected a list, not {quoted(value)}")
     if len(kinds) == 2 and kinds[1] is Ellipsis:
         kinds = (kinds[0],) * len(value)
     if len(value) != len(kinds):
@@ -112,13 +113,7 @@ def _build_tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, .
 def _check_keys(value: Mapping[Any, Any], required: Any, allowed: Any, where: str) -> None:
     unknown = [k for k in value if k not in allowed]
     if unknown:
-        raise RobotFormatError(f"{where}: unknown key {_shown(unknown[0])}; there are: {', '.join(sorted(allowed))}")
+        raise RobotFormatError(f"{where}: unknown key {quoted(unknown[0])}; there are: {', '.join(sorted(allowed))}")
     missing = sorted(k for k in required if k not in value)
     if missing:
-        raise RobotFormatError(f"{where}: missing key {missing[0]!r}")
-
-
-def _shown(value: Any) -> str:
-    """A value in one short line."""
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+        raise RobotFormatError(f"{where}: missing key {quoted(missing[0])}")

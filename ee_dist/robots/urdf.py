@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, folded
 from ee_dist.robots.inertia import rotation_matrix
@@ -75,7 +76,10 @@ class _Reader:
         carried: dict[str, Joint] = {}
         for j in joints:
             if j.child in carried:
-                raise self.fail(f"link {j.child!r}", f"hangs on two joints, {carried[j.child].name!r} and {j.name!r}")
+                raise self.fail(
+                    f"link {quoted(j.child)}",
+                    f"hangs on two joints, {quoted(carried[j.child].name)} and {quoted(j.name)}",
+                )
             carried[j.child] = j
         roots = [name for name in links if name not in carried]
         if len(roots) != 1:
@@ -84,13 +88,13 @@ class _Reader:
         order = self.order(roots[0], joints)
         if len(order) != len(links):
             lost = next(name for name in links if name not in order)
-            raise self.fail(f"link {lost!r}", f"is not connected to {roots[0]!r}: the joints form a loop")
+            raise self.fail(f"link {quoted(lost)}", f"is not connected to {quoted(roots[0])}: the joints form a loop")
         free = self.unmoored(carried, order)
         parts = {name: self.part(name, links[name], carried.get(name)) for name in order}
         kept_parts, kept_joints, start, given, idle = folded(parts, {n: carried[n] for n in order[1:]}, order[0])
         for name in idle:
             if carried[name].kind != "fixed":
-                raise self.fail(f"link {name!r}", self.without_mass(name, links[name], carried[name]))
+                raise self.fail(f"link {quoted(name)}", self.without_mass(name, links[name], carried[name]))
         assumed = list(self.assumed)
         root_given = kept_parts[0].name in given
         given = [n for n in given if n != kept_parts[0].name]
@@ -107,7 +111,7 @@ class _Reader:
             name=self.root.get("name") or self.file.stem,
             parts=tuple(kept_parts),
             joints=tuple(kept_joints),
-            drives={name: self.known(elements[name], f"joint {name!r}") for name in moving},
+            drives={name: self.known(elements[name], f"joint {quoted(name)}") for name in moving},
             root_without_mass=root_given,
             free_base=True if free else None,
             start_position_m=start[0],
@@ -130,7 +134,9 @@ class _Reader:
             return False
         first = floating[0]
         if len(floating) > 1 or first.parent != order[0] or sum(j.parent == order[0] for j in carried.values()) > 1:
-            raise self.fail(f"joint {first.name!r}", "is floating, which only the joint of the whole robot can be")
+            raise self.fail(
+                f"joint {quoted(first.name)}", "is floating, which only the joint of the whole robot can be"
+            )
         del carried[first.child]
         order.remove(first.parent)
         return True
@@ -153,10 +159,10 @@ class _Reader:
     def without_mass(self, name: str, e: ET.Element, joint: Joint) -> str:
         inertial = e.find("inertial")
         if inertial is None:
-            return f"no <inertial>, but joint {joint.name!r} moves it: give it a mass and an inertia"
+            return f"no <inertial>, but joint {quoted(joint.name)} moves it: give it a mass and an inertia"
         mass = inertial.find("mass")
-        value = 0.0 if mass is None else self.number(mass, "value", f"link {name!r}")
-        return f"mass {value:g} kg; expected a positive number, as joint {joint.name!r} moves it"
+        value = 0.0 if mass is None else self.number(mass, "value", f"link {quoted(name)}")
+        return f"mass {value:g} kg; expected a positive number, as joint {quoted(joint.name)} moves it"
 
     def hint_at_pivots(self, parts: list[Part], joints: list[Joint]) -> None:
         """Say where an inertia looks as if it were about the joint: a hint, for nothing proves it."""
@@ -193,14 +199,14 @@ class _Reader:
         text = element.get(key)
         if text is None:
             if default is None:
-                raise self.fail(where, f"<{element.tag}> lacks {key!r}")
+                raise self.fail(where, f"<{element.tag}> lacks {quoted(key)}")
             return default
         try:
             value = float(text)
         except ValueError:
-            raise self.fail(where, f"<{element.tag} {key}={text!r}> is not a number") from None
+            raise self.fail(where, f"<{element.tag} {key}={quoted(text)}> is not a number") from None
         if not abs(value) <= LARGEST:
-            raise self.fail(where, f"<{element.tag} {key}={text!r}>: expected a number of at most {LARGEST:g}")
+            raise self.fail(where, f"<{element.tag} {key}={quoted(text)}>: expected a number of at most {LARGEST:g}")
         return value
 
     def positive(self, element: ET.Element, key: str, where: str) -> float:
@@ -218,7 +224,7 @@ class _Reader:
         except ValueError:
             values = ()
         if len(values) != 3 or not all(abs(v) <= LARGEST for v in values):
-            raise self.fail(where, f"<{element.tag} {key}={text!r}>: expected three numbers")
+            raise self.fail(where, f"<{element.tag} {key}={quoted(text)}>: expected three numbers")
         return values[0], values[1], values[2]
 
     def origin(self, element: ET.Element, where: str) -> tuple[Vec3, Quat]:
@@ -228,21 +234,25 @@ class _Reader:
         return self.vector(found, "xyz", where, ZERO3), turn_of_rpy(self.vector(found, "rpy", where, ZERO3))
 
     def joint(self, name: str, e: ET.Element, links: dict[str, ET.Element]) -> Joint:
-        where = f"joint {name!r}"
+        where = f"joint {quoted(name)}"
         kind = e.get("type", "")
         if kind not in KINDS:
-            raise self.fail(where, f"kind {kind!r} is not supported; there are: {', '.join(KINDS)}")
+            raise self.fail(where, f"kind {quoted(kind)} is not supported; there are: {', '.join(KINDS)}")
         ends = {}
         for tag in ("parent", "child"):
             found = e.find(tag)
             link = found.get("link", "") if found is not None else ""
             if link not in links:
-                raise self.fail(where, f"its {tag} link {link!r} is not in the file; there are: {_list(list(links))}")
+                raise self.fail(
+                    where, f"its {tag} link {quoted(link)} is not in the file; there are: {_list(list(links))}"
+                )
             ends[tag] = link
         position, rotation = self.origin(e, where)
         mimic = e.find("mimic")
         if mimic is not None:
-            self.notes.append(f"{where} mimics {mimic.get('joint', '?')!r}, which is left out: it is held at zero")
+            self.notes.append(
+                f"{where} mimics {quoted(mimic.get('joint', '?'))}, which is left out: it is held at zero"
+            )
             kind = "fixed"
         axis_element = e.find("axis")
         axis = (1.0, 0.0, 0.0) if axis_element is None else self.vector(axis_element, "xyz", where, (1.0, 0.0, 0.0))
@@ -267,7 +277,7 @@ class _Reader:
         far = CONTINUOUS_M if kind == "prismatic" else CONTINUOUS_RAD
         if kind == "continuous":
             return -far, far
-        limit, where = e.find("limit"), f"joint {name!r}"
+        limit, where = e.find("limit"), f"joint {quoted(name)}"
         if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
             self.assumed.append(f"{where} states no limits: taken as without stops")
             return -far, far
@@ -277,7 +287,7 @@ class _Reader:
         return lower, upper
 
     def part(self, name: str, e: ET.Element, joint: Joint | None) -> Part:
-        where = f"link {name!r}"
+        where = f"link {quoted(name)}"
         shapes = tuple(s for c in e.findall("collision") if (s := self.shape(name, c)) is not None)
         inertial = e.find("inertial")
         if inertial is None:
@@ -311,7 +321,7 @@ class _Reader:
         return Part(name, mass, com, entries(axes @ own @ axes.T), shapes)
 
     def shape(self, link: str, collision: ET.Element) -> Shape | None:
-        where = f"link {link!r}"
+        where = f"link {quoted(link)}"
         position, rotation = self.origin(collision, where)
         geometry = collision.find("geometry")
         found = geometry[0] if geometry is not None and len(geometry) else None

@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Console
 
 from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.words import compare_account
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
@@ -39,19 +40,20 @@ def run(config: Config, options: Options, out: Path) -> None:
     problem = way.make(measured, config)
     residual = problem.residuals([measured.model])[0]
     found = compare(problem, residual)
-    account = compare_account(problem, found)
+    left = leftovers(problem, residual)
+    account = compare_account(problem, found, left)
     remarks = problem.remarks(measured.model)
     digest = hashlib.sha256(np.ascontiguousarray(residual).tobytes()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
-    summary = {**of_comparison(problem, found, account, measured.model), "remarks": remarks}
+    summary = {**of_comparison(problem, found, account, measured.model, left), "remarks": remarks}
     write_summary(out, "compare", config, options, watch, digest, summary)
     model = [setting("model", config.model)] if config.model else []
-    following = ["task=explain", setting("measured", measured.files[0]), *model]
+    following = [] if account.good else ["task=explain", setting("measured", measured.files[0]), *model]
     story = links(out, measured.files, config.model)
     page = compare_page(problem, measured, found, account, residual, remarks, following, story)
     write_page(page, out / "report.html")
     if options.rerun:
-        compare_scene(problem, found, account, measured.model, out / "compare.rrd")
+        compare_scene(problem, found, account, measured.model, out / "compare.rrd", following)
     show_comparison(console, problem, found)
     console.print(f"By {way.name}: {way.why}.", *remarks, sep="\n", highlight=False, markup=False)
     show_account(console, account, out, following)

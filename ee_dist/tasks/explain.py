@@ -71,7 +71,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     story = links(out, measured.files, config.model)
     write_page(explain_page(problem, measured, found, account, following, story), out / "report.html")
     if options.rerun:
-        explain_scene(problem, found, account, out / "explain.rrd")
+        explain_scene(problem, found, account, out / "explain.rrd", following)
     show_explanation(console, problem, found)
     wall, _ = watch.read()
     console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)

@@ -16,6 +16,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping, read_mapping
@@ -104,7 +105,7 @@ def hints_of(options: Options) -> Hints:
         gains = []
         for g in _listed(options.gains):
             if isinstance(g, bool) or not isinstance(g, (int, float)) or not math.isfinite(g) or g == 0:
-                raise ConfigError(f"task.gains: expected numbers in N.m per A, none of them 0, not {g!r}")
+                raise ConfigError(f"task.gains: expected numbers in N.m per A, none of them 0, not {quoted(g)}")
             gains.append(float(g))
     if options.unit is not None:
         one_of("task.unit", options.unit, UNITS_TO_ASK)

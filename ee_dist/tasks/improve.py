@@ -74,7 +74,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     account = improve_account(problem, found)
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
-    write_model(path, measured.source, measured.folder, found.terms, [account.headline, *account.lines])
+    write_model(path, measured.source, measured.folder, found.terms, account.words)
     if calibration is not None:
         path.with_suffix(".calibration.yaml").write_text(
             "# What the model beside this file leaves on an untouched robot, and the energy that the most promising effect\n"
@@ -87,7 +87,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     story = links(out, measured.files, config.model)
     write_page(improve_page(problem, measured, found, account, following, story), out / "report.html")
     if options.rerun:
-        improve_scene(problem, found, account, measured.model, out / "improve.rrd")
+        improve_scene(problem, found, account, measured.model, out / "improve.rrd", following)
     show_ladder(console, problem, found)
     if found.last is not None:
         refused = [c for c in found.last.judged if not c.earned]

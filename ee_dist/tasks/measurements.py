@@ -12,13 +12,14 @@ import numpy as np
 import yaml
 
 from ee_dist.basics.names import nearest
+from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, from_entries
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import HARDWARE, RunRecord
-from ee_dist.robots.agree import agreed, changed_sources
+from ee_dist.robots.agree import agreed, changed_sources, differences
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
@@ -68,7 +69,9 @@ def load(config: Config) -> Measurements:
             trials.append(MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup))
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
     if config.model is None:
-        source = robot.name if robot.name in BUILT_IN else robot
+        # By name only where the name says all: a log may bring sensors of its own, or a body with other numbers.
+        named = robot.name in BUILT_IN and not differences(BUILT_IN[robot.name](), robot)
+        source = robot.name if named else robot
         return Measurements(robot, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks))
     believed = read_model(config.model)
     robot, different = agreed(believed.robot, robot, f"model={config.model}")
@@ -121,7 +124,8 @@ def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
     for k, sensor in zip(order, robot.sensors, strict=True):
         if log.sensor_units[k] != sensor.unit:
             raise LogError(
-                f"{where}: {sensor.name} is in {log.sensor_units[k]!r}, the model has it in {sensor.unit!r}; convert it"
+                f"{where}: {sensor.name} is in {quoted(log.sensor_units[k])}, the model has it "
+                f"in {quoted(sensor.unit)}; convert it"
             )
         bad = ~np.isfinite(log.sensors[:, k])
         if bad.any():
@@ -152,7 +156,7 @@ def _names(where: str, what: str, have: Sequence[str], want: Sequence[str]) -> N
     if missing:
         near = nearest(missing[0], have, cutoff=0.5)
         hint = f"; is it {' or '.join(near)}?" if near else f"; the log has: {', '.join(have[:8])}"
-        raise LogError(f"{where}: no {what} {missing[0]!r}{hint}")
+        raise LogError(f"{where}: no {what} {quoted(missing[0])}{hint}")
 
 
 def _same_robot(file: Path, run: RunRecord, robot: Robot) -> None:

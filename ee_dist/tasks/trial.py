@@ -23,6 +23,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.writer import RunWriter
+from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.scene import drawn
@@ -45,6 +46,7 @@ class Options:
     excitations: list[str] = field(default_factory=list)
     repeats: int = 2
     noise: float = 0.02
+    motor_torque: bool = False
 
     def __post_init__(self) -> None:
         if self.repeats < 1:
@@ -61,7 +63,10 @@ def run(config: Config, options: Options, out: Path) -> None:
     seeds = np.random.SeedSequence(config.seed)
     hidden_seed, noise_seed = seeds.spawn(2)
     engine = engine_maker(config, alone=True)()
-    robot = with_noise(build_robot(config), config.noise or options.noise)
+    described = build_robot(config)
+    if options.motor_torque:
+        described = with_motor_torques(described)
+    robot = with_noise(described, config.noise or options.noise)
     hidden = hypothesis(config.hidden, robot, hidden_seed)
     apply(robot, hidden)
     plan = [parse(text) for text in options.excitations]

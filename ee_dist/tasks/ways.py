@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance, motor_torques
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.engines.one_joint import fits
@@ -55,7 +55,9 @@ WAYS: dict[str, Way] = {
         Way("open_loop", "commands were recorded: every channel is compared on them", open_loop, moves=True),
         Way("free_run", "joint positions were recorded: whole records are run freely", _free_run),
         Way(
-            "force_balance", "torques were recorded, and no commands that a simulation could be led by", _force_balance
+            "force_balance",
+            "torques of the drives were recorded: they are set against what the motion needed, nothing is simulated",
+            _force_balance,
         ),
     )
 }
@@ -67,7 +69,9 @@ def way_of(measured: Measurements, by: str) -> Way:
     one_of("task.by", by, (AUTO, *WAYS))
     if by == AUTO:
         driven = all(np.isfinite(t.log.commands).all(axis=1).any() for t in measured.trials)
-        torques = all(t.log.torques is not None and t.log.joints is not None for t in measured.trials)
+        torques = all(
+            t.log.joints is not None and motor_torques(t.log, measured.robot) is not None for t in measured.trials
+        )
         # On torques alone a simulation drifts away within a second, whatever the model: forces are balanced at each instant.
         led = any(d.command in ("position", "speed") for d in measured.robot.drives) or measured.robot.free_base
         by = "open_loop" if (driven and led) or not torques else "force_balance"

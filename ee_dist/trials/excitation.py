@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.basics.names import nearest
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import command_span
 from ee_dist.trials.log import Array, start_of
@@ -53,13 +54,13 @@ class Excitation:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             near = nearest(self.kind, KINDS) or list(KINDS)
-            raise ExcitationError(f"no excitation {self.kind!r}; did you mean {' or '.join(near)}?")
+            raise ExcitationError(f"no excitation {quoted(self.kind)}; did you mean {' or '.join(near)}?")
         if not 0.0 < self.amplitude <= 1.0:
             raise ExcitationError(
                 f"{self.kind}: amplitude {self.amplitude:g} must be a share of half the range, in (0, 1]"
             )
         if self.fixture not in FIXTURES:
-            raise ExcitationError(f"{self.kind}: no fixture {self.fixture!r}; there are: {', '.join(FIXTURES)}")
+            raise ExcitationError(f"{self.kind}: no fixture {quoted(self.fixture)}; there are: {', '.join(FIXTURES)}")
         if not 0 <= self.seed < 2**63:
             raise ExcitationError(f"{self.kind}: seed {self.seed} must be a whole number from 0 to 2^63 - 1")
         if not 0.1 <= self.seconds <= 600.0:
@@ -105,11 +106,11 @@ def parse(text: str) -> Excitation:
     for item in filter(None, rest.split(",")):
         key, _, value = item.partition("=")
         if key not in ("seconds", "amplitude", "seed", "fixture"):
-            raise ExcitationError(f"{text}: no setting {key!r}; there are: seconds, amplitude, seed, fixture")
+            raise ExcitationError(f"{text}: no setting {quoted(key)}; there are: seconds, amplitude, seed, fixture")
         try:
             values[key] = value if key == "fixture" else int(value) if key == "seed" else float(value)
         except ValueError:
-            raise ExcitationError(f"{text}: {key} must be a number, not {value!r}") from None
+            raise ExcitationError(f"{text}: {key} must be a number, not {quoted(value)}") from None
     return Excitation(kind, **values)
 
 

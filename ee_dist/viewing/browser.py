@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any, Self
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
-ANSWER_S = 60.0
+ANSWER_S = 300.0
 SWITCHES = (
     "--headless",
     "--no-sandbox",
@@ -93,8 +93,8 @@ class HeadlessBrowser:
     ) -> None:
         self._end()
 
-    def look(self, page: Path, width: int, *, dark: bool = False, height: int = 900, whole: bool = False) -> Look:
-        """Open a page and scroll through all of it; a picture of its first screen or of the ``whole``. Raises BrowserError."""
+    def open(self, page: Path, width: int, *, dark: bool = False, height: int = 900) -> None:
+        """Open a page, of which what is in sight is drawn. Raises BrowserError."""
         self._events.clear()
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self._ask("Emulation.setDeviceMetricsOverride", metrics, page=True)
@@ -102,6 +102,10 @@ class HeadlessBrowser:
         self._ask("Emulation.setEmulatedMedia", {"features": [scheme]}, page=True)
         self._ask("Page.navigate", {"url": page.resolve().as_uri()}, page=True)
         self._until("Page.loadEventFired")
+
+    def look(self, page: Path, width: int, *, dark: bool = False, height: int = 900, whole: bool = False) -> Look:
+        """Open a page and scroll through all of it; a picture of its first screen or of the ``whole``. Raises BrowserError."""
+        self.open(page, width, dark=dark, height=height)
         # Every part is opened and comes into sight once, so that whatever can go wrong in drawing it does.
         self.evaluate(
             "(async () => { const open = [...document.querySelectorAll('details:not([open])')];"

@@ -68,7 +68,8 @@ class Rung:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """One result. ``verdict`` is a sentence, ``error_unit`` what error, floor and those of channels are counted in.
+    """One result. ``verdict`` is a sentence; ``lines`` say below it how large the error is and how sure all of it; errors and
+    ``floor`` are in ``unit``.
 
     ``model`` is the model as it was given, ``better`` that with what was found (improve, or the best candidate).
     """
@@ -78,9 +79,9 @@ class Finding:
     robot: Robot
     cases: tuple[Case, ...]
     model: Account
-    error: float
+    lines: tuple[str, ...] = ()
     floor: float | None = None
-    error_unit: str = "standard deviations"
+    unit: str = "standard deviations"
     channels: tuple[ChannelError, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     ladder: tuple[Rung, ...] = ()

@@ -72,7 +72,7 @@ def write_explain_rrd(found: Finding, path: str | Path) -> None:
         models = [m for m in stage.models if m.key in (GIVEN, _key(k))]
         plots = _worst_plots(stage, models, around=True)
         tabs.append(_grid(plots, f"{k + 1}. {c.label.split(' (')[0]}"))
-    given = _grid(_worst_plots(stage, stage.models[:1], around=True), "The model as it was")
+    given = _grid(_worst_plots(stage, stage.models[:1], around=True), "The model")
     parts = rrb.Tabs(*tabs, given, active_tab=0)
     _write(stage, path, "explain", text, parts)
 
@@ -101,7 +101,7 @@ def _stage(found: Finding, accounts: Sequence[tuple[str, Account, palette.Rgb]])
     )
     real = [world.seen(Appearance(s.start_s, found.robot, s.measured, "measured")) for s in shots]
     ghosts = []
-    # The model as it was and the first of the others: more would hide each other.
+    # The model and the first of the others: more would hide each other.
     for place, (key, account, colour) in enumerate(accounts[:2]):
         if account.body is None:
             continue
@@ -118,7 +118,7 @@ def _stage(found: Finding, accounts: Sequence[tuple[str, Account, palette.Rgb]])
 
 def _write(stage: _Stage, path: str | Path, verb: str, text: Sequence[str], right: rrb.Container) -> None:
     found, shots = stage.found, stage.shots
-    lines = [*finding_text.headline(found), *text, *finding_text.ending(found)]
+    lines = [*finding_text.headline(found), *text]
     logs = [g for s in shots for g in (s.measured, *s.said.values())]
     identity = [verb, found.robot.digest, "\n".join(lines), *(log_digest(g) for g in logs)]
     layout = _layout(stage, right)

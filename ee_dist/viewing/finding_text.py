@@ -22,20 +22,11 @@ def plain(name: str) -> str:
 
 
 def headline(found: Finding) -> list[str]:
-    """Verdict, error and floor, and what to do next."""
-    floor = "" if found.floor is None else f"; noise alone would leave {found.floor:.3g}"
-    return [
-        f"### {found.title}",
-        "",
-        f"**{found.verdict}**",
-        "",
-        f"Error {found.error:.3g} {found.error_unit}{floor}.",
-        "",
-    ]
-
-
-def ending(found: Finding) -> list[str]:
-    return ["", f"Next: `{found.next_command}`"] if found.next_command else []
+    """Verdict, how large the error is and how sure all of it, and what to do next."""
+    lines = [f"### {found.title}", "", f"**{found.verdict}**", ""]
+    for line in found.lines:
+        lines += [line, ""]
+    return [*lines, f"Next: `{found.next_command}`", ""] if found.next_command else lines
 
 
 def colours(found: Finding) -> list[str]:
@@ -56,7 +47,7 @@ def channel_table(found: Finding) -> list[str]:
     if not any(c.error for c in ranked):
         return [f"All {len(ranked)} channels agree exactly: every error is 0."]
     largest = max(c.error for c in ranked)
-    lines = ["| channel | error | | RMS | worst |", "|---|---|---|---|---|"]
+    lines = [f"| channel | error ({found.unit}) | | RMS | worst |", "|---|---|---|---|---|"]
     for c in ranked:
         unit = "" if c.unit in ("", "1") else f" {c.unit}"
         where = f"{plain(c.worst_case)}, {c.worst_from_s:.2f} to {c.worst_to_s:.2f} s" if c.worst_case else ""
@@ -82,7 +73,7 @@ def ladder_table(found: Finding) -> list[str]:
     if not found.ladder:
         return []
     largest = max(r.error_heldout for r in found.ladder)
-    lines = ["| # | model | error held out | | in the fit |", "|---|---|---|---|---|"]
+    lines = [f"| # | model | error held out ({found.unit}) | | in the fit |", "|---|---|---|---|---|"]
     for k, rung in enumerate(found.ladder):
         fit = "" if rung.error_fit is None else f"{rung.error_fit:.3g}"
         lines.append(f"| {k} | {rung.label} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} |")

@@ -17,6 +17,8 @@ from rerun.experimental import ViewerClient, ViewerState
 
 START_S = 30.0
 LOAD_S = 60.0
+BEGINNING = b"RRF"
+"""What every recording of rerun begins with; one digit follows, its format."""
 GREETING_S = 4.0
 """For so long after its start the viewer lays a note over the picture that it runs without a screen."""
 
@@ -59,6 +61,21 @@ def vulkan_devices() -> int:
     return 0 if failed else count.value
 
 
+def check_recording(path: str | Path) -> Path:
+    """Its absolute path. Raises ViewerError for what is no recording: of some foreign files the viewer says nothing at all."""
+    file = Path(path).absolute()
+    if not file.is_file():
+        raise ViewerError(f"no such recording: {path}")
+    try:
+        with file.open("rb") as content:
+            beginning = content.read(len(BEGINNING))
+    except OSError as error:
+        raise ViewerError(f"cannot read {path}: {error.strerror}") from None
+    if beginning != BEGINNING:
+        raise ViewerError(f"cannot read {path}: not a recording of rerun (.rrd)")
+    return file
+
+
 class HeadlessViewer:
     """A viewer in the background, used in a ``with`` block, at whose end its process is gone."""
 
@@ -90,9 +107,7 @@ class HeadlessViewer:
 
     def open(self, path: str | Path) -> None:
         """Load a recording and wait until all of it is there. Raises ViewerError."""
-        file = Path(path).absolute()
-        if not file.is_file():
-            raise ViewerError(f"no such recording: {path}")
+        file = check_recording(path)
         self.client.open(str(file))
         deadline = time.monotonic() + LOAD_S
         while time.monotonic() < deadline:

@@ -56,16 +56,16 @@ class Section:
 
 @dataclass
 class Page:
-    """``tone``: good, open or plain, the colour of the finding. ``sure``: how certain it is; ``following``: the command to
-    type next; ``proof``: the one picture that shows it. ``tiles``: (number, what it is). ``links``: (name, relative path).
-    ``terms``: (word, what it means)."""
+    """``tone``: good, open or plain, the colour of the finding. ``first``: lines below the headline: how large the error is,
+    how sure all of it; ``following``: the command to type next; ``proof``: the one picture that shows it. ``tiles``: (number,
+    what it is). ``links``: (name, relative path). ``terms``: (word, what it means)."""
 
     title: str
     subtitle: str
     headline: str
     words: Sequence[str] = ()
     tone: str = "plain"
-    sure: str = ""
+    first: Sequence[str] = ()
     following: str = ""
     proof: Section | None = None
     tiles: Sequence[tuple[str, str]] = ()

@@ -13,16 +13,19 @@ from plotly.subplots import make_subplots
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
 
-MEASURED, PREDICTED, IMPROVED, RESIDUAL = "#4a90d9", "#e08a00", "#2e9e62", "#cf4b3c"
-FLOOR = "#a678e2"
+MEASURED, PREDICTED, IMPROVED = "#4a90d9", "#e08a00", "#2e9e62"
+"""What was measured, what the model says, and the improved one: the same in every figure."""
+FLOOR, MARK = "#a678e2", "#d0409a"
 DOTS = 700
 """Points of a cloud that are drawn; its mean is of all."""
+FEWEST = 5
+"""Points that a mean is drawn of."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
 
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Residuals (n,) over something (n,), before and perhaps after."""
+    """Residuals (n,) over something (n,), of the model and perhaps of the improved one."""
 
     label: str
     x: Array
@@ -76,13 +79,21 @@ def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> 
 
 
 def heat_map(
-    tables: Sequence[Array], segments: Sequence[str], channels: Sequence[str], floor: float = 1.0
+    tables: Sequence[Array],
+    segments: Sequence[str],
+    channels: Sequence[str],
+    floor: float = 1.0,
+    titles: Sequence[str] = ("model", "improved model"),
+    label: str = "error (standard deviations)",
 ) -> go.Figure:
-    """(segments, channels) root mean squares, one table or before and after; white is the noise."""
+    """(segments, channels) errors, one table or two below each other; what ``floor`` noise leaves is near the background."""
     shown = [k for k in range(tables[0].shape[1]) if any(t[:, k].any() for t in tables)]
-    top = max(4.0, float(np.quantile(tables[0][:, shown], 0.98)))
-    titles = ["before", "after"] if len(tables) > 1 else None
-    figure = make_subplots(rows=len(tables), cols=1, shared_xaxes=True, subplot_titles=titles, vertical_spacing=0.06)
+    top = max(4.0 * floor, float(np.quantile(tables[0][:, shown], 0.98)))
+    named = list(titles) if len(tables) > 1 else None
+    # Room for a title between two tables, however few rows they have.
+    tall = 17 * max(len(shown), 3)
+    gap = 30 / (30 + 2 * tall) if len(tables) > 1 else 0.0
+    figure = make_subplots(rows=len(tables), cols=1, shared_xaxes=True, subplot_titles=named, vertical_spacing=gap)
     for row, table in enumerate(tables, start=1):
         figure.add_trace(
             go.Heatmap(
@@ -90,21 +101,21 @@ def heat_map(
                 x=list(segments),
                 y=[channels[k].replace("_", " ") for k in shown],
                 coloraxis="coloraxis",
-                hovertemplate="%{y}<br>%{x}<br>%{z:.2f} standard deviations<extra></extra>",
+                hovertemplate="%{y}<br>%{x}<br>%{z:.3g}<extra></extra>",
             ),
             row=row,
             col=1,
         )
-    _styled(figure, 170 + (20 + 17 * len(shown)) * len(tables))
+    _styled(figure, 176 + (30 + tall) * len(tables))
     pale = min(1.3 * floor / top, 0.9)
     light = [[0, "#f7fbff"], [pale, "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]]
     dark = [[0, "#1d252e"], [pale, "#2a3542"], [0.95, "#e0564c"], [1, "#ff8a7a"]]
-    bar = {"title": {"text": "standard deviations", "side": "top"}, "thickness": 10, "orientation": "h", "y": 1.0,
-           "yanchor": "bottom", "len": 0.45, "x": 1.0, "xanchor": "right"}  # fmt: skip
+    bar = {"title": {"text": label, "side": "top"}, "thickness": 10, "orientation": "h", "y": 1.0,
+           "yanchor": "bottom", "ypad": 20, "len": 0.45, "x": 1.0, "xanchor": "right"}  # fmt: skip
     figure.update_layout(
         coloraxis={"cmin": 0.0, "cmax": top, "colorscale": light, "colorbar": bar},
         hovermode="closest",
-        margin={"l": 20, "r": 16, "t": 70, "b": 30},
+        margin={"l": 20, "r": 16, "t": 76, "b": 30},
         meta={
             "light": {"coloraxis.colorscale": light},
             "dark": {"coloraxis.colorscale": dark},
@@ -164,7 +175,13 @@ def ranking(
     return figure
 
 
-def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float], floor: float) -> go.Figure:
+def ladder(
+    names: Sequence[str],
+    fit: Sequence[float],
+    heldout: Sequence[float],
+    floor: float,
+    label: str = "error (standard deviations)",
+) -> go.Figure:
     """Error of each model from the first to the last, and the noise floor."""
     figure = go.Figure()
     figure.add_scatter(
@@ -178,35 +195,38 @@ def ladder(names: Sequence[str], fit: Sequence[float], heldout: Sequence[float],
         mode="lines+markers+text",
         line={"color": MEASURED, "width": 3},
         marker={"size": 10},
-        text=[f"{v:.2f}" for v in heldout],
+        text=[f"{v:.3g}" for v in heldout],
         textposition="top center",
     )
-    figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
+    figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
                      annotation_position="bottom left")  # fmt: skip
     _styled(figure, 340)
     figure.update_xaxes(range=[-0.4, len(names) - 0.6], automargin=True)
     figure.update_layout(yaxis_range=[0, 1.25 * max(max(heldout), floor)])
-    figure.update_yaxes(title_text="error (standard deviations)", rangemode="tozero")
+    figure.update_yaxes(title_text=label, rangemode="tozero")
     return figure
 
 
 def cloud(title: str, part: Cloud) -> go.Figure:
-    """One channel's residuals against one thing, with the mean over each stretch of its range, before and after."""
+    """One channel's residuals against one thing, with their means over each stretch of its range; dashed, the mark that the
+    effect promises: what the improved model predicts there less what the model does, whatever was measured."""
     figure = go.Figure()
-    series = [("before", part.before, RESIDUAL)] + ([] if part.after is None else [("after", part.after, IMPROVED)])
+    series = [(part.before, PREDICTED)] + ([] if part.after is None else [(part.after, IMPROVED)])
     thin = slice(None, None, max(1, len(part.x) // DOTS))
-    for name, y, colour in series:
+    for y, colour in series:
         marker = {"color": colour, "size": 4, "opacity": 0.22}
-        figure.add_scatter(x=_short(part.x[thin]), y=_short(y[thin]), mode="markers", marker=marker, name=name)
-    for name, y, colour in series:
+        figure.add_scatter(x=_short(part.x[thin]), y=_short(y[thin]), mode="markers", marker=marker, hoverinfo="x+y")
+    lines = [(y, {"color": colour, "width": 4}) for y, colour in series]
+    if part.after is not None:
+        lines.append((part.before - part.after, {"color": MARK, "width": 2.5, "dash": "5px,3px"}))
+    for y, line in lines:
         at, mean = _trend(part.x, y)
-        line = {"color": colour, "width": 3.5}
-        figure.add_scatter(x=at, y=mean, mode="lines", line=line, name=f"mean {name}", hoverinfo="skip")
+        figure.add_scatter(x=_short(at), y=_short(mean), mode="lines", line=line, hoverinfo="skip")
     figure.add_hline(y=0, line={"color": "#8899aa", "width": 1})
     _styled(figure, 250)
     left, right = _most(part.x)
     figure.update_xaxes(title_text=part.label, title_standoff=4, range=[left, right])
-    figure.update_yaxes(range=_most(np.concatenate([y for _, y, _ in series])), automargin=True)
+    figure.update_yaxes(range=_most(np.concatenate([y for y, _ in series])), automargin=True)
     figure.update_layout(
         title={"text": title, "font": {"size": 12}, "x": 0.02, "y": 0.97},
         showlegend=False,
@@ -229,7 +249,7 @@ def _most(values: Array) -> list[float]:
 
 
 def _trend(x: Array, y: Array, bins: int = 24) -> tuple[Array, Array]:
-    """Middles and means of the bins that hold anything."""
+    """Middles and means of the bins that hold enough."""
     left, right = _most(x)
     inside = (x >= left) & (x <= right)
     x, y = x[inside], y[inside]
@@ -238,22 +258,21 @@ def _trend(x: Array, y: Array, bins: int = 24) -> tuple[Array, Array]:
     count = np.bincount(which, minlength=bins)
     mean = np.bincount(which, weights=np.nan_to_num(y), minlength=bins) / np.maximum(count, 1)
     middle = (edges[:-1] + edges[1:]) / 2
-    return middle[count > 2], mean[count > 2]
+    told = count >= FEWEST
+    return middle[told], mean[told]
 
 
 def bars(
     names: Sequence[str], values: Sequence[float], label: str, floor: float | None = None,
     after: Sequence[float] | None = None,
 ) -> go.Figure:  # fmt: skip
-    """Horizontal bars, before and perhaps after, and a line where noise alone would end them."""
+    """Horizontal bars, of the model and perhaps the improved one, and a line where noise alone would end them."""
     places = [wrapped(n, 26) for n in names]
-    figure = go.Figure(
-        go.Bar(x=list(values), y=places, orientation="h", marker_color=RESIDUAL if after else MEASURED, name="before")
-    )
+    figure = go.Figure(go.Bar(x=list(values), y=places, orientation="h", marker_color=PREDICTED, name="model"))
     if after is not None:
-        figure.add_bar(x=list(after), y=places, orientation="h", marker_color=IMPROVED, name="after")
+        figure.add_bar(x=list(after), y=places, orientation="h", marker_color=IMPROVED, name="improved model")
     if floor is not None:
-        figure.add_vline(x=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.2f}",
+        figure.add_vline(x=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
                          annotation_position="top")  # fmt: skip
     _styled(figure, 110 + (24 if after is None else 34) * len(names))
     figure.update_xaxes(title_text=label, rangemode="tozero")

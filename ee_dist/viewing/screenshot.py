@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ee_dist.viewing.headless import HeadlessViewer
+from ee_dist.viewing.headless import HeadlessViewer, check_recording
 from ee_dist.viewing.stream import RUN_TIME
 
 SIZE = (1600, 1000)
@@ -35,6 +35,7 @@ def take_pictures(
 
     Raises ViewerError, where no viewer or no graphics driver is installed or the recording cannot be shown.
     """
+    check_recording(rrd_path)
     with HeadlessViewer(size) as viewer:
         viewer.open(rrd_path)
         viewer.hide_menu()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.robots.model import Sensor
+from ee_dist.trials.log import SensorLog
 
 every_way = pytest.mark.parametrize(("name", "way"), CASES, ids=[f"{n}-{w}" for n, w in CASES])
 
@@ -201,13 +204,20 @@ def test_only_a_controller_in_the_loop_shows_its_wiring() -> None:
     assert problem("arm", "free_run").looped == ()
 
 
-def test_what_was_not_measured_is_asked_for_in_one_line() -> None:
-    from dataclasses import replace
+def _with_channel(log: SensorLog, name: str) -> SensorLog:
+    more = np.concatenate([log.sensors, log.sensors[:, :1]], axis=1)
+    names, units = (*log.sensor_names, name), (*log.sensor_units, "N.m")
+    return replace(log, sensors=more, sensor_names=names, sensor_units=units)
 
+
+def test_what_was_not_measured_is_asked_for_in_one_line() -> None:
     robot, trials = samples()["pendulum"].robot, measured("pendulum")
     without = tuple(replace(t, log=replace(t.log, torques=None)) for t in trials)
     with pytest.raises(MeasurementError, match="no torques of the drives"):
         problem_by("force_balance", without, robot)
+    net = replace(robot, sensors=(*robot.sensors, Sensor("load", "torque", "servo", "N.m")))
+    with pytest.raises(MeasurementError, match=r"shows what friction leaves of them.*motor_torque"):
+        problem_by("force_balance", tuple(replace(t, log=_with_channel(t.log, "load")) for t in without), net)
     blind = tuple(replace(t, log=replace(t.log, joints=None)) for t in trials)
     with pytest.raises(MeasurementError, match="no joint positions in its log"):
         problem_by("free_run", blind, robot)

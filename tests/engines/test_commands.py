@@ -12,6 +12,7 @@ from engine_robots import MASS_KG, at, one_joint, run
 from ee_dist.engines.contract import Engine, Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.one_joint import OneJointEngine
+from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import command_span, command_unit
 from ee_dist.trials.excitation import Excitation
@@ -42,6 +43,16 @@ def test_a_torque_command_beyond_the_limit_is_cut_and_knows_no_back_emf(any_engi
     log = run(any_engine, robot, 50, at([0.0], [5.0]), np.array([[80.0]]))
     assert log.torques is not None
     assert np.array_equal(np.unique(log.torques), [50.0])
+
+
+def test_a_motors_current_shows_what_friction_and_a_weak_motor_take_away(any_engine: Engine) -> None:
+    rubbing = with_motor_torques(slide(command="torque", coulomb=2.0, viscous=3.0, strength=0.5))
+    assert with_motor_torques(rubbing) == rubbing and rubbing.sensors[-1].unit == "N"
+    log = run(any_engine, rubbing, 400, commands=np.full((1, 1), 10.0))
+    read = log.channel("motor_torque_joint")
+    assert read[0] == 0.0, "the step before the first reading had none"
+    assert np.array_equal(np.unique(read[1:]), [10.0])
+    assert log.torques is not None and log.torques.max() < 0.5 * 10.0 - 2.0 + 1e-9
 
 
 def test_a_speed_command_is_reached_and_held_against_friction(any_engine: Engine) -> None:

@@ -61,7 +61,7 @@ def test_a_drive_and_its_stops(robots: int, motors: int, elastic: bool, seed: in
     table = rng.uniform(0, 3, (len(drive.MOTOR), *shape)) * (rng.random((len(drive.MOTOR), *shape)) < 0.7)
     state = [rng.normal(0, 2, shape) for _ in range(3)]
     switched = [rng.uniform(0, 1, shape) for _ in range(3)]
-    written = [rng.normal(0, 1, shape) for _ in range(5)]
+    written = [rng.normal(0, 1, shape) for _ in range(6)]
     kinds = rng.integers(0, len(COMMANDS), shape)
     assert_same_bits(drive._drive, [kinds, table, *state, *switched, 0.01, elastic, *written])
     lower = rng.uniform(-2, 0, shape)
@@ -82,15 +82,16 @@ def test_not_a_number_is_not_made_one() -> None:
 
 def test_channels_show_their_joint_or_touch() -> None:
     rng = np.random.default_rng(3)
-    joints, speeds, torque = rng.normal(size=(3, 2, 4))
+    joints, speeds, torque, current = rng.normal(size=(4, 2, 4))
     touch = np.array([[True, False], [False, True]])
     middle, half = rng.normal(size=(2, 2, 4))
-    kinds, places = np.array([3, 4, 0, 1, 2, 5, 4]), np.array([2, 0, 1, 3, 0, 0, 1])
-    out = np.full((2, 7), 7.0)
-    loop._fill(kinds, places, joints, speeds, torque, touch, middle, half, out)
+    kinds, places = np.array([4, 5, 0, 1, 2, 6, 5, 3]), np.array([2, 0, 1, 3, 0, 0, 1, 1])
+    out = np.full((2, 8), 7.0)
+    loop._fill(kinds, places, joints, speeds, torque, current, touch, middle, half, out)
     assert np.array_equal(out[:, 0], (joints[:, 2] - middle[:, 2]) / half[:, 2])
     assert np.array_equal(out[:, [1, 6]], np.where(touch, 1.0, -1.0))
     assert np.array_equal(out[:, 2:5], np.stack([joints[:, 1], speeds[:, 3], torque[:, 0]], axis=1))
+    assert np.array_equal(out[:, 7], current[:, 1])
     assert (out[:, 5] == 7.0).all()  # of the base: not filled here
 
 

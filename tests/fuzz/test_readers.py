@@ -141,7 +141,7 @@ def look(path: Path, name: str, content: bytes) -> None:
         except OURS as error:
             text = str(error)
             assert "\n" not in text, text
-            assert len(text) < 2000, text
+            assert len(text) < 1000, text
 
 
 @pytest.mark.parametrize("name", sorted(CORPUS))

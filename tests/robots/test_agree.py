@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from ee_dist.robots.agree import SOURCES, agreed, changed_sources, differences, source_digests, sources_text
+from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.noise import with_noise
@@ -26,6 +27,13 @@ def test_the_models_numbers_count_and_the_logs_noise_stays() -> None:
     assert "part arm: mass_kg 0.3, in the log 0.49" in said
     assert said[1].startswith("drive servo: kp 2, in the log")
     assert differences(servo_pendulum(), recorded) == ()
+
+
+def test_a_meter_of_motor_torque_in_the_log_is_no_other_robot() -> None:
+    recorded = with_noise(with_motor_torques(servo_pendulum()), 0.001)
+    robot, said = agreed(servo_pendulum(), recorded, "model.yaml")
+    assert robot.sensor_names == recorded.sensor_names and said == ()
+    assert [s.noise for s in robot.sensors] == [s.noise for s in recorded.sensors]
 
 
 @pytest.mark.parametrize(

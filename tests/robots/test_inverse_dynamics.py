@@ -15,7 +15,7 @@ from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.one_joint import OneJointEngine, fits
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.robots.describe import load_robot
-from ee_dist.robots.inverse_dynamics import joint_torques
+from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, joint_torques, regressor
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.quadruped import quadruped
@@ -87,3 +87,14 @@ def test_an_encoder_mounted_turned() -> None:
     still = np.zeros((1, 1))
     assert joint_torques(robot, still, still, still)[0, 0] == pytest.approx(0.49 * 9.81 * 0.1 * np.sin(-0.1))
     assert joint_torques(robot, still + 0.1, still, still)[0, 0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_gravity_adds_what_is_linear_in_it() -> None:
+    robot, _ = load_robot(ARM)
+    rng = np.random.default_rng(0)
+    q, v, a = rng.normal(size=(3, 4, len(robot.drives)))
+    tilted = robot.with_world(tilt_x_rad=0.2, tilt_y_rad=-0.3)
+    pull = np.tensordot(gravity(tilted) - gravity(robot), gravity_regressor(robot, q), 1)
+    np.testing.assert_allclose(regressor(robot, q, v, a) + pull, regressor(tilted, q, v, a), atol=1e-9)
+    assert geometry(robot) == geometry(tilted.with_part("forearm", mass_kg=3.0).with_joint("elbow", freedom=0.5))
+    assert geometry(robot) != geometry(robot.with_joint("elbow", axis=(1.0, 0.0, 0.0)))

@@ -5,6 +5,7 @@ The robots are measured by ``task=trial``, and, where the force of a motor is wa
 
 from __future__ import annotations
 
+import html
 import json
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from rerun.chunk import RrdReader
 
 from ee_dist.effects.catalogue import apply, term
 from ee_dist.engines.contract import Rollout
@@ -71,6 +73,35 @@ def imported(cli, record) -> Path:
     return done
 
 
+def told_alike(folder: Path, said) -> list[str]:
+    """The headline and what comes below it: in summary, terminal, page and (where there is one) scene the same words."""
+    summary = json.loads((folder / "summary.json").read_text())
+    first = summary["words"][:3]
+    assert first[0] == summary["headline"]
+    assert first[1].split(": model ")[1] and "noise floor" in first[1], "the errors"
+    assert first[2].startswith("How sure: ")
+    plain = " ".join(said.out.split())
+    page = html.unescape((folder / "report.html").read_text(encoding="utf-8"))
+    scenes = [" ".join(text_of(scene)) for scene in folder.glob("*.rrd")]
+    following = said.out.strip().splitlines()[-1]
+    assert following.startswith("Next: python -m ee_dist task="), "the last line is the next command"
+    for line in (*first, following.removeprefix("Next: ")):
+        assert line in plain and line in page and all(line in text for text in scenes)
+    return first
+
+
+def text_of(scene: Path) -> list[str]:
+    """The texts of a scene."""
+    found = []
+    for chunk in RrdReader(scene).stream():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if "TextDocument:text" in name:
+                found += [t for cell in batch.column(name).to_pylist() for t in cell or []]
+    assert found, scene
+    return found
+
+
 @pytest.mark.parametrize("by", WAYS)
 def test_every_verb_by_every_way(cli, imported, by):
     way, log = f"task.by={by}", f"measured={imported}"
@@ -78,19 +109,25 @@ def test_every_verb_by_every_way(cli, imported, by):
     compared = json.loads((found / "summary.json").read_text())
     assert compared["way"] == by and compared["error"] > 1.5 * compared["noise_floor"]
     assert (found / "compare.rrd").is_file() and (found / "report.html").stat().st_size > 100_000
-    assert "Next: python -m ee_dist task=explain" in said.out
+    assert "task=explain" in said.out.strip().splitlines()[-1]
+    first = told_alike(found, said)
+    assert compared["left"] and first[0].startswith("The model is off, most of all at ")
 
     found, said = run(cli, "task=explain", log, way, SUSPECTS, "task.rerun=false", *QUICK)
     explained = json.loads((found / "summary.json").read_text())
     assert explained["verdict"] == "effect" and explained["candidates"][0]["name"] == HIDDEN
     assert explained["candidates"][0]["values"]["torque_nm"] == pytest.approx(0.06, rel=0.15)
     assert not (found / "explain.rrd").exists(), "a scene that was refused"
-    assert explained["headline"].startswith("Missing")
-    assert "coulomb friction at servo (torque 0.0" in explained["headline"]
+    headline, errors, _ = told_alike(found, said)
+    assert headline.startswith("Missing") and "coulomb friction at servo (torque 0.0" in headline
+    assert "improved model" in errors
 
     # What effect=auto finds by this way tests/discrepancy tells, in less time.
-    found, _ = run(cli, "task=improve", f"effect={HIDDEN}", log, way, "task.rerun=false", *QUICK)
+    found, said = run(cli, "task=improve", f"effect={HIDDEN}", log, way, "task.rerun=false", *QUICK)
     improved = json.loads((found / "summary.json").read_text())
+    headline, errors, sure = told_alike(found, said)
+    assert headline.startswith("Added: coulomb friction at servo (torque 0.0") and "improved model" in errors
+    assert "95 % intervals: torque 0.0" in sure
     assert [t["effect"] for t in improved["model_terms"]] == ["coulomb_friction"]
     assert improved["ladder"][-1]["error_heldout"] < 0.5 * improved["ladder"][0]["error_heldout"]
     low, high = improved["parameters"][0]["interval"]
@@ -108,11 +145,13 @@ def test_auto_takes_the_first_way_that_the_channels_allow(cli, imported):
     assert "By open_loop: commands were recorded" in said.out
 
 
-@pytest.mark.parametrize("by", ["open_loop", "free_run"])
+@pytest.mark.parametrize("by", WAYS)
 def test_a_sealed_trial_is_explained_improved_and_revealed(cli, by):
     plan = "task.excitations=['multisine:seconds=1.6,amplitude=0.2,seed=1','steps:seconds=1.6,amplitude=0.15,seed=2']"
     hidden = "+hidden=[{effect: load_friction, target: servo, share: 0.3}]"
-    tried, _ = run(cli, "task=trial", "robot=servo_pendulum", "engine=mujoco", hidden, plan, "task.noise=0.0005")
+    # What a balance of forces needs: the currents of the motors, and readings that can be differentiated twice.
+    read = ("task.motor_torque=true", "task.noise=0.0001") if by == "force_balance" else ("task.noise=0.0005",)
+    tried, _ = run(cli, "task=trial", "robot=servo_pendulum", "engine=mujoco", hidden, plan, *read)
     log, way, only = f"measured={tried}", f"task.by={by}", "task.only=[load_friction,parallel_spring]"
     explained, _ = run(cli, "task=explain", log, way, only, "task.rerun=false", *QUICK)
     shown, told = run(cli, "task=reveal", f"log={tried}", f"task.explained={explained}")

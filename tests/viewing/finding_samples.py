@@ -69,7 +69,7 @@ def finding(name: str) -> Finding:
     )
     joint = model.motor_names[0].replace("_", " ")
     # The second prediction is shorter than what was measured.
-    start = Account("the model as it was", (given[0], given[1].head(len(given[1]) // 2)), model)
+    start = Account("the model", (given[0], given[1].head(len(given[1]) // 2)), model)
     better = Account(f"with coulomb friction at {joint}", best, bodies[2])
     channels = errors_of(cases, start)
     largest = max(c.error for c in channels)
@@ -79,9 +79,8 @@ def finding(name: str) -> Finding:
         robot=model,
         cases=cases,
         model=start,
-        error=largest,
+        lines=(f"Error: model {largest:.3g} % of the range.", "How sure: very."),
         floor=0.1 * largest,
-        error_unit="% of the range",
         channels=channels,
         candidates=(
             Candidate(f"coulomb friction at {joint} (torque 0.31 N.m)", 0.93, 0.9, 0.95, BEST, better),
@@ -91,7 +90,7 @@ def finding(name: str) -> Finding:
             Candidate(f"viscous friction at {joint} (0.02 N.m.s/rad)", 0.2, 0.05, 0.3, REFUSED),
         ),
         ladder=(
-            Rung("the model as it was", largest, 0.97 * largest),
+            Rung("the model", largest, 0.97 * largest),
             Rung(f"+ coulomb friction at {joint}", 0.11 * largest),
         ),
         better=better,

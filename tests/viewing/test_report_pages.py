@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ee_dist.viewing import report_figures as figures
-from ee_dist.viewing.browser import BrowserError, HeadlessBrowser, chromium
+from ee_dist.viewing.browser import HeadlessBrowser
 from ee_dist.viewing.curves import NUMBERS, Overlay, browser, thinned
 from ee_dist.viewing.report import Page, Section, Table, write_page
 
+DRAWN = (
+    "(async () => { const box = document.querySelector('.picked'); const from = Date.now();"
+    "while (!box.data && Date.now() - from < 60000) await new Promise((done) => setTimeout(done, 20)); })()"
+)
 LONG = "coulomb friction at knee front right, and play at the hip of the other side"
 
 
@@ -45,7 +48,7 @@ def full_page() -> Page:
         f"Missing: {LONG}. Nothing else is left above the noise.",
         ["first", "second"],
         "good",
-        "How sure: 93 %",
+        ["Error: model 1.12", "How sure: 93 %"],
         "python -m ee_dist task=improve measured='logs/with a space/and/a/very/long/name/trial.mcap' effect=auto",
         Section("Where", "what", figures.proof(curves[1], ["model", "improved"], (1.0, 2.0))),
         [("1.12", "error"), ("position knee front right", "worst channel"), ("0.8", "noise floor")],
@@ -68,18 +71,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(full_page(), tmp_path_factory.mktemp("page") / "report.html")
 
 
-@pytest.fixture(scope="module")
-def window() -> Iterator[HeadlessBrowser]:
-    try:
-        chromium()
-    except BrowserError as missing:
-        pytest.skip(str(missing))
-    with HeadlessBrowser() as found:
-        yield found
-
-
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-@pytest.mark.parametrize("width", [1280, 400])
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (400, True)], ids=["wide-light", "narrow-dark"])
 def test_a_page_is_quiet_and_fits(window: HeadlessBrowser, page: Path, width: int, dark: bool) -> None:
     seen = window.look(page, width, dark=dark)
     assert seen.complaints == () and seen.asked == () and seen.overflow == 0
@@ -105,7 +97,9 @@ def test_what_would_be_wrong_is_seen(window: HeadlessBrowser, tmp_path: Path) ->
 
 
 def test_any_channel_can_be_picked_and_a_table_saved(window: HeadlessBrowser, page: Path) -> None:
-    window.look(page, 1280)
+    window.open(page, 1280)
+    window.evaluate("document.querySelector('.browser').scrollIntoView()")
+    window.evaluate(DRAWN)
     shown = "document.querySelector('.picked').data[0].y[0]"
     assert window.evaluate(shown) == pytest.approx(np.sin(5), abs=1e-4), "the worst is shown first"
     pick = (
@@ -126,9 +120,22 @@ def test_any_channel_can_be_picked_and_a_table_saved(window: HeadlessBrowser, pa
 
 
 def test_a_button_turns_the_light_off_and_on(window: HeadlessBrowser, page: Path) -> None:
-    window.look(page, 1280)
+    window.open(page, 1280)
     click = "document.getElementById('theme').click(), document.documentElement.dataset.theme"
     assert [window.evaluate(click) for _ in range(2)] == ["dark", "light"]
+
+
+def test_the_mark_of_an_effect_is_what_the_models_differ_by() -> None:
+    x = np.linspace(-1, 1, 2000)
+    law, noise = 0.3 * np.sign(x), np.random.default_rng(0).normal(0, 0.02, len(x))
+    figure = figures.cloud("torque", figures.Cloud("speed", x, law + noise, noise))
+    (mark,) = [t for t in figure.data if t.mode == "lines" and t.line.color == figures.MARK]
+    (model,) = [t for t in figure.data if t.mode == "lines" and t.line.color == figures.PREDICTED]
+    assert mark.line.dash and len(mark.x) > 15
+    at = np.array(mark.x)
+    away = np.abs(at) > 0.1
+    np.testing.assert_allclose(np.array(mark.y)[away], 0.3 * np.sign(at[away]), atol=1e-9)
+    np.testing.assert_allclose(np.array(model.y), np.array(mark.y), atol=0.02)  # it lies on what was measured
 
 
 def test_no_peak_is_lost_when_curves_are_thinned() -> None:

@@ -122,15 +122,14 @@ def test_a_view_behind_another_tab_is_said_to_be_there(rrd: Path) -> None:
         take_pictures(rrd, [0.0], size=(400, 300), view="Commands (rad)")
 
 
-@needs_vulkan
-def test_a_file_that_is_no_recording(tmp_path: Path) -> None:
+@pytest.mark.parametrize("content", [b"", b"RR", b"not a recording at all", b"\x89MCAP0\r\n"])
+def test_a_file_that_is_no_recording(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "wrong.rrd"
-    path.write_bytes(b"not a recording at all")
+    path.write_bytes(content)
     with pytest.raises(ViewerError, match=r"cannot read .*wrong\.rrd"):
         take_pictures(path, [0.0], size=(400, 300))
 
 
-@needs_vulkan
 def test_a_recording_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ViewerError, match="no such recording"):
         take_pictures(tmp_path / "none.rrd", [0.0], size=(400, 300))

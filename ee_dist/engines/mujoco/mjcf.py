@@ -15,6 +15,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, entries, folded
@@ -155,7 +156,7 @@ class _Reader:
             raise MjcfError(f"{self.file}: no <body> in it")
         if (m.jnt_type == _BALL).any():
             j = int(np.argmax(m.jnt_type == _BALL))
-            raise MjcfError(f"{self.file}: joint {self.name(j, 'joint')!r} is a ball; write it as three hinges")
+            raise MjcfError(f"{self.file}: joint {quoted(self.name(j, 'joint'))} is a ball; write it as three hinges")
         if free and (len(free) > 1 or len(tops) > 1 or m.body_parentid[m.jnt_bodyid[free[0]]] != 0):
             raise MjcfError(f"{self.file}: several bodies of which some move freely; name the file of the robot alone")
         start: tuple[Vec3, Quat] = (ZERO3, NO_TURN)
@@ -177,7 +178,7 @@ class _Reader:
         if own != (ZERO3, NO_TURN):
             start = own
         if idle:
-            raise MjcfError(f"{self.file}: body {idle[0]!r}: no mass, but a joint moves it")
+            raise MjcfError(f"{self.file}: body {quoted(idle[0])}: no mass, but a joint moves it")
         present = {j.name for j in joints}
         names = {j: n for j, n in self.joints.items() if n in present}
         drives, driven, said = drives_of(m, names)
@@ -254,7 +255,7 @@ class _Reader:
         far = CONTINUOUS_RAD if kind == "hinge" else CONTINUOUS_M
         lower, upper = (float(v) for v in m.jnt_range[j]) if m.jnt_limited[j] else (-far, far)
         if not lower < upper:
-            raise MjcfError(f"{self.file}: joint {name!r}: its range {lower:g} to {upper:g} leaves nothing")
+            raise MjcfError(f"{self.file}: joint {quoted(name)}: its range {lower:g} to {upper:g} leaves nothing")
         start = float((m.qpos0 if self.key is None else self.key)[m.jnt_qposadr[j]])
         return Joint(
             name, kind, parent, child, _vec(place), _vec(axis), lower, upper, turn, start=min(max(start, lower), upper)

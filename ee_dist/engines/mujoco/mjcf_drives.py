@@ -126,12 +126,12 @@ def sensors_of(
     kinds = {
         int(_S.mjSENS_JOINTPOS): "position",
         int(_S.mjSENS_JOINTVEL): "velocity",
-        int(_S.mjSENS_JOINTACTFRC): "torque",
+        int(_S.mjSENS_JOINTACTFRC): "motor_torque",
         int(_S.mjSENS_ACTUATORPOS): "position",
         int(_S.mjSENS_ACTUATORVEL): "velocity",
-        int(_S.mjSENS_ACTUATORFRC): "torque",
+        int(_S.mjSENS_ACTUATORFRC): "motor_torque",
     }
-    units = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "torque": ("N.m", "N")}
+    units = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "motor_torque": ("N.m", "N")}
     for s in range(m.nsensor):
         label = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_SENSOR, s) or f"sensor_{s}"
         kind, target = kinds.get(int(m.sensor_type[s])), int(m.sensor_objid[s])

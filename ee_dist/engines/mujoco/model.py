@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.engines.contract import EngineError
 from ee_dist.engines.drive import stiff_joints
 from ee_dist.engines.loop import gravity_vector
@@ -80,7 +81,7 @@ class Model:
         try:
             self.compiled = _spec(robot).compile()
         except ValueError as error:
-            raise EngineError(f"mujoco cannot build {robot.name!r}: {' '.join(str(error).split())}") from error
+            raise EngineError(f"mujoco cannot build {quoted(robot.name)}: {' '.join(str(error).split())}") from error
         m = self.compiled
         self.damped = bool(stiff_joints(robot).any())
         self._scratch = mujoco.MjData(m)

@@ -14,6 +14,7 @@ from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, TORQUE
 from ee_dist.measurements.units import UNITS
+from ee_dist.robots.instruments import MOTOR_TORQUE
 from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.model import RobotError
 from ee_dist.trials.log import Array
@@ -85,7 +86,7 @@ def _check_order(v: View, block: Block) -> None:
 
 def add_torques(v: View) -> None:
     """The torque sensors and the torques of the drives, where a block is the one or the other."""
-    sensed = v.sensor_names("torque")
+    sensed = [net or motor for net, motor in zip(v.sensor_names("torque"), v.sensor_names(MOTOR_TORQUE), strict=True)]
     found = []
     v.needed = torques_needed(v)
     for b in v.blocks:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.readers.arrays import read_npz
 from ee_dist.measurements.readers.bags import is_bag, read_bag, read_mcap
@@ -66,7 +67,9 @@ def read(path: str | Path, options: Options = Options()) -> tuple[Recorded, ...]
             f"{file}: a folder; expected a file, a ROS 2 bag (metadata.yaml) or a LeRobot data set (meta/info.json)"
         )
     if chosen not in READERS:
-        raise MeasurementError(f"{file}: unknown format {options.kind or file.suffix!r}; expected {', '.join(FORMATS)}")
+        raise MeasurementError(
+            f"{file}: unknown format {quoted(options.kind or file.suffix)}; expected {', '.join(FORMATS)}"
+        )
     try:
         if file.is_file() and file.stat().st_size == 0:
             raise MeasurementError(f"{file}: the file is empty")

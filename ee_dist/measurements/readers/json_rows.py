@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.readers.options import Options, bounded
 from ee_dist.measurements.table import Recorded, Table
@@ -32,14 +33,14 @@ def read_json(file: Path, options: Options) -> tuple[Recorded, ...]:
             lengths = {len(v) for v in columns.values()}
             if len(columns) < 2 or len(lengths) != 1:
                 raise MeasurementError(
-                    f"{file}: no list named {options.records!r} in it; {nearest(options.records, data)}"
+                    f"{file}: no list named {quoted(options.records)} in it; {nearest(options.records, data)}"
                 )
             rest = {str(k): v for k, v in data.items() if str(k) not in columns}
             return (Recorded("", (Table(file, columns, rest),)),)
         rows = data[name]
         header = {str(k): v for k, v in data.items() if k != name}
     elif not (isinstance(data, list) and data and isinstance(data[0], Mapping)):
-        raise MeasurementError(f"{file}: no list named {options.records!r} in it; the file is not a mapping")
+        raise MeasurementError(f"{file}: no list named {quoted(options.records)} in it; the file is not a mapping")
     return (Recorded("", (Table(file, _columns(file, rows), header),)),)
 
 
@@ -81,7 +82,7 @@ def _columns(file: Path, rows: list[Any]) -> dict[str, Any]:
     columns: dict[str, list[Any]] = {}
     for i, row in enumerate(rows):
         if not isinstance(row, Mapping):
-            raise MeasurementError(f"{file}: row {i + 1}: expected a mapping of columns, not {str(row)[:40]!r}")
+            raise MeasurementError(f"{file}: row {i + 1}: expected a mapping of columns, not {quoted(row)}")
         flat: dict[str, Any] = {}
         _flatten(row, "", flat, 0)
         for name, value in flat.items():

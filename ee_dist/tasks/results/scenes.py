@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +13,11 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.improve import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
-from ee_dist.discrepancy.words import Account, placed, told_all
+from ee_dist.discrepancy.words import Account, above, told_all
 from ee_dist.effects.catalogue import Hypothesis, apply
-from ee_dist.tasks.results.tables import TIED_STANDING, standing
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, unit_of
+from ee_dist.tasks.results.labels import drawn as in_unit
+from ee_dist.tasks.results.tables import TIED_STANDING, command, standing
 from ee_dist.trials.log import SensorLog
 from ee_dist.viewing import finding as drawn
 from ee_dist.viewing.finding_scene import write_compare_rrd, write_explain_rrd, write_improve_rrd
@@ -24,24 +27,32 @@ CANDIDATES = 4
 STANDINGS = {"best": drawn.BEST, TIED_STANDING: drawn.TIED, "earned": drawn.EARNED}
 
 
-def compare_scene(problem: Problem, found: Comparison, account: Account, model: Hypothesis, path: Path) -> None:
-    write_compare_rrd(_finding(problem, found, account, model, found.error), path)
+def compare_scene(
+    problem: Problem, found: Comparison, account: Account, model: Hypothesis, path: Path, following: Sequence[str] = ()
+) -> None:
+    write_compare_rrd(_finding(problem, found, account, model, following), path)
 
 
-def explain_scene(problem: Problem, found: Explanation, account: Account, path: Path) -> None:
+def explain_scene(
+    problem: Problem, found: Explanation, account: Account, path: Path, following: Sequence[str] = ()
+) -> None:
     """With the predictions of the first candidates to switch between."""
     shown = found.tied or found.candidates[:CANDIDATES]
     candidates = tuple(_candidate(problem, found, c, c in shown[:CANDIDATES]) for c in found.candidates)
     where = compare(problem, found.base)
-    finding = _finding(problem, where, account, found.before, found.baseline_error)
+    finding = _finding(problem, where, account, found.before, following)
     write_explain_rrd(replace(finding, candidates=candidates), path)
 
 
-def improve_scene(problem: Problem, found: Improvement, account: Account, model: Hypothesis, path: Path) -> None:
+def improve_scene(
+    problem: Problem, found: Improvement, account: Account, model: Hypothesis, path: Path, following: Sequence[str] = ()
+) -> None:
     """Before, after, and the ladder between them."""
-    finding = _finding(problem, compare(problem, found.base), account, model, found.ladder[0].error_heldout)
-    ladder = tuple(drawn.Rung(placed(r.name), r.error_heldout, r.error_fit) for r in found.ladder)
-    better = said(problem, "improved model", found.terms)
+    finding = _finding(problem, compare(problem, found.base), account, model, following)
+    ladder = tuple(
+        drawn.Rung(step_name(r), in_unit(problem, r.error_heldout), in_unit(problem, r.error_fit)) for r in found.ladder
+    )
+    better = said(problem, IMPROVED, found.terms)
     write_improve_rrd(replace(finding, ladder=ladder, better=better), path)
 
 
@@ -82,16 +93,24 @@ def _of_series(measured: SensorLog, own: dict[str, Series]) -> SensorLog:
     )
 
 
-def _finding(problem: Problem, where: Comparison, account: Account, model: Hypothesis, error: float) -> drawn.Finding:
+def _finding(
+    problem: Problem, where: Comparison, account: Account, model: Hypothesis, following: Sequence[str]
+) -> drawn.Finding:
     names = [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)]
     of_trial = dict(zip(problem.trials, names, strict=False))
     channels = tuple(
         drawn.ChannelError(
-            c.name, c.unit, c.normalised, c.rmse, of_trial.get(c.worst_trial, ""), c.worst_from_s, c.worst_to_s
+            c.name,
+            c.unit,
+            in_unit(problem, c.normalised),
+            c.rmse,
+            of_trial.get(c.worst_trial, ""),
+            c.worst_from_s,
+            c.worst_to_s,
         )
         for c in where.channels
     )
-    mine = said(problem, "model", model)
+    mine = said(problem, MODEL, model)
     cases: list[drawn.Case] = []
     for name, trial, log in zip(names, problem.measured, mine.logs, strict=True):
         measured = trial.log
@@ -110,16 +129,16 @@ def _finding(problem: Problem, where: Comparison, account: Account, model: Hypot
         problem.robot,
         tuple(cases),
         mine,
-        error,
-        where.noise_floor,
-        "standard deviations",
+        tuple(account.first),
+        in_unit(problem, where.noise_floor),
+        unit_of(problem),
         channels,
+        next_command=command(following) if following else "",
     )
 
 
 def _candidate(problem: Problem, found: Explanation, c: Judged, shown: bool) -> drawn.Candidate:
-    above = c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0
     label = told_all(c.terms, problem.robot)
     kind = STANDINGS.get(standing(c, found.candidates[0]), drawn.REFUSED)
     account = said(problem, label, (*found.fixed, *c.hypothesis)) if shown else None
-    return drawn.Candidate(label, c.explained, above * c.interval[0], above * c.interval[1], kind, account)
+    return drawn.Candidate(label, c.explained, *above(c), kind, account)

@@ -10,8 +10,9 @@ from ee_dist.discrepancy.compare import Comparison, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import placed, plain, told_all
-from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.discrepancy.words import above, percent, placed, plain, told_all
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn
 from ee_dist.tasks.results.tables import standing
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
@@ -19,10 +20,13 @@ from ee_dist.viewing.curves import MOST as POINTS
 from ee_dist.viewing.curves import Overlay, browser, rows_of, thinned
 from ee_dist.viewing.report import Section, Table
 
+MARK = "mark of what was found"
+MARKS = 2
+"""Effects whose mark is told in words."""
 PAD_S = 0.6
 """Shown before and after the stretch that proves most, at least."""
 Models = Sequence[tuple[str, Hypothesis]]
-"""(label, terms): the model as it was, and perhaps one that has what was found."""
+"""(label, terms): the model, and perhaps the improved one."""
 
 
 def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
@@ -82,8 +86,9 @@ def proof_section(
     pad = max(PAD_S, 1.5 * (end - begin))
     rows = np.flatnonzero((curve.times_s >= begin - pad) & (curve.times_s <= end + pad))
     shown = thinned(rows_of(curve, rows) if len(rows) > 1 else curve, POINTS)
-    what = "the model is most wrong" if after is None else "what was found takes off most"
-    heading = f"Where it shows most: {curve.channel}, {trial}, {begin:.1f} to {end:.1f} s"
+    what = "the error is largest" if after is None else "what was found takes off most"
+    shows = "Where the error is largest" if after is None else "Where it shows most"
+    heading = f"{shows}: {curve.channel}, {trial}, {begin:.1f} to {end:.1f} s"
     caption = f"Measured and predicted where {what} (shaded); below, what was measured less what was predicted."
     return Section(heading, caption, figures.proof(shown, [n for n, _ in models], (begin, end)))
 
@@ -106,16 +111,25 @@ def heat_section(problem: Problem, residual: Array, after: Array | None = None) 
         "Each cell is the error of one channel in one window of time. What is near the background is noise, red is what the "
         "model gets wrong."
     )
-    tables = [heat(problem, residual)] + ([] if after is None else [heat(problem, after)])
-    return Section("Where it fails, channel by time", caption, figures.heat_map(tables, unique, problem.channels))
+    tables = [drawn(problem, heat(problem, r)) for r in (residual, after) if r is not None]
+    figure = figures.heat_map(
+        tables, unique, problem.channels, drawn(problem, 1.0), (MODEL, IMPROVED), axis_of(problem)
+    )
+    return Section("Where it fails, channel by time", caption, figure)
 
 
-def signature_section(problem: Problem, residual: Array, after: Array | None = None, most: int = 3) -> Section | None:
-    """Residuals of the worst joint channels against position, speed, command and load, before and after."""
+def signature_section(
+    problem: Problem, residual: Array, after: Array | None = None, found: Hypothesis = (), most: int = 3
+) -> Section | None:
+    """Residuals of the joint channels in which the effects ``found`` show most (without any: of the worst) against
+    position, speed, command and load, with the mark that the effects promise."""
     layout = problem.layout
-    score = np.bincount(problem.channel_of[layout.reading], weights=residual[layout.reading] ** 2)
-    worst = [int(c) for c in np.argsort(-score) if layout.joint_of_channel[c] is not None and score[c] > 0][:most]
     raw, better = problem.raw(residual), None if after is None else problem.raw(after)
+    shown_by = residual**2 if after is None else residual**2 - after**2
+    score = np.bincount(
+        problem.channel_of[layout.reading], weights=shown_by[layout.reading], minlength=len(problem.channels)
+    )
+    worst = [int(c) for c in np.argsort(-score) if layout.joint_of_channel[c] is not None and score[c] > 0][:most]
     around = [circumstances(problem, k) for k in range(len(problem.trials))]
     shown = []
     for c in worst:
@@ -133,17 +147,30 @@ def signature_section(problem: Problem, residual: Array, after: Array | None = N
                 own = problem.trial_of[mine] == k
                 rows = rows_at(problem, k, layout.time_s[mine[own]])
                 x[own] = getattr(around[k], key)[rows, j]
-            if np.isfinite(x).all():
+            if np.isfinite(x).all() and np.ptp(x) > 0:
                 part = figures.Cloud(label, x, raw[mine], None if better is None else better[mine])
                 shown.append(figures.cloud(f"{plain(problem.channels[c])} ({layout.units[c]})", part))
     if not shown:
         return None
-    caption = (
-        "A law that is missing draws a line here: friction a step at zero speed, a spring a slope over position, "
-        "play a gap at zero load. Thick lines are means."
-    )
-    legend = [("before", figures.RESIDUAL)] + ([] if after is None else [("after", figures.IMPROVED)])
+    caption = "What was measured less what is predicted, against what the joint did. Thick lines are means. "
+    legend = [(MODEL, figures.PREDICTED)]
+    if after is None:
+        caption += (
+            "A law that is missing draws a line here: friction a step at zero speed, a spring a slope over position, play a "
+            "gap at zero load."
+        )
+    else:
+        legend += [(IMPROVED, figures.IMPROVED), (MARK, figures.MARK)]
+        caption += (
+            f"Dashed is the mark of what was found, from the two models alone: where it lies on the line of the {MODEL}, it "
+            "is what was measured."
+        )
+        caption += "".join(f" {_capital(placed(t.name))}: {CATALOGUE[t.effect].signature}" for t in found[:MARKS])
     return Section("Residual against what the joint did", caption, figures=shown, legend=legend)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def ranking_section(
@@ -154,8 +181,8 @@ def ranking_section(
     best = judged[0]
     kinds = [_kind(c, best) for c in judged]
     rows = [
-        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), f"{c.gain:.1%}",
-         f"{max(c.interval[0], -9.99):.1%} to {c.interval[1]:.1%}", standing(c, best)]
+        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(min(c.explained, 1.0)),
+         f"{percent(max(above(c)[0], -9.99))} to {percent(min(above(c)[1], 1.0))}", standing(c, best)]
         for c in judged
     ]  # fmt: skip
     pale = [k for k, kind in enumerate(kinds) if kind == "not"]
@@ -164,11 +191,10 @@ def ranking_section(
         f"Share of what is above the noise that each takes off data it was not fitted to ({best.held_out}), with its 95 % "
         "interval. Hatched: refused."
     )
-    above = [c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0 for c in judged]
     figure = figures.ranking(
         [placed(c.name) for c in judged],
         [c.explained for c in judged],
-        [(c.interval[0] * a, c.interval[1] * a) for c, a in zip(judged, above, strict=True)],
+        [above(c) for c in judged],
         kinds,
     )
     columns = ["rank", "effect", f"{problem.natural_name}, held out", "gain", "95 % interval", "judgement"]
@@ -185,18 +211,18 @@ def trials_section(problem: Problem, found: Comparison) -> Section:
     rows = [[t, problem.told(e)] for t, e in zip(problem.trials, found.trial_errors, strict=True)]
     figure = figures.bars(
         [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)],
-        found.trial_errors,
-        "error (standard deviations)",
-        found.noise_floor,
+        [drawn(problem, e) for e in found.trial_errors],
+        axis_of(problem),
+        drawn(problem, found.noise_floor),
     )
     return Section("By trial", "", figure, Table(["trial", problem.natural_name], rows, (1,)))
 
 
 def regimes_section(problem: Problem, found: Comparison) -> Section:
     regimes = sorted(found.regimes, key=lambda r: -r.error)
-    rows = [[r.name, f"{r.error:.2f}", f"{r.share:.0%}", f"{r.values:.0%}"] for r in regimes]
-    label = "error (standard deviations)"
-    figure = figures.bars([r.name for r in regimes], [r.error for r in regimes], label, found.noise_floor)
+    rows = [[r.name, problem.told(r.error), percent(r.share), percent(r.values)] for r in regimes]
+    errors = [drawn(problem, r.error) for r in regimes]
+    figure = figures.bars([r.name for r in regimes], errors, axis_of(problem), drawn(problem, found.noise_floor))
     table = Table(["regime", "error", "share of the excess", "share of the data"], rows, (1, 2, 3))
     return Section("By regime", "Joint channels, sorted by what their joint was doing at the time.", figure, table)
 
@@ -207,22 +233,22 @@ def channels_section(problem: Problem, found: Comparison, after: Comparison | No
     rows, first = [], [c for c in found.channels if not later or c.name in later]
     for c in first:
         unit = "" if c.unit == "1" else f" {c.unit}"
-        row = [plain(c.name), f"{c.rmse:.4g}{unit}", f"{c.normalised:.2f}"]
+        row = [plain(c.name), f"{c.rmse:.4g}{unit}", problem.told(c.normalised)]
         if after is not None:
-            row += [f"{later[c.name].rmse:.4g}{unit}", f"{later[c.name].normalised:.2f}"]
+            row += [f"{later[c.name].rmse:.4g}{unit}", problem.told(later[c.name].normalised)]
         rows.append([*row, c.worst_trial, f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
-    columns = ["channel", "rmse", "error"] + ([] if after is None else ["rmse after", "error after"])
+    columns = ["channel", "rmse", "error"] + ([] if after is None else [f"rmse, {IMPROVED}", f"error, {IMPROVED}"])
     table = Table([*columns, "worst trial", "when"], rows, tuple(range(1, len(columns))))
     shown = [c for c in first if c.normalised > 0][:most]
     figure = figures.bars(
         [plain(c.name) for c in shown],
-        [c.normalised for c in shown],
-        "error (standard deviations)",
-        found.noise_floor,
-        None if after is None else [later[c.name].normalised for c in shown],
+        [drawn(problem, c.normalised) for c in shown],
+        axis_of(problem),
+        drawn(problem, found.noise_floor),
+        None if after is None else [drawn(problem, later[c.name].normalised) for c in shown],
     )
-    caption = "Root mean square in the channel's own unit, and in standard deviations."
+    caption = f"Root mean square in the channel's own unit, and {axis_of(problem)}."
     if len(first) > most:
         caption += f" Bars: the {len(shown)} largest."
-    legend = [] if after is None else [("before", figures.RESIDUAL), ("after", figures.IMPROVED)]
+    legend = [] if after is None else [(MODEL, figures.PREDICTED), (IMPROVED, figures.IMPROVED)]
     return Section("By channel", caption, figure, table, legend=legend)

@@ -28,11 +28,13 @@ def common(problem: Problem, account: Account, floor: float, source: str, model:
         "noise_floor_source": source,
         "model_terms": hypothesis_list(model),
         "headline": account.headline,
-        "words": [account.headline, *account.lines],
+        "words": account.words,
     }
 
 
-def of_comparison(problem: Problem, found: Comparison, account: Account, model: Hypothesis) -> dict[str, Any]:
+def of_comparison(
+    problem: Problem, found: Comparison, account: Account, model: Hypothesis, left: Sequence[Leftover]
+) -> dict[str, Any]:
     return {
         **common(problem, account, found.noise_floor, found.floor_source, model),
         "error": found.error,
@@ -47,6 +49,7 @@ def of_comparison(problem: Problem, found: Comparison, account: Account, model: 
             for t, e in zip(problem.trials, found.trial_errors, strict=True)
         ],
         "parted_s": found.parted_s,
+        "left": of_left(left),
     }  # fmt: skip
 
 

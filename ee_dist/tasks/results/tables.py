@@ -15,7 +15,8 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.improve import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, named, plain, told_all
+from ee_dist.discrepancy.words import Account, named, percent, plain, told_all
+from ee_dist.tasks.results.labels import step_name
 
 TIED_STANDING = "tied with the best"
 Column = tuple[str, bool]
@@ -33,13 +34,13 @@ def _table(title: str, columns: Sequence[Column], rows: Sequence[Sequence[str]])
 
 def show_comparison(console: Console, problem: Problem, found: Comparison) -> None:
     rows = [
-        (plain(c.name), f"{c.rmse:.3g} {c.unit}", f"{c.normalised:.2f}",
+        (plain(c.name), f"{c.rmse:.3g} {c.unit}", problem.told(c.normalised),
          f"{c.worst_trial}, {c.worst_from_s:.1f} to {c.worst_to_s:.1f} s") for c in found.channels[:8]
     ]  # fmt: skip
     columns = (("channel", False), ("rmse", True), ("error", True), ("worst", False))
     console.print(_table("Where it fails: channels", columns, rows))
     ordered = sorted(found.regimes, key=lambda r: -r.error)
-    rows2 = [(r.name, f"{r.error:.2f}", f"{r.share:.0%}", f"{r.values:.0%}") for r in ordered]
+    rows2 = [(r.name, problem.told(r.error), percent(r.share), percent(r.values)) for r in ordered]
     columns = (("regime", False), ("error", True), ("share of excess", True), ("of data", True))
     console.print(_table("Where it fails: regimes", columns, rows2))
 
@@ -49,7 +50,7 @@ def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged]
         return
     best = judged[0]
     rows = [
-        (str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), f"{c.gain:.0%}",
+        (str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(min(c.explained, 1.0)),
          standing(c, best)) for c in judged
     ]  # fmt: skip
     columns = (("", True), ("effect", False), ("held out", True), ("gain", True), ("", False))
@@ -67,7 +68,7 @@ def standing(c: Judged, best: Judged) -> str:
 
 def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
     rows = [
-        (told_all(r.added, problem.robot) or r.name, problem.told(r.error_fit), problem.told(r.error_heldout))
+        (told_all(r.added, problem.robot) or step_name(r), problem.told(r.error_fit), problem.told(r.error_heldout))
         for r in found.ladder
     ]
     table = _table(f"The ladder: {problem.natural_name}", (("step", False), ("fitted", True), ("held out", True)), rows)
@@ -83,12 +84,14 @@ def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
 
 
 def show_account(console: Console, account: Account, out: Path, following: Sequence[str] = ()) -> None:
-    """What speaks for it, the files, and last the finding in one sentence with the command to type next."""
+    """What speaks for it, the files, and last the finding with how sure it is and the command to type next."""
     for line in account.lines:
         console.print(line, highlight=False, markup=False)
     for file in sorted(p.name for p in out.iterdir() if p.is_file() and not p.name.startswith(".")):
         console.print(f"  {os.path.relpath(out / file)}", highlight=False, markup=False, soft_wrap=True)
     console.print(account.headline, highlight=False, markup=False, style="bold")
+    for line in account.first:
+        console.print(line, highlight=False, markup=False)
     if following:
         console.print(f"Next: {command(following)}", highlight=False, markup=False, soft_wrap=True)
 

@@ -1,0 +1,25 @@
+"""Instruments beside those that a robot has: a meter of each motor's current, read as the torque that it stands for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ee_dist.robots.model import Robot, Sensor
+
+MOTOR_TORQUE = "motor_torque"
+"""Kind of a sensor that shows what the motor gave, before friction and all else that comes after it."""
+
+
+def with_motor_torques(robot: Robot) -> Robot:
+    """The robot with a sensor ``motor_torque_JOINT`` (N.m; N of a slide), after its own, for each motor that has none yet."""
+    known = {s.target for s in robot.sensors if s.kind == MOTOR_TORQUE}
+    added = tuple(
+        Sensor(f"{MOTOR_TORQUE}_{d.joint}", MOTOR_TORQUE, d.joint, "N" if _slides(robot, d.joint) else "N.m")
+        for d in robot.drives
+        if d.command != "none" and d.joint not in known
+    )
+    return replace(robot, sensors=(*robot.sensors, *added))
+
+
+def _slides(robot: Robot, joint: str) -> bool:
+    return bool(robot.joint(joint).kind == "slide")

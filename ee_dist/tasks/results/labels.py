@@ -1,0 +1,39 @@
+"""The same words for the same things in terminal, page and scene."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from ee_dist.discrepancy.improve import Rung
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import placed
+from ee_dist.trials.log import Array
+
+MODEL = "model"
+"""The model as it was given."""
+IMPROVED = "improved model"
+"""The model with what was found."""
+
+_FACTORS = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm")}
+Value = TypeVar("Value", float, Array)
+
+
+def unit_of(problem: Problem) -> str:
+    """The unit in which errors of this way are drawn, which is that in which they are told."""
+    return _FACTORS.get(problem.natural_unit, (1.0, problem.natural_unit))[1]
+
+
+def drawn(problem: Problem, error: Value) -> Value:
+    """An error, or many, in ``unit_of``."""
+    factor = _FACTORS.get(problem.natural_unit, (1.0, ""))[0]
+    return factor * problem.natural(error)  # type: ignore[return-value, arg-type]
+
+
+def axis_of(problem: Problem) -> str:
+    """What stands at an axis of errors."""
+    return f"{problem.natural_name} ({unit_of(problem)})"
+
+
+def step_name(r: Rung) -> str:
+    """A step of the ladder: what was added, or, of the first, the model itself."""
+    return placed(r.name) if r.added or r.held_out != "nothing was fitted" else f"the {MODEL}"

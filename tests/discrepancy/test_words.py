@@ -1,0 +1,85 @@
+"""What findings say: ties by name, errors with their digits and units, agreement only where nothing stands out."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.explain import EFFECT
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.words import Account, compare_account, explain_account, told
+from ee_dist.effects.catalogue import term
+from ee_dist.robots.linear_stage import linear_stage
+from ee_dist.robots.servo_pendulum import servo_pendulum
+
+
+def headline(tied: list[str]) -> str:
+    best = SimpleNamespace(
+        terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
+        explained=1.0, held_out="windows", error_heldout=1.1,
+    )  # fmt: skip
+    found = SimpleNamespace(
+        best=best,
+        verdict=EFFECT,
+        left=[],
+        baseline_error=2.0,
+        refitted_error=2.0,
+        noise_floor=1.0,
+        floor_source="told",
+        tried=9,
+    )
+    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="")
+    return explain_account(problem, found, None).headline  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("tied", "said"),
+    [
+        ([], "Missing: coulomb friction at servo (torque 0.3 N.m). Nothing"),
+        (["part_lost@servo"], "(torque 0.3 N.m), or part lost at servo, which looks the same here. Nothing"),
+        (["part_lost@servo", "b@c"], ", or part lost at servo or b at c, which look the same here. Nothing"),
+        (["a@c", "b@c", "d@c"], ", or one of 3 others that look the same here. Nothing"),
+    ],
+)
+def test_what_looks_the_same_is_named(tied: list[str], said: str) -> None:
+    assert said in headline(tied)
+
+
+def compared(error: float, left: list[Leftover]) -> Account:
+    found = SimpleNamespace(
+        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={}, channels=[SimpleNamespace(name="a_b")]
+    )  # fmt: skip
+    problem = SimpleNamespace(
+        told=str, natural=lambda e: e**2, natural_name="error", natural_unit="mm", channels=("a_b",), trials=("sway",)
+    )
+    return compare_account(problem, found, left)  # type: ignore[arg-type]
+
+
+def test_an_error_below_its_floor_gets_a_word() -> None:
+    assert not [line for line in compared(1.05, []).lines if "below" in line or "within chance" in line]
+    assert "The error is at the floor, within chance." in compared(0.98, []).lines
+    assert any(line.startswith("The error is below the floor: the noise was") for line in compared(0.9, []).lines)
+
+
+def test_a_small_error_is_no_agreement_where_a_channel_stands_out() -> None:
+    calm, loud = compared(1.02, []), compared(1.02, [Leftover("sway", "a_b", 7.0, 3.0, True)])
+    assert calm.good and calm.headline.startswith("The model agrees") and calm.advice.startswith("Next: nothing")
+    assert not loud.good and "nearly right" in loud.headline and "most of all at a b" in loud.headline
+    assert "stands out in 1 of 1 curve (1 channel in 1 trial)" in loud.sure and not loud.advice
+
+
+def test_times_the_floor_are_those_of_the_errors_that_are_told() -> None:
+    assert "9 times what noise alone would leave" in compared(3.0, []).headline, "the way tells squares"
+
+
+@pytest.mark.parametrize(("error_m", "said"), [(3.2e-8, "3.2e-05 mm"), (4.1e-5, "0.041 mm"), (0.0123456, "12.3 mm")])
+def test_small_errors_keep_their_digits(error_m: float, said: str) -> None:
+    problem = SimpleNamespace(natural=lambda e: e, unit="m")
+    assert FreeRun.told(problem, error_m) == said  # type: ignore[arg-type]
+
+
+def test_units_are_told_once_and_as_they_are_on_a_slide() -> None:
+    stage = linear_stage()
+    assert told(term("zero_offset", "carriage", offset_rad=0.07), stage) == "zero offset at carriage (offset 0.07 m)"
