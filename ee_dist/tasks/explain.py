@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
+from ee_dist.discrepancy.explain import EFFECT, explain
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.words import explain_account
@@ -64,7 +64,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead))
     following = []
-    if found.verdict in (EFFECT, UNEXPLAINED):
+    if found.verdict == EFFECT:
         model = [setting("model", config.model)] if config.model else []
         effect = setting("effect", found.best.terms[0].name if found.best else "auto")
         following = ["task=improve", setting("measured", measured.files[0]), *model, effect]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
+from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.improve import Rung
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed
@@ -37,3 +38,17 @@ def axis_of(problem: Problem) -> str:
 def step_name(r: Rung) -> str:
     """A step of the ladder: what was added, or, of the first, the model itself."""
     return placed(r.name) if r.added or r.held_out != "nothing was fitted" else f"the {MODEL}"
+
+
+def trial_name(problem: Problem, trial: int) -> str:
+    """With its number: repeats have one name."""
+    return problem.trials[trial] if len(problem.trials) == 1 else f"{trial + 1}. {problem.trials[trial]}"
+
+
+def worst_trials(problem: Problem, found: Comparison) -> dict[str, str]:
+    """By channel the trial in which it is worst."""
+    segments = found.heat.argmax(axis=0)
+    return {
+        name: trial_name(problem, int(problem.trial_of_segment[k]))
+        for name, k in zip(problem.channels, segments, strict=True)
+    }

@@ -13,9 +13,9 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.improve import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
-from ee_dist.discrepancy.words import Account, above, told_all
+from ee_dist.discrepancy.words import Account, above, placed, told_all
 from ee_dist.effects.catalogue import Hypothesis, apply
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, unit_of
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, trial_name, unit_of, worst_trials
 from ee_dist.tasks.results.labels import drawn as in_unit
 from ee_dist.tasks.results.tables import TIED_STANDING, command, standing
 from ee_dist.trials.log import SensorLog
@@ -96,15 +96,15 @@ def _of_series(measured: SensorLog, own: dict[str, Series]) -> SensorLog:
 def _finding(
     problem: Problem, where: Comparison, account: Account, model: Hypothesis, following: Sequence[str]
 ) -> drawn.Finding:
-    names = [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)]
-    of_trial = dict(zip(problem.trials, names, strict=False))
+    names = [trial_name(problem, k) for k in range(len(problem.trials))]
+    worst = worst_trials(problem, where)
     channels = tuple(
         drawn.ChannelError(
             c.name,
             c.unit,
             in_unit(problem, c.normalised),
             c.rmse,
-            of_trial.get(c.worst_trial, ""),
+            worst[c.name],
             c.worst_from_s,
             c.worst_to_s,
         )
@@ -140,5 +140,5 @@ def _finding(
 def _candidate(problem: Problem, found: Explanation, c: Judged, shown: bool) -> drawn.Candidate:
     label = told_all(c.terms, problem.robot)
     kind = STANDINGS.get(standing(c, found.candidates[0]), drawn.REFUSED)
-    account = said(problem, label, (*found.fixed, *c.hypothesis)) if shown else None
+    account = said(problem, placed(c.name), (*found.fixed, *c.hypothesis)) if shown else None
     return drawn.Candidate(label, c.explained, *above(c), kind, account)

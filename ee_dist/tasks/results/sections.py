@@ -12,7 +12,7 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import above, percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, trial_name, worst_trials
 from ee_dist.tasks.results.tables import standing
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
@@ -50,11 +50,6 @@ def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
         )
         for s in problem.series(models[0][1])
     ]
-
-
-def trial_name(problem: Problem, trial: int) -> str:
-    """With its number: repeats have one name."""
-    return problem.trials[trial] if len(problem.trials) == 1 else f"{trial + 1}. {problem.trials[trial]}"
 
 
 def proof_section(
@@ -208,9 +203,10 @@ def _kind(c: Judged, best: Judged) -> str:
 
 
 def trials_section(problem: Problem, found: Comparison) -> Section:
-    rows = [[t, problem.told(e)] for t, e in zip(problem.trials, found.trial_errors, strict=True)]
+    names = [trial_name(problem, k) for k in range(len(problem.trials))]
+    rows = [[t, problem.told(e)] for t, e in zip(names, found.trial_errors, strict=True)]
     figure = figures.bars(
-        [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)],
+        names,
         [drawn(problem, e) for e in found.trial_errors],
         axis_of(problem),
         drawn(problem, found.noise_floor),
@@ -230,13 +226,14 @@ def regimes_section(problem: Problem, found: Comparison) -> Section:
 def channels_section(problem: Problem, found: Comparison, after: Comparison | None = None, most: int = 14) -> Section:
     """Errors of the channels, before and perhaps after, largest first."""
     later = {} if after is None else {c.name: c for c in after.channels}
+    worst = worst_trials(problem, found)
     rows, first = [], [c for c in found.channels if not later or c.name in later]
     for c in first:
         unit = "" if c.unit == "1" else f" {c.unit}"
         row = [plain(c.name), f"{c.rmse:.4g}{unit}", problem.told(c.normalised)]
         if after is not None:
             row += [f"{later[c.name].rmse:.4g}{unit}", problem.told(later[c.name].normalised)]
-        rows.append([*row, c.worst_trial, f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
+        rows.append([*row, worst[c.name], f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
     columns = ["channel", "rmse", "error"] + ([] if after is None else [f"rmse, {IMPROVED}", f"error, {IMPROVED}"])
     table = Table([*columns, "worst trial", "when"], rows, tuple(range(1, len(columns))))
     shown = [c for c in first if c.normalised > 0][:most]

@@ -16,7 +16,7 @@ from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.improve import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account, named, percent, plain, told_all
-from ee_dist.tasks.results.labels import step_name
+from ee_dist.tasks.results.labels import step_name, worst_trials
 
 TIED_STANDING = "tied with the best"
 Column = tuple[str, bool]
@@ -33,9 +33,10 @@ def _table(title: str, columns: Sequence[Column], rows: Sequence[Sequence[str]])
 
 
 def show_comparison(console: Console, problem: Problem, found: Comparison) -> None:
+    worst = worst_trials(problem, found)
     rows = [
         (plain(c.name), f"{c.rmse:.3g} {c.unit}", problem.told(c.normalised),
-         f"{c.worst_trial}, {c.worst_from_s:.1f} to {c.worst_to_s:.1f} s") for c in found.channels[:8]
+         f"{worst[c.name]}, {c.worst_from_s:.1f} to {c.worst_to_s:.1f} s") for c in found.channels[:8]
     ]  # fmt: skip
     columns = (("channel", False), ("rmse", True), ("error", True), ("worst", False))
     console.print(_table("Where it fails: channels", columns, rows))
