@@ -5,7 +5,8 @@
 Every tenth robot is untouched (``--untouched``). An effect whose whole mark on the logs is below the noise is said to be
 too small and is left out of the scores. ``--withhold`` takes the drawn effect out of the catalogue: right is then
 ``unexplained``, or an effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``.
-``--robot`` and ``--by`` take another robot and another way of comparing.
+``--robot`` and ``--by`` take another robot and another way of comparing. ``--by every`` judges each case by every way, of the
+same trials: effects are then drawn among those that can show in all of them.
 ``--cross-engine`` tries the robot in the other engine, after calibrating the model on an untouched robot there.
 ``--workers`` runs cases side by side; a case is the same whoever runs it.
 """
@@ -21,6 +22,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
@@ -43,6 +45,7 @@ from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.contract import Engine, EngineError
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.robots.describe import load_robot
+from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.improve import calibrated
@@ -60,6 +63,7 @@ FIXED_BASE = (
     Excitation("fast_sines", 1.8, 0.05, 4),
 )
 """Trials of a robot that is bolted to the world, well inside its range."""
+EVERY = "every"
 DETECTABLE = 30.0
 """Energy (sum of squares in standard deviations) of an effect's mark below which no search over 400 candidates can tell
 it from luck: about 2 ln(435) + 3 standard deviations."""
@@ -85,6 +89,7 @@ class Case:
     beside: float = float("nan")
     value_error: float = float("nan")
     seconds: float = 0.0
+    by: str = ""
 
 
 def measured(engine: Engine, robot: Robot, hidden: Hypothesis, seed: Sequence[int]) -> tuple[MeasuredTrial, ...]:
@@ -104,6 +109,9 @@ class Bench:
     def __init__(self, args: argparse.Namespace) -> None:
         self.args = args
         robot, _ = load_robot(args.robot)
+        self.ways = tuple(WAYS) if args.by == EVERY else (args.by,)
+        if "force_balance" in self.ways:
+            robot = with_motor_torques(robot)
         self.robot = with_noise(robot, args.noise)
         self.config = Config(engine=EngineConfig(args.engine, 1), evaluator=EvaluatorConfig("serial"))
         other = {"mujoco": "pybullet", "pybullet": "mujoco"}[args.engine] if args.cross_engine else args.engine
@@ -115,11 +123,17 @@ class Bench:
     def before(self) -> Hypothesis:
         return self.known.model
 
-    def problem(self, trials: Sequence[MeasuredTrial]) -> Problem:
+    @cached_property
+    def families(self) -> frozenset[str]:
+        """Families of effects that show in all ways."""
+        trials = measured(self.engine, self.robot, (), [self.args.seed, 999_998])
+        return frozenset.intersection(*(self.problem(trials, by).families for by in self.ways))
+
+    def problem(self, trials: Sequence[MeasuredTrial], by: str) -> Problem:
         known = replace(self.known, trials=tuple(trials))
         # What was simulated for another case is of no use for this one.
         close_evaluators()
-        return way_of(known, self.args.by).make(known, self.config)
+        return way_of(known, by).make(known, self.config)
 
     def calibrate(self) -> None:
         """As ``task=improve task.calibrate=true`` does it, on an untouched robot of the other engine."""
@@ -136,18 +150,26 @@ class Bench:
         print(f"calibrated on an untouched robot: {'; '.join(map(str, self.before)) or 'nothing to add'}; an effect "
               f"takes {self.known.gained:.0f} off it", flush=True)  # fmt: skip
 
-    def case(self, index: int) -> Case:
+    def cases(self, index: int) -> list[Case]:
+        """One hidden change, tried once and judged by every way asked for."""
         rng = np.random.default_rng([self.args.seed, index])
         drawn: list[Candidate] = []
         hidden: Hypothesis = ()
         if (index + 1) % self.args.untouched or self.args.two or self.args.withhold:
             for _ in range(2 if self.args.two else 1):
                 chosen, hidden_term = draw(self.robot, rng)
+                while len(self.ways) > 1 and chosen.effect.family not in self.families:
+                    chosen, hidden_term = draw(self.robot, rng)
                 drawn.append(chosen)
                 hidden = (*hidden, hidden_term)
-        began = time.monotonic()
         trials = measured(self.engine, self.robot, hidden, [self.args.seed, index])
-        problem = self.problem(trials)
+        return [self._case(index, drawn, hidden, trials, by) for by in self.ways]
+
+    def _case(
+        self, index: int, drawn: list[Candidate], hidden: Hypothesis, trials: Sequence[MeasuredTrial], by: str
+    ) -> Case:
+        began = time.monotonic()
+        problem = self.problem(trials, by)
         base, true = problem.residuals([self.before, (*self.before, *hidden)])
         mark = float(((base - true) ** 2).sum()) if np.isfinite(true).all() else float("inf")
         names = [c.name for c in drawn]
@@ -158,6 +180,7 @@ class Bench:
             "; ".join(map(str, hidden)),
             mark,
             bool(drawn) and mark < DETECTABLE,
+            by=problem.way,
         )
         if self.args.two:
             self._two(found, problem, names)
@@ -195,7 +218,19 @@ class Bench:
 
 
 def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
-    """Print the table; return what goes into the JSON."""
+    """Print a table for each way; return what goes into the JSON."""
+    ways = list(dict.fromkeys(c.by for c in cases))
+    found = {}
+    for by in ways:
+        print(f"\nby {by}:")
+        found[by] = scored([c for c in cases if c.by == by], args)
+    settings = {k: v for k, v in vars(args).items() if k != "json"}
+    shown = found[ways[0]] if len(ways) == 1 else {"by": found}
+    return {"settings": settings, **shown, "cases": [asdict(c) for c in cases]}
+
+
+def scored(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
+    """The table of cases judged by one way."""
     real = [c for c in cases if c.truth and not c.too_small]
     untouched = [c for c in cases if not c.truth]
     small = [c for c in cases if c.too_small]
@@ -242,18 +277,16 @@ def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
                     f"  {c.index}: {c.shown} -> {c.verdict} {', '.join(c.named)} (mark {c.mark:.0f}, error/floor {c.ratio:.2f})"
                 )
     return {
-        "settings": {k: v for k, v in vars(args).items() if k != "json"},
         "within_ties": share([c.within for c in real]),
         "first": share([c.first for c in real]),
         "false_alarms": share([c in alarms for c in untouched]),
         "within_1.3_of_floor": share([c.ratio <= 1.3 for c in real]),
         "flagged": flagged,
         "too_small": len(small),
-        "cases": [asdict(c) for c in cases],
     }
 
 
-def run(bench: Bench) -> Iterator[Case | str]:
+def run(bench: Bench) -> Iterator[list[Case] | str]:
     """All cases in their order; for one that the engine cannot simulate, what it said."""
     count = bench.args.cases
     if bench.args.workers < 2:
@@ -264,9 +297,9 @@ def run(bench: Bench) -> Iterator[Case | str]:
         yield from pool.map(_attempt, range(count))
 
 
-def attempt(bench: Bench, index: int) -> Case | str:
+def attempt(bench: Bench, index: int) -> list[Case] | str:
     try:
-        return bench.case(index)
+        return bench.cases(index)
     except EngineError as problem:
         return str(problem)
 
@@ -281,7 +314,7 @@ def _start(args: argparse.Namespace, known: Measurements) -> None:
     _here.append(bench)
 
 
-def _attempt(index: int) -> Case | str:
+def _attempt(index: int) -> list[Case] | str:
     return attempt(_here[0], index)
 
 
@@ -292,7 +325,7 @@ def main() -> int:
     parser.add_argument("--noise", type=float, default=0.02, help="share of each channel's range")
     parser.add_argument("--untouched", type=int, default=10, metavar="K", help="every K-th robot is untouched (1: all)")
     parser.add_argument("--robot", default="quadruped_lab", help="by name, or a file that describes it (.yaml, .urdf)")
-    parser.add_argument("--by", choices=(AUTO, *WAYS), default=AUTO, help="the way of comparing")
+    parser.add_argument("--by", choices=(AUTO, EVERY, *WAYS), default=AUTO, help="the way of comparing")
     parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--json", type=Path)
@@ -306,15 +339,16 @@ def main() -> int:
     if args.cross_engine:
         bench.calibrate()
     began = time.monotonic()
-    for k, case in enumerate(run(bench)):
-        if isinstance(case, str):
-            print(f"{k + 1:4d}/{args.cases}  skipped: {case}", flush=True)
+    for k, found in enumerate(run(bench)):
+        if isinstance(found, str):
+            print(f"{k + 1:4d}/{args.cases}  skipped: {found}", flush=True)
             continue
-        cases.append(case)
+        cases += found
         left = (time.monotonic() - began) / (k + 1) * (args.cases - k - 1)
-        mark = "small" if case.too_small else "first" if case.first else "tied" if case.within else case.verdict
-        print(f"{k + 1:4d}/{args.cases}  {case.shown or 'untouched':<78.78}  {mark:<16} {case.ratio:5.2f} x floor "
-              f"{case.seconds:5.0f} s, {left / 60:.0f} min left", flush=True)  # fmt: skip
+        for case in found:
+            mark = "small" if case.too_small else "first" if case.first else "tied" if case.within else case.verdict
+            print(f"{k + 1:4d}/{args.cases}  {case.shown or 'untouched':<78.78}  {case.by:<13} {mark:<16} {case.ratio:5.2f} x "
+                  f"floor {case.seconds:5.0f} s, {left / 60:.0f} min left", flush=True)  # fmt: skip
     result = report(cases, args)
     if args.json:
         args.json.write_text(json.dumps(result, indent=1, default=str) + "\n", encoding="utf-8")

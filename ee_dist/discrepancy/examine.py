@@ -17,7 +17,7 @@ from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, rank
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
-from ee_dist.discrepancy.search.fit import fit_all
+from ee_dist.discrepancy.search.fit import rough
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.scan import Scanned, scan
@@ -34,6 +34,9 @@ FAR = 2.0
 """Error over the noise floor of the best quick fit from which windows of the same motions need not even be looked at."""
 NEAR = 1.1
 """Error over the noise floor up to which windows of the same motions are evidence enough: no more than noise is left."""
+WORTH_JUDGING = 0.4
+"""Share of what the best quick fit takes off that another must take off to be judged beside it: no data held out make up for
+more."""
 FAMILIES_TRIED = 4
 """Effects whose members at all joints, each with a value of its own, are tried together."""
 
@@ -104,7 +107,8 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)[: effort.first]
     scanned = sorted(scan(now.among(busy), promising, refit), key=lambda s: s.energy)[: effort.second]
     quick = sorted(_quick(search.among(calm), current, scanned, effort.starts, leading), key=lambda f: f.energy)
-    quick = quick[: effort.final]
+    energy = float((base[np.isin(problem.trial_of, calm)] ** 2).sum())
+    quick = [f for f in quick[: effort.final] if energy - f.energy >= WORTH_JUDGING * (energy - quick[0].energy)]
     starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
     starts += _families(screened, starts, least)
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
@@ -220,7 +224,7 @@ def _quick(
     """The better of a few quick fits of each candidate with the model so far, on all data: it only chooses who is judged."""
     tasks = [(i, s.candidate, u) for i, s in enumerate(scanned) for u in s.starts[:starts]]
     models = [(Model((*current.parts, c)), np.concatenate([current.u, u])) for _, c, u in tasks]
-    fits = fit_all(search, models, None, WIDTHS[1:3], leading=leading)
+    fits = rough(search, models, WIDTHS[1:3], leading)
     best: dict[int, Fit] = {}
     for (i, _, _), fit in zip(tasks, fits, strict=True):
         if i not in best or fit.energy < best[i].energy:

@@ -86,9 +86,6 @@ class Effect:
     """Whether ``explain`` proposes it by itself."""
     ranges: Ranges | None = None
     """Values worth trying on a robot at a target, for parameters whose scale depends on them."""
-    contains: tuple[str, ...] = ()
-    """Simpler laws that this one becomes for some of its values: it must beat them to be named."""
-
     worth_proposing: Callable[[Robot], bool] | None = None
     """On which robots ``explain`` proposes it, where that is not all of them."""
 
@@ -189,7 +186,6 @@ def effect(
     reference: str = "",
     searchable: bool = True,
     ranges: Ranges | None = None,
-    contains: tuple[str, ...] = (),
     worth_proposing: Callable[[Robot], bool] | None = None,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
@@ -217,7 +213,6 @@ def effect(
             reference,
             searchable,
             ranges,
-            contains,
             worth_proposing,
         )
         return transform

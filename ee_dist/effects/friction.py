@@ -83,7 +83,6 @@ def _stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
     signature="Residual torque peaks around zero speed and fades within the scale; slow motions go stick and slip.",
     reference=SURVEY,
     ranges=_stribeck_range,
-    contains=("coulomb_friction",),
 )
 def stribeck_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     if values["torque_nm"] == 0:
@@ -168,7 +167,6 @@ def _load_stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
     signature="Like Stribeck friction, but only where there is load: a held weight sticks, an unloaded joint does not.",
     reference=SERVOS,
     ranges=_load_stribeck_range,
-    contains=("load_friction",),
 )
 def load_stribeck_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     if values["share"] == 0:

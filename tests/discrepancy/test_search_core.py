@@ -94,7 +94,8 @@ def test_motions_and_settings_are_held_out_whole() -> None:
     assert travelling(Linear(())) == [], "one motion, one setting"
     problem = Linear((), motions=4)
     (motions,) = travelling(problem)
-    assert motions.name == MOTIONS and motions.folds == 2
+    assert motions.name == MOTIONS and motions.folds == 4
+    assert travelling(Linear((), motions=6))[0].folds == 2, "more take turns in two groups"
     for k in range(4):
         assert len(set(motions.fold_of[problem.trial_of_segment == k])) == 1
     heavy = (term("on_stand"),)
@@ -105,6 +106,12 @@ def test_motions_and_settings_are_held_out_whole() -> None:
     # Of the same commands under two names: repeats of one motion, which does not travel to itself.
     log = problem.measured[0].log
     problem.measured = tuple(replace(t, log=log, setup=()) for t in problem.measured)
+    assert travelling(problem) == []
+    # Drives released a row later, and another motion of the joints: the same commands are the same motion.
+    late = np.array(log.commands)
+    late[-3:] = np.nan
+    moved = replace(log, commands=late, joints=None if log.joints is None else log.joints + 1.0)
+    problem.measured = (replace(problem.measured[0], log=moved), *problem.measured[1:])
     assert travelling(problem) == []
 
 

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from itertools import cycle
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
 from ee_dist.viewing.story import told
 
+METRICS = ("rolling_mean", "distance")
 KEYS = {
     "format", "task", "version", "config_digest", "result_digest", "seed", "engine", "wall_s", "cpu_s", "scenario",
     "metric", "distance_m", "hypotheses", "fitness", "diagnosis_error", "truth", "recovered_fraction", "evaluations",
@@ -177,9 +179,8 @@ def test_view_rebuilds_the_scene_from_the_mcap_alone(finished, cli, tmp_path):
     assert scene.stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("scenario", range(1, 14))
-@pytest.mark.parametrize("metric", ["rolling_mean", "distance"])
-def test_every_scenario_runs_with_both_metrics(cli, scenario, metric):
+@pytest.mark.parametrize(("scenario", "metric"), [*zip(range(1, 14), cycle(METRICS), strict=False), (8, METRICS[0])])
+def test_every_scenario_runs_with_either_metric(cli, scenario, metric):
     outcome = cli(
         f"+scenario={scenario}", f"metric={metric}", "evaluator=serial", "budget=quick", "budget.population=4",
         "budget.generations=1", "budget.diagnosis_population=4", "budget.diagnosis_generations=1", "budget.crossovers=1",

@@ -28,8 +28,10 @@ ONE_BY_ONE = 4
 SAME_MOTION, SAME_LENGTH = 0.02, 0.9
 """Two trials are one motion where their commands differ by less than this share of how much they vary, over nearly all of it."""
 PRIOR = 1.0
-"""Energy that a value at its bound costs in a fit that will be judged elsewhere: a value that the fitted part does not
-determine is neutral there, and not what the part held out would like it to be."""
+"""Energy, beside noise, that a value at its bound costs in a fit that will be judged elsewhere: a value that the fitted part
+does not determine is neutral there, and not what the part held out would like it to be."""
+PIECES = 10
+"""Pieces of a segment over which what is above the noise may average out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,17 +149,28 @@ def cross_fit(
     problem = search.problem
     residuals = [np.zeros(len(problem.segment_of)) for _ in starts]
     seen, count = np.zeros(len(starts)), 0
+    prior = PRIOR * _unsure(search, starts)
     fits: list[list[Fit]] = [[] for _ in starts]
     for fold in range(cut.folds):
         mask = cut.seen(problem, fold)
         if mask.all():
             continue
         count += int(mask.sum())
-        for i, fit in enumerate(fit_all(search, starts, mask, widths, PRIOR, leading)):
+        for i, fit in enumerate(fit_all(search, starts, mask, widths, prior, leading)):
             residuals[i][~mask] = fit.residual[~mask]
             seen[i] += fit.energy
             fits[i].append(fit)
     return [HeldOut(cut, r, float(s) / max(count, 1), tuple(f)) for r, s, f in zip(residuals, seen, fits, strict=True)]
+
+
+def _unsure(search: Search, starts: Sequence[tuple[Model, Array]]) -> float:
+    """By how much less a value is determined than noise alone would have it: what is above the noise does not average out
+    from one value to the next, but at best over some pieces of a segment."""
+    problem = search.problem
+    rows = search.residuals([m.hypothesis(u) for m, u in starts])
+    energies = [float(r @ r) for r in rows if np.isfinite(r).all()]
+    above = max(0.0, min(energies, default=0.0) - float(problem.floor.sum()))
+    return 1.0 + above / (PIECES * len(problem.segments))
 
 
 def bootstrap(

@@ -149,8 +149,8 @@ def _best(found: HeldOut) -> Array:
 
 
 def ranked(found: Sequence[Judged]) -> list[Judged]:
-    """Best held-out energy first, those that earned their place before the others; ties are named, and of tied laws
-    the one that another contains goes first: a richer law can always mimic a simpler one."""
+    """Best held-out energy first, those that earned their place before the others; ties are named, and of those that are
+    tied with the best the one with the fewest numbers goes first: a richer law can always mimic a simpler one."""
     ordered = sorted(found, key=lambda j: (not j.earned, float(j.held.sum())))
     for k, j in enumerate(ordered):
         j.tied_with, j.rank = [], k
@@ -160,26 +160,15 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
                 one.tied_with.append(other.name)
                 other.tied_with.append(one.name)
     if ordered:
+        # Of explanations that data do not tell apart the one with the fewest numbers says the least that is not known.
         best = ordered[0]
-        simpler = [j for j in ordered[1:] if j.name in best.tied_with and contains(best.proposal, j.proposal)]
-        if simpler:
-            first = min(simpler, key=lambda j: (j.proposal.size, j.rank))
-            ordered.remove(first)
-            ordered.insert(0, first)
+        same = [best, *(j for j in ordered[1:] if j.name in best.tied_with)]
+        first = min(same, key=lambda j: (j.proposal.size, j.rank))
+        ordered.remove(first)
+        ordered.insert(0, first)
     for k, j in enumerate(ordered):
         j.rank = k + 1
     return ordered
-
-
-def contains(richer: Proposal, simpler: Proposal) -> bool:
-    """Whether the richer proposal is to give way to the simpler one where data do not tell them apart: a law with one more
-    term, or a family of values, one for each joint, against anything that does with fewer."""
-    if len(richer.parts) > 1:
-        return simpler.size < richer.size
-    if len(simpler.parts) > 1:
-        return False
-    r, s = richer.parts[0], simpler.parts[0]
-    return r.target == s.target and s.effect.name in r.effect.contains
 
 
 def tied(one: Judged, other: Judged) -> bool:

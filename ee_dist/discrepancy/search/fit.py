@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.cloud import effort_of, follow_cloud
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -13,8 +15,6 @@ from ee_dist.trials.log import Array
 
 ROUGH_WIDTHS = (0.12, 0.06, 0.06, 0.03, 0.012)
 """Finite differences of the iterations where the error jumps: more of the wide ones."""
-FULL = 4
-"""Iterations from which a fit counts as a full one."""
 
 
 def fit_all(
@@ -26,7 +26,7 @@ def fit_all(
     leading: Array | None = None,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given. ``leading``: known
-    slopes of the first values (see slopes.py); a cloud needs none."""
+    slopes of the first values (see slopes.py); where the error is rugged none are of use."""
     chosen = search.everything if mask is None else mask
     if not search.problem.rugged:
         return follow_slopes(search, starts, chosen, widths, prior, leading)
@@ -36,16 +36,34 @@ def fit_all(
 def _rugged(
     search: Search, starts: Sequence[tuple[Model, Array]], mask: Mask, iterations: int, prior: float
 ) -> list[Fit]:
-    """Wide slopes from a start that is good already find nearly what a cloud finds, at a quarter of its rollouts (motors
-    with friction, several gains and motions). They fail where a value does nothing by itself, as in laws of several numbers:
-    there a quick fit sends out a cloud too, and a full fit does everywhere."""
-    fits = follow_slopes(search, starts, mask, ROUGH_WIDTHS, prior)
+    """Wide slopes, from the start and from half way to neutral, then a cloud from where the better of them ended: slopes go
+    far for few rollouts, and stop at the first ridge."""
+    halves = [(m, 0.5 * np.asarray(u, float)) for m, u in starts]
+    found = follow_slopes(search, [*starts, *halves], mask, ROUGH_WIDTHS, prior)
+    pairs = zip(found[: len(starts)], found[len(starts) :], strict=True)
+    best = [min(pair, key=lambda f: _cost(f, prior)) for pair in pairs]
     generations, seeds = effort_of(iterations, search.problem.effort)
-    clouded = [i for i, (m, _) in enumerate(starts) if iterations >= FULL or (m.parts and m.parts[-1].size > 1)]
-    models = [(fits[i].model, fits[i].u) for i in clouded]
-    for i, fit in zip(clouded, follow_cloud(search, models, mask, generations, seeds, prior=prior), strict=True):
-        if _cost(fit, prior) < _cost(fits[i], prior):
-            fits[i] = fit
+    clouds = follow_cloud(search, [(f.model, f.u) for f in best], mask, generations, seeds, prior=prior)
+    return [min(pair, key=lambda f: _cost(f, prior)) for pair in zip(best, clouds, strict=True)]
+
+
+def rough(
+    search: Search, starts: Sequence[tuple[Model, Array]], widths: Sequence[float], leading: Array | None
+) -> list[Fit]:
+    """Quick fits of all data that only choose what is fitted well: by slopes, and by a cloud too for laws of several numbers
+    where the error is rugged: a number that does nothing by itself has no slope."""
+    everything = search.everything
+    if not search.problem.rugged:
+        return follow_slopes(search, starts, everything, widths, leading=leading)
+    fits = follow_slopes(search, starts, everything, ROUGH_WIDTHS)
+    several = [i for i, (m, _) in enumerate(starts) if m.parts and m.parts[-1].size > 1]
+    generations, seeds = effort_of(len(widths), search.problem.effort)
+    for i, fit in zip(
+        several,
+        follow_cloud(search, [(fits[i].model, fits[i].u) for i in several], everything, generations, seeds),
+        strict=True,
+    ):
+        fits[i] = min(fits[i], fit, key=lambda f: f.energy)
     return fits
 
 

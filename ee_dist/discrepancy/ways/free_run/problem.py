@@ -10,6 +10,7 @@ position error. A stick that lasts too long moves a joint far away for a while; 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -45,6 +46,8 @@ class ToPositions:
 
 RESTART_S = 0.5
 """Length of the windows that remarks re-start from the measured state."""
+MEAN_ABSOLUTE, MEDIAN_ABSOLUTE = math.sqrt(2 / math.pi), 0.6745
+"""Of normal noise with a standard deviation of 1."""
 BLOCKS = 6
 """Segments that a record run through in one go is cut into."""
 
@@ -255,7 +258,9 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
 
 
 def _noise(positions: Array) -> float:
-    """Mean absolute error that the noise of the readings (T, C) alone would leave."""
+    """Mean absolute error that the noise of the readings (T, C) alone would leave, from second differences of rows ``every``
+    apart. A little of the motion is in them, as what the noise of the first state does later is in the error."""
     if len(positions) < 3:
         return 0.0
-    return float(np.median(np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2])) / np.sqrt(6.0))
+    rough = np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2])
+    return float(np.median(rough) / np.sqrt(6.0)) * MEAN_ABSOLUTE / MEDIAN_ABSOLUTE
