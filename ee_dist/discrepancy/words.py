@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
-from ee_dist.discrepancy.improve import Improvement, Rung
+from ee_dist.discrepancy.improve import EXPLAINED, Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
@@ -93,7 +94,8 @@ def _unit(term: Term, key: str, robot: Robot | None) -> str:
 
 
 def percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
+    """Never all of it where something is left."""
+    return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 else f"{100 * share:.0f} %"
 
 
 def named(term: Term) -> str:
@@ -280,7 +282,8 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
     lines.append("The model: " + ("; ".join(told(t, robot) for t in found.terms) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
-    lines += _beside(last.error_heldout, found.noise_floor, bool(found.left))
+    settled = found.verdict in (EXPLAINED, NOTHING_MISSING)
+    lines += _beside(last.error_heldout, found.noise_floor, not settled)
     if found.left:
         lines.append(left_text(found.left, bool(steps)))
     error = _errors(problem, first.error_heldout, last.error_heldout, found.noise_floor, last.held_out)
@@ -295,10 +298,11 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         new = added(found)
         what = _listed([told(t, robot) for t in new]) if new else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
-        head += f" {NOTHING_ELSE}" if not found.left else f" More than noise is left: {share}."
+        where = "" if found.left or settled else f" on {last.held_out}"
+        head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {last.held_out}{_ranges(found, new, robot)}{_told_from(steps)}."
-    advice = "" if len(found.ladder) > 1 else STUCK if found.left else CONTENT
-    return Account(head, error, sure, tuple(lines), not found.left, advice)
+    advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
+    return Account(head, error, sure, tuple(lines), settled, advice)
 
 
 def added(found: Improvement) -> list[Term]:
