@@ -106,7 +106,9 @@ def named(term: Term) -> str:
 def told_all(terms: Hypothesis, robot: Robot | None = None) -> str:
     """Terms in one phrase; one effect at several places with its values side by side."""
     effects = {t.effect for t in terms}
-    if len(terms) > 1 and len(effects) == 1 and all(len(t.values) == 1 for t in terms):
+    if len(terms) > 1 and len(effects) == 1 and any(len(t.values) > 1 for t in terms):
+        return f"{plain(terms[0].effect)}, each joint by itself ({', '.join(plain(t.target) for t in terms)})"
+    if len(terms) > 1 and len(effects) == 1 and all(t.values for t in terms):
         key = terms[0].values[0][0]
         each = ", ".join(f"{plain(t.target)} {t.values[0][1]:.3g}" for t in terms)
         return f"{plain(terms[0].effect)}, each joint by itself ({each}{_unit(terms[0], key, robot)})"
@@ -191,13 +193,12 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:
-        head = "Unexplained: something is left, and no effect of the catalogue earns its place."
+        none = f"none of {_count(found.tried, 'explanation')} that {_were(found.tried)} tried earns its place"
+        head = f"Unexplained: something is left, and {none}."
         if found.left:
-            head = (
-                f"Unexplained: more than noise is left, most at {plain(found.left[0].channel)}, and no effect of the "
-                "catalogue earns its place."
-            )
-        sure = f"How sure: {_count(found.tried, 'explanation')} {_were(found.tried)} tried, and none earns its place."
+            head = f"Unexplained: more than noise is left, most at {plain(found.left[0].channel)}, and {none}."
+        places = _places(found.left)
+        sure = f"How sure: more than noise stands out in {_count(places, 'curve')}; noise floor: {found.floor_source}."
         advice = STUCK
         lines += [
             f"Nearest, but not good enough: {told_all(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]
@@ -355,7 +356,7 @@ def tie_text(what: str, others: Sequence[str]) -> str:
 
 def left_text(left: Sequence[Leftover], after: bool) -> str:
     head = "Even with it, more than noise is left in" if after else "It sits in"
-    return f"{head} {_count(_places(left), 'curve')}; worst: {'; '.join(map(str, left[:3]))}."
+    return f"{head} {_count(_places(left), 'curve')}; worst: {'; '.join(plain(str(g)) for g in left[:3])}."
 
 
 def _places(left: Sequence[Leftover]) -> int:
