@@ -40,8 +40,6 @@ TALL = 840
 IN_DOCS = {
     "quadruped_explain_1280_light.png": "report_explain.png",
     "quadruped_improve_1280_dark.png": "report_dark.png",
-    "pendulum_improve_400_light.png": "report_narrow.png",
-    "arm_explain_1280_scene.png": "scene_explain.png",
 }
 MOST_BYTES = 250_000
 

@@ -18,18 +18,24 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "tutorial.md"
 STEP = re.compile(r"```bash\n(?P<command>[^`]+)```\n\n```text\n(?P<output>[^`]*)```")
 MODEL = re.compile(r"```yaml\n[^`]*```")
-COLUMNS = "110"
+COLUMNS = "80"
 
 
 def run(command: str, folder: Path) -> str:
-    """What a command prints, without its progress line's control characters. Raises SystemExit where it fails."""
+    """What a command prints, without its progress and times, which differ from run to run. Raises SystemExit where it fails."""
     words = [w.strip("'") for w in command.split()]
     settings = {**os.environ, "COLUMNS": COLUMNS, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, *words[1:]], cwd=folder, env=settings, capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"{command.strip()}: {done.stderr.strip()}")
-    plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", done.stdout)
-    return "\n".join(line.rstrip() for line in plain.splitlines()).strip("\n")
+    return told(done.stdout)
+
+
+def told(printed: str) -> str:
+    """The part of an output that is the same in every run."""
+    plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", printed)
+    lines = [re.sub(r"^\d+ s\. (?=Digest)", "", line.rstrip()) for line in plain.splitlines()]
+    return "\n".join(line for line in lines if not re.match(r" +\d+ s  \w+$", line)).strip("\n")
 
 
 def main() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
-from ee_dist.discrepancy.improve import Improvement, Rung
+from ee_dist.discrepancy.improve import EXPLAINED, Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
@@ -93,7 +94,8 @@ def _unit(term: Term, key: str, robot: Robot | None) -> str:
 
 
 def percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
+    """Never all of it where something is left."""
+    return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 else f"{100 * share:.0f} %"
 
 
 def named(term: Term) -> str:
@@ -104,7 +106,9 @@ def named(term: Term) -> str:
 def told_all(terms: Hypothesis, robot: Robot | None = None) -> str:
     """Terms in one phrase; one effect at several places with its values side by side."""
     effects = {t.effect for t in terms}
-    if len(terms) > 1 and len(effects) == 1 and all(len(t.values) == 1 for t in terms):
+    if len(terms) > 1 and len(effects) == 1 and any(len(t.values) > 1 for t in terms):
+        return f"{plain(terms[0].effect)}, each joint by itself ({', '.join(plain(t.target) for t in terms)})"
+    if len(terms) > 1 and len(effects) == 1 and all(t.values for t in terms):
         key = terms[0].values[0][0]
         each = ", ".join(f"{plain(t.target)} {t.values[0][1]:.3g}" for t in terms)
         return f"{plain(terms[0].effect)}, each joint by itself ({each}{_unit(terms[0], key, robot)})"
@@ -189,13 +193,12 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:
-        head = "Unexplained: something is left, and no effect of the catalogue earns its place."
+        none = f"none of {_count(found.tried, 'explanation')} that {_were(found.tried)} tried earns its place"
+        head = f"Unexplained: something is left, and {none}."
         if found.left:
-            head = (
-                f"Unexplained: more than noise is left, most at {plain(found.left[0].channel)}, and no effect of the "
-                "catalogue earns its place."
-            )
-        sure = f"How sure: {_count(found.tried, 'explanation')} {_were(found.tried)} tried, and none earns its place."
+            head = f"Unexplained: more than noise is left, most at {plain(found.left[0].channel)}, and {none}."
+        places = _places(found.left)
+        sure = f"How sure: more than noise stands out in {_count(places, 'curve')}; noise floor: {found.floor_source}."
         advice = STUCK
         lines += [
             f"Nearest, but not good enough: {told_all(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]
@@ -280,7 +283,8 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
     lines.append("The model: " + ("; ".join(told(t, robot) for t in found.terms) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
-    lines += _beside(last.error_heldout, found.noise_floor, bool(found.left))
+    settled = found.verdict in (EXPLAINED, NOTHING_MISSING)
+    lines += _beside(last.error_heldout, found.noise_floor, not settled)
     if found.left:
         lines.append(left_text(found.left, bool(steps)))
     error = _errors(problem, first.error_heldout, last.error_heldout, found.noise_floor, last.held_out)
@@ -295,10 +299,11 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         new = added(found)
         what = _listed([told(t, robot) for t in new]) if new else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
-        head += f" {NOTHING_ELSE}" if not found.left else f" More than noise is left: {share}."
+        where = "" if found.left or settled else f" on {last.held_out}"
+        head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {last.held_out}{_ranges(found, new, robot)}{_told_from(steps)}."
-    advice = "" if len(found.ladder) > 1 else STUCK if found.left else CONTENT
-    return Account(head, error, sure, tuple(lines), not found.left, advice)
+    advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
+    return Account(head, error, sure, tuple(lines), settled, advice)
 
 
 def added(found: Improvement) -> list[Term]:
@@ -351,7 +356,7 @@ def tie_text(what: str, others: Sequence[str]) -> str:
 
 def left_text(left: Sequence[Leftover], after: bool) -> str:
     head = "Even with it, more than noise is left in" if after else "It sits in"
-    return f"{head} {_count(_places(left), 'curve')}; worst: {'; '.join(map(str, left[:3]))}."
+    return f"{head} {_count(_places(left), 'curve')}; worst: {'; '.join(plain(str(g)) for g in left[:3])}."
 
 
 def _places(left: Sequence[Leftover]) -> int:

@@ -8,8 +8,9 @@ import pytest
 
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
+from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.words import Account, compare_account, explain_account, told
+from ee_dist.discrepancy.words import Account, compare_account, explain_account, improve_account, told
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.servo_pendulum import servo_pendulum
@@ -83,3 +84,23 @@ def test_small_errors_keep_their_digits(error_m: float, said: str) -> None:
 def test_units_are_told_once_and_as_they_are_on_a_slide() -> None:
     stage = linear_stage()
     assert told(term("zero_offset", "carriage", offset_rad=0.07), stage) == "zero offset at carriage (offset 0.07 m)"
+
+
+def test_a_headline_says_no_more_than_the_verdict() -> None:
+    rung = SimpleNamespace(
+        added=(term("coulomb_friction", "servo", torque_nm=0.3),), dropped=(), tied_with=[], name="x@y", error_heldout=1.5,
+        held_out="motions that were not fitted",
+    )  # fmt: skip
+    start = SimpleNamespace(added=(), dropped=(), tied_with=[], error_heldout=5.0, held_out="", name="")
+    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="")
+    for verdict, share, said in (
+        (EXPLAINED, 1.0, "Nothing else is left above the noise."),
+        (BETTER, 0.9979, "More than noise is left on motions that were not fitted: 99.7 % of"),
+    ):
+        found = SimpleNamespace(
+            ladder=[start, rung], left=[], verdict=verdict, explained=share, parameters=[], terms=rung.added, stopped="so",
+            noise_floor=1.0, floor_source="told", last=None,
+        )  # fmt: skip
+        account = improve_account(problem, found)  # type: ignore[arg-type]
+        assert account.headline.endswith(said) or said in account.headline
+        assert account.good is (verdict == EXPLAINED) and ("Nothing" in account.headline) is account.good

@@ -176,8 +176,8 @@ def ranking_section(
     best = judged[0]
     kinds = [_kind(c, best) for c in judged]
     rows = [
-        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(min(c.explained, 1.0)),
-         f"{percent(max(above(c)[0], -9.99))} to {percent(min(above(c)[1], 1.0))}", standing(c, best)]
+        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(max(0.0, min(c.explained, 1.0))),
+         f"{percent(max(above(c)[0], -1.0))} to {percent(min(above(c)[1], 1.0))}", standing(c, best)]
         for c in judged
     ]  # fmt: skip
     pale = [k for k, kind in enumerate(kinds) if kind == "not"]

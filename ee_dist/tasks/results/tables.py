@@ -51,7 +51,7 @@ def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged]
         return
     best = judged[0]
     rows = [
-        (str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(min(c.explained, 1.0)),
+        (str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(max(0.0, min(c.explained, 1.0))),
          standing(c, best)) for c in judged
     ]  # fmt: skip
     columns = (("", True), ("effect", False), ("held out", True), ("gain", True), ("", False))
