@@ -1,0 +1,252 @@
+"""Is the verdict right about robots that are a little wrong everywhere, as all real ones are?
+
+    python tools/messy_benchmark.py --size middle --cases 60 --robot servo_pendulum --seed 0 --json messy.json
+
+Every part's mass, every joint's friction, offset, gain and delay are off by draws of the ``--size``; on top of that a hidden
+effect of the catalogue, larger than all that is wrong at its joint together, except in every fourth robot. ``improve
+effect=auto`` sees three motions; two others are held out from all of it. Scored are the name of the hidden effect, wrong
+names, the error on the motions held out, and whether 95 % intervals hold what is true.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import numpy as np
+from benchmarks.arm6 import desk_arm_6
+
+from ee_dist.discrepancy.draw import draw
+from ee_dist.discrepancy.improve import Improvement, improve
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.effects.catalogue import Hypothesis, Term, term
+from ee_dist.effects.groups import members_of
+from ee_dist.engines.contract import EngineError
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.robots.describe import load_robot
+from ee_dist.robots.model import Robot
+from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
+from ee_dist.tasks.trial import one_trial
+from ee_dist.tasks.wiring import close_evaluators, engine_maker, evaluator_of
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.noise import with_noise
+
+ARM = "desk_arm_6"
+SIZES = {"small": 0.25, "middle": 0.5, "large": 1.0}
+"""Shares of the large draws: friction of 3 to 11 % of a drive's torque limit, masses off by up to 20 %, offsets of 20 mrad,
+gains off by up to 10 %, delays of up to 10 ms."""
+ATTEMPTS = 40
+"""Draws of a hidden effect until one stands out."""
+
+
+@dataclass(frozen=True)
+class Motions:
+    """What is recorded: ``fitted`` for the search, ``held`` for the last word."""
+
+    fitted: tuple[Excitation, ...]
+    held: tuple[Excitation, ...]
+
+
+def motions(robot: Robot, seconds: float) -> Motions:
+    if robot.free_base:
+        plan = (("multisine", 0.4, 1, "stand"), ("steps", 0.3, 2, "floor"), ("slow_sines", 0.6, 3, "stand"))
+        other = (("fast_sines", 0.3, 4, "stand"), ("multisine", 0.3, 9, "floor"))
+    else:
+        plan = (("multisine", 0.5, 1, "floor"), ("steps", 0.4, 2, "floor"), ("slow_sines", 0.5, 3, "floor"))
+        other = (("fast_sines", 0.25, 4, "floor"), ("multisine", 0.6, 9, "floor"))
+    fitted, held = (tuple(Excitation(k, seconds, a, n, on) for k, a, n, on in some) for some in (plan, other))
+    return Motions(fitted, held)
+
+
+def mess(robot: Robot, size: float, rng: np.random.Generator) -> dict[str, list[Term]]:
+    """What is wrong by joint (and, under "", at the parts)."""
+    found: dict[str, list[Term]] = {"": []}
+    for drive in robot.drives:
+        limit = drive.torque_limit if np.isfinite(drive.torque_limit) else 1.0
+        found[drive.joint] = [
+            term("coulomb_friction", drive.joint, torque_nm=size * limit * float(rng.uniform(0.03, 0.11))),
+            term("viscous_friction", drive.joint, damping_nm_s_rad=size * limit * float(rng.uniform(0.0, 0.035))),
+            term("zero_offset", drive.joint, offset_rad=size * float(rng.normal(0, 0.02))),
+            term("command_gain", drive.joint, change=size * float(rng.uniform(-0.1, 0.1))),
+            term("command_delay", drive.joint, delay_s=size * float(rng.uniform(0.0, 0.01))),
+        ]
+    for part in robot.parts[0 if robot.free_base else 1 :]:
+        found[""].append(term("part_mass", part.name, change=size * float(rng.uniform(-0.2, 0.2))))
+    return found
+
+
+@dataclass
+class Case:
+    """``ratio``: error over the noise floor on motions held out from everything, ``before`` the same without the search;
+    ``held``: 1 for each interval that holds the truth, 0 for each that does not."""
+
+    index: int
+    truth: str
+    terms: list[str] = field(default_factory=list)
+    within: bool = False
+    wrong: list[str] = field(default_factory=list)
+    shared: bool = False
+    verdict: str = ""
+    before: float = float("nan")
+    ratio: float = float("nan")
+    held: list[int] = field(default_factory=list)
+    seconds: float = 0.0
+
+
+class Bench:
+    def __init__(self, args: argparse.Namespace) -> None:
+        self.args = args
+        robot = desk_arm_6() if args.robot == ARM else with_noise(load_robot(args.robot)[0], args.noise)
+        self.robot, self.size = robot, SIZES[args.size]
+        self.config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
+        self.engine = engine_maker(self.config, alone=True)()
+        self.motions = motions(robot, args.seconds)
+
+    def trials(self, hidden: Hypothesis, plan: Sequence[Excitation], seed: Sequence[int]) -> tuple[MeasuredTrial, ...]:
+        out = []
+        for k, excitation in enumerate(plan):
+            held = setup_of(excitation)
+            hardware = PhysicalRobot(self.engine, self.robot, (*hidden, *held), np.random.SeedSequence([*seed, k]))
+            _, record = one_trial(hardware, excitation, self.robot, k)
+            out.append(MeasuredTrial(f"{k} {record.name}", record.log, record.driver, held))
+        return tuple(out)
+
+    def problem(self, trials: Sequence[MeasuredTrial]) -> OpenLoop:
+        return OpenLoop(trials, self.robot, evaluator_of(self.config))
+
+    def case(self, index: int) -> Case:
+        rng = np.random.default_rng([self.args.seed, index])
+        began = time.monotonic()
+        close_evaluators()
+        wrong = mess(self.robot, self.size, rng)
+        everywhere = tuple(t for terms in wrong.values() for t in terms)
+        hidden: Hypothesis = ()
+        if (index + 1) % 4:
+            hidden = self.standing_out(wrong, everywhere, rng)
+        truth = (*everywhere, *hidden)
+        problem = self.problem(self.trials(truth, self.motions.fitted, [self.args.seed, index, 0]))
+        other = self.problem(self.trials(truth, self.motions.held, [self.args.seed, index, 1]))
+        result = improve(problem, pool_of(problem))
+        found = Case(index, "; ".join(map(str, hidden)), [str(t) for t in result.terms], verdict=result.verdict)
+        before, after, true = (error(r) for r in other.residuals([(), result.terms, truth]))
+        found.before, found.ratio = before / true, after / true
+        self.score(found, result, truth, hidden)
+        found.seconds = time.monotonic() - began
+        return found
+
+    def standing_out(
+        self, wrong: dict[str, list[Term]], everywhere: Hypothesis, rng: np.random.Generator
+    ) -> Hypothesis:
+        """An effect whose mark is larger than that of all the mess at its joint. Empty where none was drawn."""
+        problem = self.problem(self.trials(everywhere, self.motions.fitted, [self.args.seed, 0, 2]))
+        for _ in range(ATTEMPTS):
+            chosen, drawn = draw(self.robot, rng)
+            here = tuple(wrong.get(chosen.target, wrong[""]))
+            rest = tuple(t for t in everywhere if t not in here)
+            try:
+                base, mine, without = problem.residuals([everywhere, (*everywhere, drawn), rest])
+            except EngineError:
+                continue
+            mark, beside = float(((base - mine) ** 2).sum()), float(((base - without) ** 2).sum())
+            if np.isfinite(mark) and mark > beside and chosen.effect.family in problem.families:
+                return (drawn,)
+        return ()
+
+    def score(self, found: Case, result: Improvement, truth: Hypothesis, hidden: Hypothesis) -> None:
+        """A name is wrong where nothing of the kind is at any of its joints and no tie says that it may be another."""
+        steps = [r for r in result.ladder if r.added]
+        named = {t.name for t in result.terms} | {name for r in steps for name in r.tied_with}
+        found.within = all(self.covers(named, h) for h in hidden)
+        at = {(t.effect, t.target) for t in truth}
+        for rung in steps:
+            for t in rung.added:
+                places = self.places(t)
+                if not any((t.effect, p) in at for p in places) and not rung.tied_with:
+                    found.wrong.append(t.name)
+        found.shared = any(len(self.places(t)) > 1 for t in result.terms)
+        for p in result.parameters:
+            t = result.terms[p.term]
+            true = [dict(x.values)[p.name] for x in truth if x.effect == t.effect and x.target in self.places(t)]
+            if true and np.isfinite(p.high - p.low) and len(true) == len(self.places(t)):
+                found.held.append(int(p.low <= float(np.mean(true)) <= p.high))
+
+    def places(self, t: Term) -> tuple[str, ...]:
+        allowed = tuple({*self.robot.motor_names, *(p.name for p in self.robot.parts), *self.robot.sensor_names})
+        return members_of(self.robot, t.target, allowed) or (t.target,)
+
+    def covers(self, named: set[str], hidden: Term) -> bool:
+        return hidden.name in named or any(f"{hidden.name.split('@')[0]}@each" in n for n in named)
+
+
+def run(bench: Bench) -> Iterator[Case]:
+    for k in range(bench.args.cases):
+        try:
+            yield bench.case(k)
+        except EngineError as problem:
+            print(f"{k + 1:4d}  skipped: {problem}", flush=True)
+
+
+def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, object]:
+    hidden = [c for c in cases if c.truth]
+    ratios = sorted(c.ratio for c in cases)
+    held = [h for c in cases for h in c.held]
+
+    def share(values: Sequence[bool | int]) -> float:
+        return float(np.mean(values)) if values else float("nan")
+
+    found = {
+        "cases": len(cases),
+        "hidden_within_names": share([c.within for c in hidden]),
+        "cases_with_a_wrong_name": share([bool(c.wrong) for c in cases]),
+        "error_over_floor_before": float(np.median([c.before for c in cases])),
+        "error_over_floor_median": float(np.median(ratios)),
+        "error_over_floor_90": float(np.quantile(ratios, 0.9)),
+        "intervals_hold": share(held),
+        "intervals": len(held),
+    }
+    print(f"\n{args.robot}, {args.size}: {len(cases)} robots, {len(hidden)} with a hidden effect")
+    for key, value in found.items():
+        print(f"  {key.replace('_', ' '):<28}{value:.3g}")
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--size", choices=tuple(SIZES), default="middle")
+    parser.add_argument("--robot", default="servo_pendulum", help=f"by name or file; {ARM} is built in here")
+    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--noise", type=float, default=0.001, help="share of each channel's range")
+    parser.add_argument("--seconds", type=float, default=4.0, help="length of a trial")
+    parser.add_argument("--json", type=Path)
+    args = parser.parse_args()
+    bench, cases = Bench(args), []
+    for case in run(bench):
+        cases.append(case)
+        mark = "found" if case.truth and case.within else "missed" if case.truth else "-"
+        print(f"{case.index + 1:4d}/{args.cases}  {case.truth or 'nothing more':<64.64} {mark:<7}"
+              f"{case.before:6.2f} -> {case.ratio:5.2f} x floor {case.seconds:5.0f} s  "
+              f"{'wrong: ' + ', '.join(case.wrong) if case.wrong else ''}", flush=True)  # fmt: skip
+    found = report(cases, args)
+    if args.json:
+        settings = {k: v for k, v in vars(args).items() if k != "json"}
+        content = {"settings": settings, **found, "robots": [asdict(c) for c in cases]}
+        args.json.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
