@@ -118,6 +118,10 @@ class _Remembered:
     def __init__(self, run: Unfinished, name: str, inner: Hardware, robot: Robot) -> None:
         self.run, self.folder, self.name, self.inner, self.robot = run, run.folder, name, inner, robot
         self.count = 0
+        knock = getattr(inner, "knock", None)
+        # A run that is resumed may have made all its trials: then nobody needs to be there any more.
+        if knock is not None and not any(self.folder.glob("*.mcap")):
+            knock()
 
     def trial(self, driver: Any, steps: int) -> SensorLog:
         path = self.folder / f"{self.name}_{self.count:04d}.mcap"
