@@ -336,11 +336,11 @@ def _torque_of(law: LawFunction, context: LawContext) -> Array:
     """What a law of a user's own returns. Raises EngineError where it fails, or gives something else than torques."""
     said = f"drive law {law.__name__} ({law.__module__.removeprefix('ee_dist_plugin_')})"
     try:
-        found = np.asarray(law(context), dtype=np.float64)
+        given = law(context)
+        found = np.asarray(given, dtype=np.float64)
     except (Exception, SystemExit) as error:
         raise EngineError(f"{said}: {type(error).__name__}: {' '.join(str(error).split())}") from error
-    if found.shape not in ((), context.position.shape):
-        raise EngineError(
-            f"{said}: it gave {found.shape}, expected a torque for each of its {len(context.position)} joints"
-        )
+    if given is None or found.shape not in ((), context.position.shape):
+        what = "nothing" if given is None else f"an array of shape {found.shape}"
+        raise EngineError(f"{said}: it gave {what}; expected a torque for each of its {len(context.position)} joints")
     return found

@@ -148,6 +148,7 @@ _EXPECTED = (
     (r"Value '(.*)' of type '.*' could not be converted to Float", "a number"),
     (r"Value '(.*)' is not a valid bool", "true or false"),
     (r"Invalid value assigned: .* is not a ListConfig", "a list, such as {key}=[one,two]"),
+    (r"Cannot assign \w+ to Dict", "a list of mappings, such as [{{effect: ..., target: ...}}]"),
     (r"Incompatible value 'None' for field of type", "a value, not null"),
 )
 """What OmegaConf says of a value of the wrong kind, and what would be right."""

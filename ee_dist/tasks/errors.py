@@ -12,6 +12,7 @@ from hydra.errors import HydraException, OverrideParseException
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import EffectError, loaded_plugins
 from ee_dist.engines.contract import EngineError
+from ee_dist.engines.drivers import DriverError
 from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, abandon_ray
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
@@ -27,6 +28,7 @@ _LONGEST = 300
 """Characters of an error that nobody foresaw: some libraries put whole arrays into theirs."""
 USER_ERRORS = (
     ConfigError,
+    DriverError,
     EffectError,
     EngineError,
     EvaluatorError,

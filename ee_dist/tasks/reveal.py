@@ -46,6 +46,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     if not config.log:
         raise ConfigError("log=: whose truth? name the folder of a trial, such as log=logs/trial/...")
     folder = Path(config.log)
+    if not folder.exists():
+        raise ConfigError(f"log={folder}: no such folder; name that of a trial, such as log=logs/trial/...")
     folder = folder if folder.is_dir() else folder.parent
     logs = sorted(folder.glob("*.mcap"))
     record = read_run(logs[0]) if logs else None
