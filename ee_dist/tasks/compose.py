@@ -28,7 +28,10 @@ TASKS = (
     "import",
     "robot",
     "export",
+    "workbench",
 )
+_ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}
+"""Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
 _SWEEP = ("-m", "--multirun")
 _RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
@@ -80,10 +83,14 @@ def config_folder() -> Path:
     raise ConfigError(f"no conf/config.yaml beside {package} or in it: the installation is incomplete")
 
 
+def module_of(name: str) -> str:
+    """The name of the module of a verb. Raises ConfigError for an unknown one."""
+    return _ELSEWHERE.get(one_of("task", name, TASKS), f"ee_dist.tasks.{name}")
+
+
 def task_module(name: str) -> ModuleType:
     """The module of a verb. Raises ConfigError for an unknown one."""
-    one_of("task", name, TASKS)
-    return importlib.import_module(f"ee_dist.tasks.{name}_" if name == "import" else f"ee_dist.tasks.{name}")
+    return importlib.import_module(module_of(name))
 
 
 _HANDLING = Handling.__dataclass_fields__

@@ -180,6 +180,12 @@ def unfinished(out: Path, config: Config, options: Any, resume: bool) -> Iterato
         _current = None
 
 
+def note_nothing() -> None:
+    """From here on the run under way keeps nothing to go on from: it has no end to reach, or goes on after its results."""
+    global _current
+    _current = None
+
+
 def remembered(name: str, inner: Hardware, robot: Robot) -> Hardware:
     """Hardware of the run under way, of which no trial is asked twice."""
     return inner if _current is None else _current.hardware(name, inner, robot)
