@@ -22,7 +22,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.compose import check_flags, config_folder, handling, plain, quoted, settings
+from ee_dist.tasks.compose import check_flags, check_used, config_folder, handling, plain, quoted, settings
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.errors import USER_ERRORS, RayLostError, abandon_evaluators, defect, hydra_message, unasked_end
 from ee_dist.tasks.folder import (
@@ -30,6 +30,7 @@ from ee_dist.tasks.folder import (
     SETTINGS,
     Refused,
     claimed,
+    forget_sweep,
     free_name,
     held,
     kept,
@@ -51,6 +52,7 @@ def run(composed: DictConfig) -> None:
     try:
         out = _folder(hydra_settings)
         config, module, options = settings(composed)
+        check_used(list(hydra_settings.overrides.task), str(composed.task.name))
         how = handling(composed)
         if how.resume is not None and resumed(out, config, options, how.overwrite):
             return
@@ -171,6 +173,7 @@ def main() -> int:
 
 
 def _complain(text: str, status: int = MISTAKE) -> int:
+    forget_sweep()
     print(leaving.line(text), file=sys.stderr)
     return status
 

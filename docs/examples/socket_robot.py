@@ -83,6 +83,7 @@ def trial(line: Line, engine: Engine, robot: Robot, changed: Robot, unplug: tupl
     (log,) = engine.rollout([Rollout(changed if index else robot, driver, int(asked["steps"]), pose=True)])
     rows = {name: getattr(log, name) for name in ("base_pose", "joints", "torques", "supply_v")}
     line.say(done=True, travel_m=log.travel_m, **{k: v.tolist() for k, v in rows.items() if v is not None})
+    print(f"trial {index} done", flush=True)
 
 
 def main() -> int:

@@ -35,8 +35,9 @@ FAR = 2.0
 NEAR = 1.1
 """Error over the noise floor up to which windows of the same motions are evidence enough: no more than noise is left."""
 WORTH_JUDGING = 0.4
-"""Share of what the best quick fit takes off that another must take off to be judged beside it: no data held out make up for
-more."""
+"""Share of what the best quick fit takes off that another must take off to be judged beside it, unless it is among the first
+AT_LEAST."""
+AT_LEAST = 4
 FAMILIES_TRIED = 4
 """Effects whose members at all joints, each with a value of its own, are tried together."""
 
@@ -108,7 +109,11 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     scanned = sorted(scan(now.among(busy), promising, refit), key=lambda s: s.energy)[: effort.second]
     quick = sorted(_quick(search.among(calm), current, scanned, effort.starts, leading), key=lambda f: f.energy)
     energy = float((base[np.isin(problem.trial_of, calm)] ** 2).sum())
-    quick = [f for f in quick[: effort.final] if energy - f.energy >= WORTH_JUDGING * (energy - quick[0].energy)]
+    quick = [
+        f
+        for k, f in enumerate(quick[: effort.final])
+        if k < AT_LEAST or energy - f.energy >= WORTH_JUDGING * (energy - quick[0].energy)
+    ]
     starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
     starts += _families(screened, starts, least)
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)

@@ -206,7 +206,7 @@ def effect(
             name,
             family,
             transform,
-            targets,
+            _asked(name, targets),
             parameters,
             physics,
             signature,
@@ -218,6 +218,21 @@ def effect(
         return transform
 
     return register
+
+
+def _asked(name: str, targets: Callable[[Robot], tuple[str, ...]]) -> Callable[[Robot], tuple[str, ...]]:
+    """``targets``, of which a user's own may fail or give something else: then it raises EffectError."""
+
+    def ask(robot: Robot) -> tuple[str, ...]:
+        try:
+            found = targets(robot)
+        except (Exception, SystemExit) as error:
+            raise EffectError(f"{name}: its targets failed on {robot.name}: {type(error).__name__}: {error}") from error
+        if not isinstance(found, (tuple, list)) or not all(isinstance(t, str) for t in found):
+            raise EffectError(f"{name}: its targets gave {quoted(found)}; expected a tuple of names")
+        return tuple(found)
+
+    return ask
 
 
 def find(name: str) -> Effect:
@@ -311,8 +326,10 @@ def load_plugin(path: str | Path) -> None:
         _registry.update(before)
         LAWS.clear()
         LAWS.update(laws)
-        kind = "" if isinstance(error, EffectError) else f"{type(error).__name__}: "
-        raise EffectError(f"{path}{_line_of(error, file)}: {kind}{error}") from error
+        said = f"{error}" if isinstance(error, EffectError) else f"{type(error).__name__}: {error}"
+        if isinstance(error, SystemExit):
+            said = f"sys.exit({error.code!r}) was called; a file of effects only defines them"
+        raise EffectError(f"{path}{_line_of(error, file)}: {said}") from error
     _plugins[str(file)] = content
 
 

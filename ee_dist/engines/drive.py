@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ee_dist.effects.laws import LAWS, LawContext, LawFunction, drive_law, find_law
 from ee_dist.engines.compiled import compiled
+from ee_dist.engines.contract import EngineError
 from ee_dist.engines.friction import Friction
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.transmission import Transmission
@@ -165,7 +166,7 @@ class DrivePath:
             context.t_s = t_s
             context.position, context.speed = q[rows, columns], qd[rows, columns]
             context.torque = torque[rows, columns]
-            added = function(context)
+            added = _torque_of(function, context)
             torque = torque.copy()
             np.add.at(torque, (rows, columns), added)
         if self.friction is not None:
@@ -329,3 +330,17 @@ def _slopes(robot: Robot) -> Array:
 def _present(robot: Robot) -> list[bool]:
     have = {j.name for j in robot.present_joints}
     return [d.joint in have for d in robot.drives]
+
+
+def _torque_of(law: LawFunction, context: LawContext) -> Array:
+    """What a law of a user's own returns. Raises EngineError where it fails, or gives something else than torques."""
+    said = f"drive law {law.__name__} ({law.__module__.removeprefix('ee_dist_plugin_')})"
+    try:
+        given = law(context)
+        found = np.asarray(given, dtype=np.float64)
+    except (Exception, SystemExit) as error:
+        raise EngineError(f"{said}: {type(error).__name__}: {' '.join(str(error).split())}") from error
+    if given is None or found.shape not in ((), context.position.shape):
+        what = "nothing" if given is None else f"an array of shape {found.shape}"
+        raise EngineError(f"{said}: it gave {what}; expected a torque for each of its {len(context.position)} joints")
+    return found

@@ -27,6 +27,10 @@ def weight_count(sensors: int, motors: int, hidden: int = HIDDEN) -> int:
     return (sensors + 1) * hidden + hidden * hidden + (hidden + 1) * motors
 
 
+class DriverError(ValueError):
+    """A driver that does not fit the robot."""
+
+
 @dataclass(frozen=True)
 class Network:
     """The paper's controller by its weights, in the order: input and bias to hidden, hidden to hidden, hidden and bias to output.
@@ -94,7 +98,7 @@ class _Networks:
         h = len(robots[0].wiring.hidden_gain) or HIDDEN
         w = np.array([d.weights for d in drivers])
         if w.shape[1] != weight_count(s, m, h):
-            raise ValueError(
+            raise DriverError(
                 f"network: {w.shape[1]} weights, expected {weight_count(s, m, h)} for {s} sensors and {m} motors"
             )
         n = len(w)

@@ -119,7 +119,8 @@ class RayEvaluator:
         self.shares = Shares(self.workers)
         self.patience_s = PATIENCE_S
         start_ray(address, self.workers)
-        actor = ray.remote(num_cpus=1 if not workers else 0.01, max_restarts=-1, max_task_retries=-1)(_Worker)
+        # Next to no share of a core: what a lost machine leaves must find a place on one that is full.
+        actor = ray.remote(num_cpus=0.01, max_restarts=-1, max_task_retries=-1, scheduling_strategy="SPREAD")(_Worker)
         self.actors = [actor.remote(make_engine) for _ in range(self.workers)]
         self._asked: list[Any] = [a.who.remote() for a in self.actors]
         self._pids: dict[int, int] = {}

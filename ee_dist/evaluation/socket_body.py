@@ -43,6 +43,13 @@ class SocketBody:
         self._socket: socket.socket | None = None
         self._rest = b""
 
+    def knock(self) -> None:
+        """Raises HardwareError where no robot answers: to be said before a search of hours, not after."""
+        try:
+            socket.create_connection(self.place, self.begin_s).close()
+        except OSError as error:
+            raise self._silent(error, "no robot answers there") from None
+
     def begin(self, trial: int, steps: int, step_s: float) -> Reading:
         self.abort()
         try:

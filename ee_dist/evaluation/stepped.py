@@ -25,6 +25,12 @@ class SteppedRobot:
         self.trials = 0
         self.aborted: SensorLog | None = None
 
+    def knock(self) -> None:
+        """Raises HardwareError where nobody answers; bodies that cannot be asked are taken to be there."""
+        knock = getattr(self.body, "knock", None)
+        if knock is not None:
+            knock()
+
     def skip(self) -> None:
         """A trial that was made before, by a run that is resumed now."""
         self.trials += 1

@@ -14,6 +14,8 @@ from typing import Any
 
 import yaml
 
+from ee_dist.basics.plain_yaml import load_yaml
+
 LARGEST = 4 * 2**20
 """Bytes of a description, a model or a mapping; ours have a few thousand."""
 DEEPEST = 64
@@ -49,7 +51,7 @@ def check_file(path: Path, largest: int) -> None:
         raise UntrustedError(f"{found.st_size >> 20} MiB; such a file may have {largest >> 20} MiB")
 
 
-def yaml_of(path: Path, load: Callable[[str], Any] = yaml.safe_load) -> Any:
+def yaml_of(path: Path, load: Callable[[str], Any] = load_yaml) -> Any:
     """Plain data out of YAML. Raises UntrustedError, and OSError as ``open`` does."""
     text = text_of(path)
     try:

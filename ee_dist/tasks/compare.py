@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.left import leftovers
-from ee_dist.discrepancy.words import compare_account
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import Account, compare_account
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.results.pages import compare_page
@@ -31,7 +32,7 @@ class Options:
     rerun: bool = True
 
 
-def run(config: Config, options: Options, out: Path) -> None:
+def run(config: Config, options: Options, out: Path) -> tuple[Problem, Comparison, Account]:
     """Write summary.json, report.html and compare.rrd into ``out``. Raises ConfigError, LogError, RecordingError."""
     console, watch, measured = Console(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
@@ -57,3 +58,4 @@ def run(config: Config, options: Options, out: Path) -> None:
     show_comparison(console, problem, found)
     console.print(f"By {way.name}: {way.why}.", *remarks, sep="\n", highlight=False, markup=False)
     show_account(console, account, out, following)
+    return problem, found, account

@@ -28,7 +28,15 @@ TASKS = (
     "import",
     "robot",
     "export",
+    "workbench",
 )
+_USED_BY = {
+    "scenario": (("recover", "online"), "what task=trial hides is hidden=..."),
+    "robot": (("recover", "online", "trial", "import"), "the others take the robot from the log or the model file"),
+}
+"""Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
+_ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}
+"""Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
 _SWEEP = ("-m", "--multirun")
 _RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
@@ -60,7 +68,23 @@ def check_flags(arguments: list[str]) -> None:
 
     parser = get_args_parser()
     parser.error = complain  # type: ignore[method-assign]
-    parser.parse_args(arguments)
+    for setting in parser.parse_args(arguments).overrides:
+        if not setting.lstrip("+~").partition("=")[0].strip():
+            raise ConfigError(f"{setting}: which setting? they are written key=value, and --help lists them")
+        if re.match(r"\+{0,2}resume=$", setting):
+            raise ConfigError(
+                "resume=: which folder? name that of a run that was stopped, such as resume=logs/recover/..."
+            )
+
+
+def check_used(overrides: list[str], task: str) -> None:
+    """Raises ConfigError for a setting that the verb would pass over in silence."""
+    for override in overrides:
+        name = override.lstrip("+").partition("=")[0].partition(".")[0]
+        verbs, instead = _USED_BY.get(name, ((task,), ""))
+        if task not in verbs:
+            having = f"{', '.join(f'task={v}' for v in verbs[:-1])} and task={verbs[-1]}"
+            raise ConfigError(f"{override}: task={task} has no use for it; it is for {having}, {instead}")
 
 
 def folder_name(overrides: str) -> str:
@@ -80,10 +104,14 @@ def config_folder() -> Path:
     raise ConfigError(f"no conf/config.yaml beside {package} or in it: the installation is incomplete")
 
 
+def module_of(name: str) -> str:
+    """The name of the module of a verb. Raises ConfigError for an unknown one."""
+    return _ELSEWHERE.get(one_of("task", name, TASKS), f"ee_dist.tasks.{name}")
+
+
 def task_module(name: str) -> ModuleType:
     """The module of a verb. Raises ConfigError for an unknown one."""
-    one_of("task", name, TASKS)
-    return importlib.import_module(f"ee_dist.tasks.{name}_" if name == "import" else f"ee_dist.tasks.{name}")
+    return importlib.import_module(module_of(name))
 
 
 _HANDLING = Handling.__dataclass_fields__
@@ -122,11 +150,28 @@ def _typed(kind: Any, tree: Any, prefix: str) -> Any:
         raise ConfigError(plain(error, prefix)) from None
 
 
+_EXPECTED = (
+    (r"Value '(.*)' of type '.*' could not be converted to Integer", "a whole number"),
+    (r"Value '(.*)' of type '.*' could not be converted to Float", "a number"),
+    (r"Value '(.*)' is not a valid bool", "true or false"),
+    (r"Invalid value assigned: .* is not a ListConfig", "a list, such as {key}=[one,two]"),
+    (r"Cannot assign \w+ to Dict", "a list of mappings, such as [{{effect: ..., target: ...}}]"),
+    (r"Incompatible value 'None' for field of type", "a value, not null"),
+)
+"""What OmegaConf says of a value of the wrong kind, and what would be right."""
+
+
 def plain(error: OmegaConfBaseException, prefix: str = "") -> str:
     """OmegaConf's message in one line, with the key in front."""
     text = str(error.msg or error).strip().splitlines()[0]
     cause = error.__cause__
     if isinstance(cause, ValueError) and not isinstance(cause, OmegaConfBaseException):
         text = str(cause)
-    key = error.full_key
-    return f"{prefix}{key}: {text}" if key else text
+    key = f"{prefix}{error.full_key}" if error.full_key else ""
+    if key:
+        for pattern, expected in _EXPECTED:
+            match = re.match(pattern, text)
+            if match:
+                value = f"={match.group(1)}" if match.groups() else ""
+                return f"{key}{value}: expected {expected.format(key=key)}"
+    return f"{key}: {text}" if key else text

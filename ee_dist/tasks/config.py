@@ -60,6 +60,8 @@ class EvaluatorConfig:
     workers: int = 0
     chunk: int = 0
     cache: bool = True
+    recent: bool = False
+    """Keep the last logs whole: for a person who asks one thing after another of few motions."""
 
     def __post_init__(self) -> None:
         one_of("evaluator", self.name, EVALUATORS)

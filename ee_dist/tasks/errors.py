@@ -7,10 +7,12 @@ import re
 import traceback
 from pathlib import Path
 
-from hydra.errors import HydraException
+from hydra.errors import HydraException, OverrideParseException
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import EffectError, loaded_plugins
 from ee_dist.engines.contract import EngineError
+from ee_dist.engines.drivers import DriverError
 from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, abandon_ray
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
@@ -26,6 +28,7 @@ _LONGEST = 300
 """Characters of an error that nobody foresaw: some libraries put whole arrays into theirs."""
 USER_ERRORS = (
     ConfigError,
+    DriverError,
     EffectError,
     EngineError,
     EvaluatorError,
@@ -80,6 +83,14 @@ def _of_plugin(error: BaseException) -> str:
 def hydra_message(error: HydraException) -> str:
     """What was wrong with the command line, without Hydra's advice to programmers."""
     text = str(error).strip()
+    unread = getattr(error, "override", None)
+    if unread is not None or isinstance(error, OverrideParseException):
+        return (
+            f"{quoted(str(unread))}: cannot be read; settings are written key=value, signs within quotes: key=\"'a=b'\""
+        )
+    twice = re.match(r"Multiple values for (\S+)\. ", text)
+    if twice:
+        return f"{twice.group(1)}: given more than once; name one, or several with -m: -m +{twice.group(1)}=1,2"
     missing = re.match(
         r"(?s)(?:In '.*?': )?Could not find '([^']+)'\s*Available options in '([^']+)':\s*(.*?)(?:\nConfig search path|$)",
         text,

@@ -8,10 +8,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ee_dist.discrepancy.explain import EFFECT, explain
+from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
+from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.pool import pool_of
-from ee_dist.discrepancy.words import explain_account
+from ee_dist.discrepancy.search.search import Progress, quiet
+from ee_dist.discrepancy.words import Account, explain_account
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
@@ -39,13 +41,14 @@ class Options:
     rerun: bool = True
 
 
-def run(config: Config, options: Options, out: Path) -> None:
-    """Write summary.json, report.html and explain.rrd into ``out``. Raises ConfigError, LogError, RecordingError."""
+def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> tuple[Problem, Explanation, Account]:
+    """Write summary.json, report.html and explain.rrd into ``out``; ``told`` hears of the progress. Raises ConfigError,
+    LogError, RecordingError."""
     console, watch, measured = Console(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
-    with SearchProgress(console) as progress:
+    with SearchProgress(console, told) as progress:
         problem = way.make(measured, config)
         pool = pool_of(problem, options.without, options.only)
         count = len(measured.trials)
@@ -76,3 +79,4 @@ def run(config: Config, options: Options, out: Path) -> None:
     wall, _ = watch.read()
     console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)
     show_account(console, account, out, following)
+    return problem, found, account

@@ -33,6 +33,8 @@ HELD = (
 )
 
 _made: tuple[Path, ...] = ()
+_sweep: Path | None = None
+"""Folder of a sweep that was empty before; Hydra notes the sweep's settings there before anybody looked at them."""
 
 
 class Refused(BaseException):
@@ -54,7 +56,10 @@ class NotedFolders(Callback):
             raise Refused(NO_NAME.format(key="hydra.sweep.dir"))
         if (Path(str(config.hydra.sweep.dir)) / _SWEEP).exists() and not (config.overwrite or config.resume):
             raise Refused(HELD.format(key="hydra.sweep.dir", folder=config.hydra.sweep.dir, content="a sweep"))
-        self._missing = missing(Path(str(config.hydra.sweep.dir)))
+        global _made, _sweep
+        folder = Path(str(config.hydra.sweep.dir))
+        self._missing = _made = missing(folder)
+        _sweep = None if held(folder) else folder
 
     def on_job_start(self, config: DictConfig, **_: Any) -> None:
         # A launcher may have brought this object to another process, and with it what was noted.
@@ -116,6 +121,13 @@ def remove_made(folders: Sequence[Path] | None = None) -> None:
     for path in _made if folders is None else folders:
         with suppress(OSError):
             path.rmdir()
+
+
+def forget_sweep() -> None:
+    """Remove what Hydra noted of a sweep, none of whose jobs left anything."""
+    if _sweep is not None and held(_sweep) == [_SWEEP]:
+        (_sweep / _SWEEP).unlink()
+        remove_made((_sweep, *_made) if _sweep in _made else _made)
 
 
 def shown(folder: Path) -> str:

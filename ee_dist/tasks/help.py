@@ -14,7 +14,7 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from ee_dist.tasks.compose import TASKS, config_folder
+from ee_dist.tasks.compose import TASKS, config_folder, module_of
 from ee_dist.tasks.config import one_of
 from ee_dist.tasks.summary import package_version
 
@@ -78,6 +78,9 @@ VERBS = {
     "export": Verb("the model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),
     "reveal": Verb("open the seal, score what was found", "task=reveal log=TRIAL", (), ("log",)),
     "view": Verb("open a run in rerun", "task=view log=RUN", (), ("log",)),
+    "workbench": Verb(
+        "all of it by hand, on a page", "task=workbench measured=LOG", ("robot", *_RUN), (*_MODEL, "log")
+    ),
 }
 
 
@@ -223,6 +226,6 @@ def _default(conf: Path, group: str) -> str:
 
 def _first_line(name: str) -> str:
     """The first sentence of a verb's module; it is read, not imported, which would take seconds."""
-    module = Path(__file__).parent / (f"{name}_.py" if name == "import" else f"{name}.py")
+    module = Path(__file__).parents[1].joinpath(*module_of(name).split(".")[1:]).with_suffix(".py")
     text = ast.get_docstring(ast.parse(module.read_text(encoding="utf-8"))) or ""
     return text.splitlines()[0]

@@ -12,13 +12,14 @@ from rich.console import Console
 
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, Improvement, improve
+from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import to_entries
-from ee_dist.discrepancy.words import improve_account
+from ee_dist.discrepancy.words import Account, improve_account
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
@@ -49,8 +50,9 @@ class Options:
             raise ConfigError(f"task.most={self.most}: must be 1 or more")
 
 
-def run(config: Config, options: Options, out: Path) -> None:
-    """Write model.yaml, summary.json, report.html and improve.rrd into ``out``. Raises ConfigError, EffectError, LogError."""
+def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> tuple[Problem, Improvement, Account]:
+    """Write model.yaml, summary.json, report.html and improve.rrd into ``out``; ``told`` hears of the progress. Raises
+    ConfigError, EffectError, LogError."""
     console, watch, measured = Console(), Stopwatch(), load(config)
     wanted = effects_of(config.effect, measured.robot)
     for key in ("without", "only"):
@@ -63,7 +65,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         console.print(remark, highlight=False, markup=False)
     if options.calibrate and way.name != OpenLoop.way:
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
-    with SearchProgress(console) as progress:
+    with SearchProgress(console, told) as progress:
         problem = way.make(measured, config)
         pool = pool_of(problem, options.without, options.only)
         calibration = None
@@ -93,6 +95,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         refused = [c for c in found.last.judged if not c.earned]
         show_candidates(console, problem, refused, "Tried on top of it, and refused")
     show_account(console, account, out, following)
+    return problem, found, account
 
 
 def effects_of(asked: Any, robot: Robot) -> list[Candidate] | None:

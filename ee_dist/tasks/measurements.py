@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from ee_dist.basics.names import nearest
 from ee_dist.basics.quoted import quoted
@@ -22,6 +21,7 @@ from ee_dist.recording.records import HARDWARE, RunRecord
 from ee_dist.robots.agree import agreed, changed_sources, differences
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
+from ee_dist.robots.untrusted import yaml_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import LogError, SensorLog
@@ -105,6 +105,8 @@ def files_of(measured: Any) -> list[Path]:
             if not inside:
                 raise ConfigError(f"measured={path}: no .mcap in this folder; other formats come in with task=import")
             found += inside
+        elif path.exists() and not path.is_file():
+            raise ConfigError(f"measured={path}: not an ordinary file; name a recording (.mcap)")
         elif not path.is_file():
             near = nearest(path.name, [p.name for p in path.parent.glob("*.mcap")], cutoff=0.3)
             hint = f"; did you mean {' or '.join(near)}?" if near else ""
@@ -170,10 +172,10 @@ def _calibration(path: Path, robot: Robot) -> tuple[Unmodelled | None, float, st
     if not beside.is_file():
         return None, 0.0, ""
     try:
-        content = yaml.safe_load(beside.read_text(encoding="utf-8"))
+        content = yaml_of(beside)
         left = from_entries(content["unmodelled"], robot.sensor_names)
         return left, float(content["gained"]), str(content.get("way", "open_loop"))
-    except (KeyError, TypeError, ValueError, AttributeError, yaml.YAMLError):
+    except (KeyError, TypeError, ValueError, AttributeError):
         raise ConfigError(
             f"{beside}: not a calibration; write it with task=improve task.calibrate=true on an untouched robot"
         ) from None

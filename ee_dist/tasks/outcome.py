@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.recording.records import HARDWARE, TrialRecord
+from ee_dist.recovery.gait import gait
+from ee_dist.recovery.observer import Observer
+from ee_dist.robots.model import Robot
 
 RESTORED = 0.9
 """Function counts as restored at this share of the intact distance."""
@@ -13,10 +17,11 @@ RESTORED = 0.9
 
 @dataclass(frozen=True)
 class Score:
-    """``recovered_fraction``: best compensating trial over the intact distance. ``found``: which true terms the last
-    hypothesis names, by effect and place; ``invented``: which it names that are not true."""
+    """``recovered_fraction``: best compensating trial over the intact distance; ``counted_fraction``: the best of those that
+    count. ``found``: which true terms the last hypothesis names, by effect and place; ``invented``: which that are not true."""
 
     recovered_fraction: float
+    counted_fraction: float
     restored: bool
     found: int
     true: int
@@ -28,11 +33,39 @@ class Score:
         return self.found == self.true and self.invented == 0
 
 
-def score(intact_m: float, trials_m: Sequence[float], believed: Hypothesis, truth: Hypothesis) -> Score:
-    """Compare with the truth, distances in metres."""
+class Gaits(Observer):
+    """How the hardware made its distances: what is no gait in each trial, by its number.
+
+    The physical robot after the change is ``robot`` under ``hidden``, where that is known.
+    """
+
+    def __init__(self, robot: Robot, hidden: Hypothesis) -> None:
+        self.bodies = (robot, apply(robot, hidden))
+        self.cheats: list[tuple[str, ...]] = []
+
+    def trial(self, record: TrialRecord) -> None:
+        if record.source == HARDWARE:
+            found = gait(self.bodies[min(record.index, 1)], record.log)
+            self.cheats.append(() if found is None else found.cheats)
+
+    @property
+    def compensating(self) -> list[tuple[str, ...]]:
+        """Without the intact trial and the one right after the change."""
+        return self.cheats[2:]
+
+
+def score(
+    intact_m: float,
+    trials_m: Sequence[float],
+    believed: Hypothesis,
+    truth: Hypothesis,
+    cheats: Sequence[tuple[str, ...]] = (),
+) -> Score:
+    """Compare with the truth, distances in metres. A trial with ``cheats`` does not count as function restored."""
     named, real = _places(believed), _places(truth)
-    fraction = max(trials_m) / intact_m if intact_m > 0 else float("nan")
-    return Score(fraction, fraction >= RESTORED, len(named & real), len(real), len(named - real))
+    counted = [m for k, m in enumerate(trials_m) if not (k < len(cheats) and cheats[k])]
+    best, fraction = (max(m) / intact_m if m and intact_m > 0 else float("nan") for m in (list(trials_m), counted))
+    return Score(best, fraction, fraction >= RESTORED, len(named & real), len(real), len(named - real))
 
 
 def _places(hypothesis: Hypothesis) -> set[tuple[str, str]]:

@@ -7,12 +7,14 @@ import time
 from rich.console import Console
 from rich.status import Status
 
+from ee_dist.discrepancy.search.search import Progress, quiet
+
 
 class SearchProgress:
-    """A live line on a terminal; elsewhere a plain line whenever another stage begins."""
+    """A live line on a terminal; elsewhere a plain line whenever another stage begins. ``told``: who else is told."""
 
-    def __init__(self, console: Console) -> None:
-        self.console, self.stage = console, ""
+    def __init__(self, console: Console, told: Progress = quiet) -> None:
+        self.console, self.stage, self.told = console, "", told
         self.began = self.stage_began = time.monotonic()
         self.status: Status | None = console.status("starting") if console.is_terminal else None
 
@@ -27,6 +29,7 @@ class SearchProgress:
 
     def __call__(self, what: str, share: float) -> None:
         now = time.monotonic()
+        self.told(what, share)
         if what != self.stage:
             self.stage, self.stage_began = what, now
             if self.status is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.effects.groups import members_of
 from ee_dist.recording.reader import read_run
 from ee_dist.robots.model import Robot
+from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.seal import FILE, opened
 from ee_dist.tasks.summary import Stopwatch, hypothesis_list, write_summary
@@ -46,6 +46,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     if not config.log:
         raise ConfigError("log=: whose truth? name the folder of a trial, such as log=logs/trial/...")
     folder = Path(config.log)
+    if not folder.exists():
+        raise ConfigError(f"log={folder}: no such folder; name that of a trial, such as log=logs/trial/...")
     folder = folder if folder.is_dir() else folder.parent
     logs = sorted(folder.glob("*.mcap"))
     record = read_run(logs[0]) if logs else None
@@ -150,8 +152,8 @@ def _pair(name: str) -> tuple[str, str]:
 def _summary(path: Path) -> Mapping[str, Any]:
     file = path / "summary.json" if path.is_dir() else path
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = json_of(text_of(file, 2**28))
+    except (OSError, UntrustedError):
         found = None
     if not isinstance(found, dict):
         raise ConfigError(f"task.explained={path}: no summary.json of explain or improve there")

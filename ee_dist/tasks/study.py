@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections import defaultdict
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from rich.table import Table
 from scipy.stats import false_discovery_control, mannwhitneyu
 
 from ee_dist.basics.files import write_whole
+from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.outcome import RESTORED
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
@@ -29,6 +29,8 @@ class Options:
     name: str = "study"
 
 
+LARGEST = 2**28
+"""Bytes of a summary."""
 COLUMNS = (
     "scenario", "metric", "seed", "engine", "budget", "intact_m", "after_m", "best_m", "last_m", "recovered",
     "restored", "found", "true", "invented", "right", "asked", "simulated", "steps", "wall_s", "digest",
@@ -62,11 +64,18 @@ def load(folder: Path) -> list[dict[str, Any]]:
     found = []
     for path in sorted(folder.rglob("summary.json")):
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise ConfigError(f"{path}: not a summary ({error})") from None
-        if content.get("task") == "recover":
-            found.append(content)
+            content = json_of(text_of(path, LARGEST))
+        except (OSError, UntrustedError) as error:
+            raise ConfigError(f"{path}: not a summary ({error}); take it out of the folder") from None
+        if not isinstance(content, dict):
+            raise ConfigError(f"{path}: not a summary; take it out of the folder")
+        if content.get("task") != "recover":
+            continue
+        try:
+            row(content)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ConfigError(f"{path}: a summary without {error}; take it out of the folder") from None
+        found.append(content)
     if not found:
         raise ConfigError(f"log={folder}: no finished run below it; a run is finished when it has a summary.json")
     return sorted(found, key=lambda s: (s["metric"], s["engine"], s["scenario"], s["seed"]))
@@ -76,14 +85,17 @@ def row(summary: dict[str, Any]) -> dict[str, Any]:
     """One run as a line of the table."""
     trials = summary["distance_m"]["trials"]
     evaluations = summary["evaluations"]
+    # Of a robot of one's own nobody knows the truth: its runs count, its diagnoses cannot be scored.
+    scored = summary["diagnosis"] or dict.fromkeys(("found", "true", "invented", "right"))
+    fraction = summary["recovered_fraction"]
     return {
         **{k: summary[k] for k in ("scenario", "metric", "seed", "engine", "budget", "restored", "wall_s")},
         "intact_m": summary["distance_m"]["intact"],
         "after_m": summary["distance_m"]["after"],
         "best_m": max(trials),
         "last_m": trials[-1],
-        "recovered": summary["recovered_fraction"],
-        **summary["diagnosis"],
+        "recovered": float("nan") if fraction is None else fraction,
+        **scored,
         **{k: evaluations[k] for k in ("asked", "simulated", "steps")},
         "digest": summary["result_digest"][:12],
     }
@@ -97,10 +109,16 @@ def total(rows: list[dict[str, Any]]) -> dict[str, Any]:
         found[metric] = {
             "runs": len(mine),
             "restored": sum(bool(r["restored"]) for r in mine),
+            "scored": sum(r["true"] is not None for r in mine),
             "right": sum(bool(r["right"]) for r in mine),
-            "true_among_believed": sum(r["found"] == r["true"] for r in mine),
+            "true_among_believed": _named(mine),
         }
     return found
+
+
+def _named(rows: list[dict[str, Any]]) -> int:
+    """Runs whose truth is known and whose diagnosis has all of it."""
+    return sum(r["true"] is not None and r["found"] == r["true"] for r in rows)
 
 
 def by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -109,7 +127,7 @@ def by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     groups: dict[tuple[str, int], list[dict[str, Any]]] = defaultdict(list)
     for r in rows:
         groups[r["metric"], r["scenario"]].append(r)
-    lines = []
+    lines: list[dict[str, Any]] = []
     for (metric, scenario), mine in sorted(groups.items()):
         after, last = ([r[k] for r in mine] for k in ("after_m", "last_m"))
         p = float(mannwhitneyu(last, after, alternative="two-sided").pvalue) if len(mine) > 1 else float("nan")
@@ -119,8 +137,9 @@ def by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
             "runs": len(mine),
             **{k: float(np.mean([r[k] for r in mine])) for k in ("intact_m", "after_m", "best_m", "last_m", "recovered")},
             "restored": sum(bool(r["restored"]) for r in mine),
+            "scored": sum(r["true"] is not None for r in mine),
             "right": sum(bool(r["right"]) for r in mine),
-            "named": sum(r["found"] == r["true"] for r in mine),
+            "named": _named(mine),
             "p": p,
             "p_corrected": float("nan"),
         })  # fmt: skip
@@ -159,7 +178,8 @@ def cells(line: dict[str, Any]) -> list[str]:
     n, p = line["runs"], "-" if math.isnan(line["p_corrected"]) else f"{line['p_corrected']:.2g}"
     return [
         str(line["scenario"]), str(n), *(f"{line[k]:.2f}" for k in ("intact_m", "after_m", "best_m", "last_m")),
-        f"{line['restored']}/{n}", f"{line['right']}/{n}", f"{line['named']}/{n}", p,
+        f"{line['restored']}/{n}",
+        *(f"{line[k]}/{line['scored']}" if line["scored"] else "-" for k in ("right", "named")), p,
     ]  # fmt: skip
 
 
@@ -171,11 +191,11 @@ def markdown(rows: list[dict[str, Any]]) -> str:
         parts.append(f"### {metric}\n")
         parts.append("| " + " | ".join(HEAD) + " |\n|" + "---|" * len(HEAD))
         parts += ["| " + " | ".join(cells(x)) + " |" for x in lines]
-        n = counts["runs"]
+        n, scored = counts["runs"], counts["scored"]
         parts.append(
             f"\nRestored ({RESTORED:.0%} of intact or more in one of the compensating trials): {counts['restored']} of {n}. "
-            f"Diagnosis right (every true effect at its place and no other): {counts['right']} of {n}; "
-            f"all true effects named: {counts['true_among_believed']} of {n}. {CAPTION.split('. ', 1)[1]}\n"
+            f"Diagnosis right (every true effect at its place and no other): {counts['right']} of {scored}; "
+            f"all true effects named: {counts['true_among_believed']} of {scored}. {CAPTION.split('. ', 1)[1]}\n"
         )
     return "\n".join(parts) + "\n"
 
@@ -191,7 +211,7 @@ def _print(console: Console, rows: list[dict[str, Any]]) -> None:
             if line["metric"] == metric:
                 table.add_row(*cells(line))
         console.print(table)
-        n = counts["runs"]
-        console.print(f"restored {counts['restored']}/{n}, diagnosis right {counts['right']}/{n}, "
-                      f"all true effects named {counts['true_among_believed']}/{n}", highlight=False)  # fmt: skip
+        n, scored = counts["runs"], counts["scored"]
+        console.print(f"restored {counts['restored']}/{n}, diagnosis right {counts['right']}/{scored}, "
+                      f"all true effects named {counts['true_among_believed']}/{scored}", highlight=False)  # fmt: skip
     console.print(CAPTION.split(". ", 1)[1], style="dim", highlight=False)

@@ -67,6 +67,10 @@ def run(config: Config, options: Options, out: Path) -> None:
     if options.motor_torque:
         described = with_motor_torques(described)
     robot = with_noise(described, config.noise or options.noise)
+    if not robot.drives:
+        raise ConfigError(
+            f"robot: {robot.name} has no drives, so nothing moves it; name them with robot.drives=FILE.yaml"
+        )
     hidden = hypothesis(config.hidden, robot, hidden_seed)
     apply(robot, hidden)
     plan = [parse(text) for text in options.excitations]

@@ -118,6 +118,10 @@ class _Remembered:
     def __init__(self, run: Unfinished, name: str, inner: Hardware, robot: Robot) -> None:
         self.run, self.folder, self.name, self.inner, self.robot = run, run.folder, name, inner, robot
         self.count = 0
+        knock = getattr(inner, "knock", None)
+        # A run that is resumed may have made all its trials: then nobody needs to be there any more.
+        if knock is not None and not any(self.folder.glob("*.mcap")):
+            knock()
 
     def trial(self, driver: Any, steps: int) -> SensorLog:
         path = self.folder / f"{self.name}_{self.count:04d}.mcap"
@@ -178,6 +182,12 @@ def unfinished(out: Path, config: Config, options: Any, resume: bool) -> Iterato
             found.forget()
         found.close()
         _current = None
+
+
+def note_nothing() -> None:
+    """From here on the run under way keeps nothing to go on from: it has no end to reach, or goes on after its results."""
+    global _current
+    _current = None
 
 
 def remembered(name: str, inner: Hardware, robot: Robot) -> Hardware:

@@ -15,6 +15,7 @@ from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import JournaledEvaluator
 from ee_dist.evaluation.ray_actors import RayEvaluator
 from ee_dist.evaluation.ray_session import stop_ray
+from ee_dist.evaluation.recent import RecentEvaluator
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.evaluation.socket_body import SocketBody
 from ee_dist.evaluation.stepped import SteppedRobot
@@ -97,6 +98,7 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
         settings.workers,
         settings.chunk,
         settings.cache,
+        settings.recent,
         config.ray.address,
         engine_maker(config, True, engine),
     )
@@ -111,7 +113,7 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
                 engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address
             )
             leaving.arm()  # Ray has put handlers of its own in place
-        inner = JournaledEvaluator(inner)
+        inner = JournaledEvaluator(RecentEvaluator(inner) if settings.recent else inner)
         _kept[key] = CachedEvaluator(inner) if settings.cache else inner
     evaluator = _kept[key]
     evaluator.counts.reset()

@@ -21,6 +21,11 @@ def plain(name: str) -> str:
     return name.replace("_", " ")
 
 
+def _unit(found: Finding) -> str:
+    """Behind a heading, where it is short: a table has to fit beside the plots."""
+    return f" ({found.unit})" if len(found.unit) < 6 else ""
+
+
 def headline(found: Finding) -> list[str]:
     """Verdict, how large the error is and how sure all of it, and what to do next."""
     lines = [f"### {found.title}", "", f"**{found.verdict}**", ""]
@@ -47,7 +52,7 @@ def channel_table(found: Finding) -> list[str]:
     if not any(c.error for c in ranked):
         return [f"All {len(ranked)} channels agree exactly: every error is 0."]
     largest = max(c.error for c in ranked)
-    lines = [f"| channel | error ({found.unit}) | | RMS | worst |", "|---|---|---|---|---|"]
+    lines = [f"| channel | error{_unit(found)} | | RMS | worst |", "|---|---|---|---|---|"]
     for c in ranked:
         unit = "" if c.unit in ("", "1") else f" {c.unit}"
         where = f"{plain(c.worst_case)}, {c.worst_from_s:.2f} to {c.worst_to_s:.2f} s" if c.worst_case else ""
@@ -73,7 +78,7 @@ def ladder_table(found: Finding) -> list[str]:
     if not found.ladder:
         return []
     largest = max(r.error_heldout for r in found.ladder)
-    lines = [f"| # | model | error held out ({found.unit}) | | in the fit |", "|---|---|---|---|---|"]
+    lines = [f"| # | model | error held out{_unit(found)} | | in the fit |", "|---|---|---|---|---|"]
     for k, rung in enumerate(found.ladder):
         fit = "" if rung.error_fit is None else f"{rung.error_fit:.3g}"
         lines.append(f"| {k} | {rung.label} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} |")

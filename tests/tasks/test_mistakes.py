@@ -2,92 +2,82 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+from pathlib import Path
+
 import pytest
 
+# Under every import mode of pytest.
+sys.path.insert(0, str(Path(__file__).parent))
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["+scenario=14"], "scenario=14: no such choice; there are: 1, 2, 3"),
-        (["+scenario=8", "seed=abc"], "seed: Value 'abc'"),
-        (["+scenario=8", "seed=-1"], "seed=-1: must be a whole number"),
-        (["+scenario=8", "budget=papr"], "budget=papr: no such choice; there are: paper, quick"),
-        (["+scenario=8", "engine=mujuco"], "engine=mujuco: no such choice; there are: mujoco, pybullet"),
-        (["+scenario=8", "ray.address=127.0.0.1:1"], "ray.address=127.0.0.1:1: no Ray cluster answers there"),
-        (["+scenario=8", "ray.address=nonsense"], "neither 'auto' nor host:port"),
-        (["+scenario=8", "hydra.run.dir=/dev/null/x"], "choose a folder with hydra.run.dir"),
-        (["+scenario=8", "metric.header=3"], "header (3) must be at least window (10)"),
-        (["+scenario=8", "+metric.heder=3"], "metric.heder: no such setting; did you mean header?"),
-        (["+scenario=8", "sed=1"], "sed: no such setting; did you mean seed"),
-        (["+scenario=8", "evaluator.wrkers=2"], "evaluator.wrkers: no such setting; did you mean evaluator.workers"),
-        (["+scenario=8", "evaluator=serial", "evaluator.workers=2"],
-         "evaluator.workers: the chosen evaluator has no such setting; evaluator=auto and evaluator=ray have it"),
-        (["+scenario=8", "engine.threads=2"], "engine=mujoco has it"),
-        (["task=compare", "task.bye=free_run"], "task.bye: this verb has no such setting"),
-        (["task=explian", "--help"], "task=explian: no such choice; did you mean explain"),
-        (["scenario=8"], "add it with a plus sign: +scenario=8"),
-        (["+scenario=8", "+sed=1"], "sed: no such setting; did you mean seed?"),
-        (["+scenario.sev=1"], "scenario.sev: no such setting"),
-        (["+scenario=8", "budget.population=7"], "population must be an even number"),
-        (["+scenario=8", "noise=2"], "noise=2.0: must be a share"),
-        (["task=recovr"], "task=recovr: no such choice"),
-        ([], "which scenario? add one, such as +scenario=8"),
-        (["+scenario=8", "scenario.changes=[{effect: motor_week, target: knee_front_left}]"], "did you mean motor_weak"),
-        (["+scenario=8", "scenario.changes=[{effect: motor_weak, target: knee}]"], "motor_weak cannot act on 'knee'"),
-        (["+scenario=8", "scenario.changes=[{effect: motor_weak, target: knee_front_left, loss: 7}]"], "[0, 1]"),
-        (["+scenario=8", "plugins=[nowhere.py]"], "no such file of effects: "),
-        (["task=view"], "log=: which log?"),
-        (["task=import", "measured=nowhere.csv"], "nowhere.csv: no such file"),
-        (["task=import", "measured=nowhere.bag"], "nowhere.bag: no such file"),
-        (["task=import", "measured=nowhere.npz"], "nowhere.npz: no such file"),
-        (["task=import", "measured=."], "no file to import in this folder; expected .csv, "),
-        (["task=import", "measured=a.csv", "task.unit=degrees"], "task.unit=degrees: no such choice; did you mean deg"),
-        (["task=import", "measured=a.csv", "task.gains=[0]"], "task.gains: expected numbers in N.m per A, none of them 0"),
-        (["task=import", "measured=a.csv", "task.rate_hz=-5"], "task.rate_hz=-5"),
-        (["task=import", "measured=a.csv", "task.joints=[nee]", "task.mapping=m.yaml"], "is for an import without a mapping"),
-        (["task=view", "log=nowhere.mcap"], "nowhere.mcap"),
-        (["task=export"], "model=: which model file?"),
-        (["task=export", "model=nowhere.yaml"], "nowhere.yaml: no such file"),
-        (["task=export", "model=nowhere.yaml", "to=sdf"], "to=sdf: no such choice; "),
-        (["task=robot"], "task=robot looks at one file: urdf=FILE.urdf or mjcf=FILE.xml"),
-        (["task=robot", "urdf=nowhere.urdf"], "nowhere.urdf: no such file"),
-        (["task=robot", "mjcf=nowhere.xml"], "nowhere.xml: no such file"),
-        (["task=robot", "urdf=a.urdf", "task.output=../x.yaml"], "expected the name of a file that ends in .yaml"),
-        (["task=view", "log=/dev/zero"], "/dev/zero: not an ordinary file"),
-        (["+scenario=-1"], "scenario=-1: no such choice; there are: 1, 2"),
-        (["+scenario=8", "--foo"], "unrecognized arguments: --foo; settings are written key=value"),
-        (["task=trial", "+hidden=" + "[" * 3000 + "]" * 3000], "nested too deep"),
-        (["+scenario=8", "seed=${oc.env:NOT_THERE}"], "Environment variable 'NOT_THERE' not found"),
-        (["+scenario=8", "seed=1e400"], "seed: Value 'inf'"),
-        (["+scenario=8", "noise=nan"], "noise=nan: must be a share"),
-        (["+scenario=8", "noise=-1"], "noise=-1.0: must be a share"),
-        (["+scenario=8", "budget.population=1000000000"], "budget.population=1000000000: must be from 0 to 100 000"),
-        (["+scenario=8", "budget.steps=1000000000000"], "budget.steps=1000000000000: must be from 0 to 1 000 000"),
-        (["+scenario=8", "budget.generations=-3"], "budget.generations=-3: must be from 0"),
-        (["+scenario=8", "metric.header=5000"], "metric.header=5000: longer than a trial; must be at most budget.steps (1000)"),
-        (["+scenario=8", "evaluator.workers=100000"], "evaluator.workers=100000: this machine has"),
-        (["+scenario=8", "evaluator.workers=-1"], "evaluator.workers=-1: must be from 0"),
-        (["+scenario=8", "evaluator=serial", "evaluator.chunk=99999999"], "evaluator.chunk=99999999: must be from 0"),
-        (["+scenario=8", "plugins=3"], "plugins: "),
-        (["+scenario=8", "robot.urdf=x.urdf"], "the chosen robot has no such setting; robot=mjcf and robot=urdf have it"),
-        (["task=improve", "task.without=[gremlin]", "measured=x.mcap"], "no effect named 'gremlin'"),
-        (["task=explain", "task.without=[gremlin@knee]", "measured=x.mcap"], "no effect named 'gremlin'"),
-        (["task=trial", "task.excitations=['steps:seconds=1e300']"], "1e+300 s must lie between 0.1 and 600 s"),
-        (["task=trial", "task.excitations=['steps:seed=-1']"], "seed -1 must be a whole number from 0"),
-        (["task=import", "measured=/dev/zero", "task.mapping=/dev/zero"], "/dev/zero: not an ordinary file"),
-        (["task=trial", "+hidden=" + "x" * 5000], "no effect named"),
-    ],
-)  # fmt: skip
-def test_one_line_and_a_status(cli, arguments, said):
-    outcome = cli(*arguments)
-    assert outcome.status == 2
-    lines = [line for line in outcome.err.splitlines() if line.strip()]
-    assert len(lines) == 1, outcome.err
+import one_job
+import wrong_files
+from mistakes import TABLE, WHOLE
+
+from ee_dist.tasks.compose import TASKS
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Every row finds here what it names."""
+    folder = tmp_path_factory.mktemp("wrong")
+    wrong_files.write(folder)
+    return folder
+
+
+def check(status: int, err: str, said: str) -> None:
+    assert status == 2, err
+    lines = [line for line in err.splitlines() if line.strip()]
+    assert len(lines) == 1, err
     assert lines[0].startswith("ee_dist: ")
     assert said in lines[0]
     assert len(lines[0]) <= 700
+
+
+@pytest.mark.parametrize(("line", "said"), TABLE, ids=[line for line, _ in TABLE])
+def test_one_line_and_a_status(files, monkeypatch, line, said):
+    monkeypatch.chdir(files)
+    before = wrong_files.written(files)
+    status, err = one_job.run(*shlex.split(line))
+    check(status, err, said)
+    assert wrong_files.written(files) == before, "a mistake left files behind"
+
+
+HOSTILE = (
+    (["task=trial", "+hidden=" + "[" * 3000 + "]" * 3000], "nested too deep"),
+    (["task=trial", "+hidden=" + "x" * 5000], "no effect named 'xxx"),
+    ([], "which scenario? add one, such as +scenario=8"),
+)
+
+
+@pytest.mark.parametrize(("arguments", "said"), [*((shlex.split(line), said) for line, said in WHOLE), *HOSTILE])
+def test_the_whole_program_too(cli, arguments, said):
+    outcome = cli(*arguments)
+    check(outcome.status, outcome.err, said)
     assert "Traceback" not in outcome.out
     assert not [p for p in outcome.folder.rglob("*") if p.is_file()], "a mistake left files behind"
+
+
+def test_the_table_is_long_enough_and_has_every_verb():
+    lines = [line for line, _ in (*TABLE, *WHOLE)]
+    assert len(set(lines)) >= 200
+    verbs = {word.removeprefix("task=") for line in lines for word in line.split() if word.startswith("task=")}
+    assert verbs >= set(TASKS) - {"recover"}
+
+
+@pytest.mark.parametrize(("plugin", "said"), [
+    ("shape", "it gave an array of shape (3,); expected a torque for each of its 1 joints"), ("law", "ZeroDivisionError"),
+    ("nothing", "it gave nothing"), ("text", "could not convert"), ("nan", "unstable"),
+])  # fmt: skip
+def test_a_drive_law_that_fails_is_one_line(files, monkeypatch, tmp_path, plugin, said):
+    monkeypatch.chdir(files)
+    status, err = one_job.run(
+        "task=trial", "robot=servo_pendulum", "engine=mujoco", "task.excitations=['sway:seconds=0.2']", f"plugins=[{plugin}.py]",
+        f"+hidden=[{{effect: my_{plugin}, target: servo, much: 0.5}}]", f"hydra.run.dir={tmp_path}/out",
+    )  # fmt: skip
+    check(status, err, said)
+    assert not (tmp_path / "out" / "trial.mcap").exists()
 
 
 def test_a_foreign_file_is_not_a_run(cli, tmp_path):

@@ -35,6 +35,7 @@ def stopping(monkeypatch):
         close_evaluators()  # what a new process would not have
         calls[:], due[:] = [0, after], [when]
 
+    stop.calls = calls
     yield stop
     close_evaluators()
 
@@ -91,6 +92,37 @@ def test_what_cannot_be_resumed_is_said_in_one_line(cli, tiny, tmp_path, stoppin
     assert "it was begun with mujoco 0.1, here is" in cli(*FAST, *tiny, f"resume={out}").err
     (out / "unfinished" / "run.json").write_text("[" * 9)
     assert "is damaged" in cli(*FAST, *tiny, f"resume={out}").err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", [("task=explain",), ("task=improve", "effect=auto", "task.most=1")])
+def test_explain_and_improve_go_on_where_they_stopped(cli, tmp_path, stopping, verb):
+    log = tmp_path / "log"
+    assert cli(
+        "task=trial", "robot=servo_pendulum", "+hidden=coulomb_friction@servo", "engine=mujoco", "seed=1",
+        "task.excitations=['multisine:seconds=2,seed=1','slow_sines:seconds=2,seed=2']", f"hydra.run.dir={log}",
+    ).status == 0  # fmt: skip
+    ask = (
+        *verb, f"measured={log}", "engine=mujoco", "evaluator=serial", "task.by=open_loop", "task.rerun=false",
+        "task.only=[coulomb_friction,viscous_friction]",
+    )  # fmt: skip
+    stopping()
+    assert cli(*ask, f"hydra.run.dir={tmp_path}/whole").status == 0
+    calls = stopping.calls[0]
+    assert calls > 3, "too short to be stopped in the middle"
+    where = f"hydra.run.dir={tmp_path}/run"
+    for after in (calls // 2, calls // 3):
+        stopping(after)
+        assert cli(*ask, where).status == 1
+        where = f"resume={tmp_path}/run"
+    stopping()
+    assert cli(*ask, where).status == 0
+    assert stopping.calls[0] < calls, "nothing was remembered"
+    whole, resumed = ((tmp_path / n / "summary.json").read_text().replace(f"/{n}", "") for n in ("whole", "run"))
+    left_out = ("wall_s", "cpu_s")
+    found = [{k: v for k, v in json.loads(text).items() if k not in left_out} for text in (whole, resumed)]
+    assert found[0] == found[1]
+    assert not (tmp_path / "run" / "unfinished").exists()
 
 
 def test_a_sweep_goes_on_where_it_stopped(cli, tiny, tmp_path, stopping):

@@ -20,7 +20,10 @@ from ee_dist.robots.quadruped import quadruped
 from ee_dist.trials.hardware import HardwareError, Limiter, Limits, Reading
 
 ROBOT = Path(__file__).parents[2] / "docs" / "examples" / "socket_robot.py"
-FAST = ("evaluator=serial", "engine=mujoco", "budget.compensating_trials=1", "budget.polish=1")
+FAST = (
+    "evaluator=serial", "engine=mujoco", "budget.compensating_trials=1", "budget.polish=0", "budget.population=4",
+    "budget.diagnosis_population=4", "budget.crossovers=1", "budget.generations=1", "budget.diagnosis_generations=1",
+)  # fmt: skip
 
 
 @contextlib.contextmanager
@@ -36,7 +39,7 @@ def plugged_in(*arguments: str) -> Iterator[str]:
 
 
 def test_recovery_on_it_with_the_plug_pulled_and_a_resume_ends_as_the_simulated_one_does(cli, tiny, tmp_path):
-    base = ("+scenario=8", *FAST, *tiny)
+    base = ("+scenario=8", *tiny, *FAST)
     simulated = cli(*base, f"hydra.run.dir={tmp_path}/simulated")
     assert simulated.status == 0, simulated.err
     out = tmp_path / "own"

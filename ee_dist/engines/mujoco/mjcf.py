@@ -88,6 +88,10 @@ def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> Non
                 raise XmlError(f"{file}: <{element.tag}> stands for more than {MOST_COPIES} elements")
         name = element.get("file")
         if element.tag in ("include", "model") and name:
+            if not (folder / name).resolve().is_relative_to(folder.resolve()):
+                raise XmlError(
+                    f"{file}: <{element.tag} file={quoted(name)}> lies outside of its folder; put it beside the file"
+                )
             _scan(folder / name, folder, (*above, here), many)
         waiting += [(child, many) for child in element]
 

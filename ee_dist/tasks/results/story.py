@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-import yaml
+from ee_dist.robots.untrusted import UntrustedError, yaml_of
 
 REPORT = "report.html"
 MOST = 100
@@ -37,10 +37,9 @@ def links(out: Path, files: Sequence[Path], model: str | Path | None) -> list[Li
 def _asked(folder: Path) -> tuple[str, list[Path]]:
     """The task of a run and the measurements it was given; nothing where its settings say nothing."""
     try:
-        asked = yaml.safe_load((folder / "config" / "config.yaml").read_text(encoding="utf-8"))
-        hydra = yaml.safe_load((folder / "config" / "hydra.yaml").read_text(encoding="utf-8"))
+        asked, hydra = (yaml_of(folder / "config" / f"{name}.yaml") for name in ("config", "hydra"))
         where, measured = Path(hydra["hydra"]["runtime"]["cwd"]), asked["measured"] or []
         several = [measured] if isinstance(measured, str) else measured
         return str(asked["task"]["name"]), [(where / str(m)).resolve() for m in several]
-    except (OSError, yaml.YAMLError, KeyError, TypeError):
+    except (OSError, UntrustedError, KeyError, TypeError):
         return "", []

@@ -1,0 +1,263 @@
+"""The charts of the page as plain data for plotly: what is drawn, and in which colours.
+
+Colours are those of Okabe and Ito, which the colour-blind can tell; what matters is told apart by shape or width too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ee_dist.discrepancy.words import plain
+from ee_dist.trials.log import Array
+from ee_dist.viewing.curves import Overlay
+from ee_dist.viewing.report_figures import wrapped
+from ee_dist.workbench.bench import Step
+from ee_dist.workbench.sight import Cloud
+
+Chart = dict[str, Any]
+MEASURED, PREDICTED, RESIDUAL, MARK, FLOOR, MARKED = "#0072b2", "#e69f00", "#c04a00", "#009e73", "#8a5fbf", "#000000"
+DOTS = 1500
+"""Points of a cloud that are drawn."""
+NUMBERED = 150
+"""Cells of a map up to which each has its number in it."""
+_FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
+_CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["toImage", "lasso2d", "autoScale2d"]}
+
+
+def _chart(data: list[Chart], height: int, **layout: Any) -> Chart:
+    return {
+        "data": data,
+        "layout": {
+            "font": _FONT,
+            "height": height,
+            "margin": {"l": 56, "r": 14, "t": 28, "b": 40},
+            "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
+            "paper_bgcolor": "rgba(0,0,0,0)",
+            "plot_bgcolor": "#ffffff",
+            "hovermode": "closest",
+            **layout,
+        },
+        "config": _CONFIG,
+    }
+
+
+def _short(values: Array) -> list[float | None]:
+    """As many digits as can be seen; gaps where there is no number."""
+    return [float(f"{v:.5g}") if np.isfinite(v) else None for v in values]
+
+
+def overlay(
+    curve: Overlay, key: str, brushed_s: Array | None = None, mark: tuple[str, Array] | None = None, height: int = 400
+) -> Chart:
+    """Measured over predicted, and below it what is left. ``key``: as long as it stays, so does the zoom; ``brushed_s`` (k,):
+    times to point out; ``mark``: a name, and what that would make of the residual."""
+    times = _short(curve.times_s)
+    left = curve.measured - curve.predicted
+    data: list[Chart] = [
+        _line(times, curve.measured, "measured", MEASURED, 4.0, opacity=0.55),
+        _line(times, curve.predicted, "predicted", PREDICTED, 2.0),
+        _line(times, left, "measured - predicted", RESIDUAL, 1.5, yaxis="y2"),
+    ]
+    if curve.improved is not None:
+        data.insert(2, _line(times, curve.improved, "with it", MARK, 2.0, dash="dash"))
+    if mark is not None:
+        data.append(_line(times, mark[1], mark[0], MARK, 3.0, yaxis="y2", dash="dash"))
+    if brushed_s is not None and len(brushed_s):
+        near = np.searchsorted(curve.times_s, brushed_s).clip(0, len(times) - 1)
+        near = np.unique(near)
+        data.append({"type": "scatter", "mode": "markers", "x": [times[k] for k in near], "y": _short(left[near]),
+                     "name": "chosen", "yaxis": "y2",
+                     "marker": {"color": MARKED, "size": 5, "symbol": "circle-open"}})  # fmt: skip
+    unit = "" if curve.unit == "1" else f" ({curve.unit})"
+    return _chart(
+        data,
+        height,
+        uirevision=key,
+        hovermode="x unified",
+        dragmode="zoom",
+        xaxis={"title": {"text": "s", "standoff": 4}, "anchor": "y2", "gridcolor": "#e8edf2"},
+        yaxis={
+            "domain": [0.38, 1.0],
+            "title": {"text": f"{curve.channel}{unit}"},
+            "gridcolor": "#e8edf2",
+            "fixedrange": True,
+        },
+        yaxis2={
+            "domain": [0.0, 0.3],
+            "title": {"text": "residual"},
+            "gridcolor": "#e8edf2",
+            "zerolinecolor": "#8899aa",
+            "fixedrange": True,
+        },
+    )
+
+
+def _line(x: list[float | None], y: Array, name: str, colour: str, width: float, **more: Any) -> Chart:
+    line = {"color": colour, "width": width}
+    if "dash" in more:
+        line["dash"] = more.pop("dash")
+    return {"type": "scatter", "mode": "lines", "x": x, "y": _short(y), "name": name, "line": line, **more}
+
+
+def cloud(part: Cloud, channel_unit: str, span_s: tuple[float, float] | None = None) -> Chart:
+    """Residuals of a channel against one thing; those of a stretch of time are pointed out, and a box chooses some."""
+    thin = slice(None, None, max(1, len(part.x) // DOTS))
+    x, y, t = part.x[thin], part.residual[thin], part.times_s[thin]
+    inside = np.ones(len(t), dtype=bool) if span_s is None else (t >= span_s[0]) & (t <= span_s[1])
+    data = []
+    for mask, colour, size, name in ((~inside, "#b8c2cc", 4, "elsewhere"), (inside, RESIDUAL, 5, "in sight")):
+        data.append({"type": "scattergl" if len(x) > 4000 else "scatter", "mode": "markers", "x": _short(x[mask]),
+                     "y": _short(y[mask]), "customdata": _short(t[mask]), "name": name,
+                     "marker": {"color": colour, "size": size, "opacity": 0.5}, "hoverinfo": "x+y"})  # fmt: skip
+    return _chart(
+        data,
+        210,
+        showlegend=False,
+        dragmode="select",
+        margin={"l": 52, "r": 8, "t": 8, "b": 38},
+        xaxis={"title": {"text": f"{part.against} ({part.unit})", "standoff": 4}, "gridcolor": "#e8edf2",
+               "zerolinecolor": "#8899aa"},
+        yaxis={"title": {"text": f"residual ({channel_unit})"}, "gridcolor": "#e8edf2", "zerolinecolor": "#8899aa"},
+    )  # fmt: skip
+
+
+def heat(table: Array, channels: Sequence[str], trials: Sequence[str], chosen: tuple[int, int] | None) -> Chart:
+    """(trials, channels) errors, to click on; channels without a value are left out by the caller's names being empty."""
+    shown = [k for k in range(table.shape[1]) if table[:, k].any()]
+    z = table[:, shown].T
+    top = max(3.0, float(np.nanquantile(z, 0.98))) if z.size else 3.0
+    names = [plain(channels[k]) for k in shown]
+    labels = [wrapped(t, 14) for t in trials]
+    trace: Chart = {
+        "type": "heatmap", "z": [_short(row) for row in z], "x": list(range(len(trials))), "y": list(range(len(shown))),
+        "customdata": [[[t, k] for t in range(len(trials))] for k in shown], "zmin": 0.0, "zmax": top, "colorscale": "Cividis",
+        "text": [[f"{names[r]}<br>{trials[t]}<br>{z[r, t]:.2f}" for t in range(len(trials))] for r in range(len(shown))],
+        "hoverinfo": "text", "xgap": 2, "ygap": 2, "colorbar": {"thickness": 10, "title": {"text": "error", "side": "right"}},
+    }  # fmt: skip
+    if z.size <= NUMBERED:
+        trace |= {"texttemplate": "%{z:.1f}", "textfont": {"size": 11}}
+    shapes = []
+    if chosen is not None and chosen[1] in shown:
+        row = shown.index(chosen[1])
+        shapes.append({"type": "rect", "x0": chosen[0] - 0.5, "x1": chosen[0] + 0.5, "y0": row - 0.5, "y1": row + 0.5,
+                       "line": {"color": "#d55e00", "width": 3}})  # fmt: skip
+    return _chart(
+        [trace],
+        90 + 24 * len(shown),
+        shapes=shapes,
+        dragmode=False,
+        margin={"l": 10, "r": 10, "t": 8, "b": 30},
+        xaxis={"tickvals": list(range(len(trials))), "ticktext": labels, "fixedrange": True, "automargin": True,
+               "showgrid": False},
+        yaxis={"tickvals": list(range(len(shown))), "ticktext": names, "autorange": "reversed", "fixedrange": True,
+               "automargin": True, "showgrid": False},
+    )  # fmt: skip
+
+
+def bars(names: Sequence[str], values: Sequence[float], floor: float) -> Chart:
+    """Errors by regime, largest first, and where noise alone would end them."""
+    order = sorted(range(len(names)), key=lambda k: -values[k])
+    trace = {"type": "bar", "orientation": "h", "x": _short(np.array([values[k] for k in order])),
+             "y": [names[k] for k in order], "marker": {"color": RESIDUAL}, "hoverinfo": "x+y"}  # fmt: skip
+    return _chart(
+        [trace],
+        70 + 22 * len(names),
+        margin={"l": 10, "r": 14, "t": 24, "b": 36},
+        dragmode=False,
+        shapes=[_floor_line(floor, "x")],
+        annotations=[{"x": floor, "y": 1, "yref": "paper", "yanchor": "bottom", "showarrow": False, "text": "noise floor",
+                      "font": {"color": FLOOR, "size": 11}}],
+        xaxis={"title": {"text": "error"}, "rangemode": "tozero", "fixedrange": True},
+        yaxis={"autorange": "reversed", "automargin": True, "ticksuffix": "  ", "fixedrange": True},
+    )  # fmt: skip
+
+
+def _floor_line(floor: float, axis: str) -> Chart:
+    other = "y" if axis == "x" else "x"
+    return {"type": "line", f"{axis}0": floor, f"{axis}1": floor, f"{other}0": 0, f"{other}1": 1, f"{other}ref": "paper",
+            "line": {"color": FLOOR, "width": 2, "dash": "dot"}}  # fmt: skip
+
+
+def ladder(steps: Sequence[Step], floor: float) -> Chart:
+    """Fitted and held-out error of each step apart; what was refused is crossed out."""
+    places = list(range(len(steps)))
+    held = [k for k in places if steps[k].error_heldout is not None and not steps[k].refused]
+    hand = [k for k in places if steps[k].error_heldout is None]
+    refused = [k for k in places if steps[k].refused]
+    fitted = [k for k in places if k not in hand]
+
+    def at(rows: Sequence[int], values: Sequence[float | None], name: str, **more: Any) -> Chart:
+        return {"type": "scatter", "x": list(rows), "y": _short(np.array(values, dtype=float)), "name": name, **more}
+
+    numbers = [f"{steps[k].error_heldout:.3g}" for k in held]
+    data = [
+        at(fitted, [steps[k].error_fit for k in fitted], "where it was fitted", mode="lines+markers",
+           line={"color": PREDICTED, "dash": "dot", "width": 2}, marker={"symbol": "circle-open", "size": 9}),
+        at(held, [steps[k].error_heldout for k in held], "held out", mode="lines+markers+text", text=numbers,
+           textposition="top center", line={"color": MEASURED, "width": 3}, marker={"symbol": "square", "size": 10}),
+        at(hand, [steps[k].error_fit for k in hand], "set by hand, all data seen", mode="markers",
+           marker={"symbol": "diamond-open", "size": 11, "color": "#5a6672", "line": {"width": 2}}),
+        at(refused, [steps[k].error_heldout for k in refused], "refused", mode="markers",
+           marker={"symbol": "x", "size": 13, "color": RESIDUAL}),
+    ]  # fmt: skip
+    tops = [v for s in steps for v in (s.error_fit, s.error_heldout) if v is not None and np.isfinite(v)]
+    top = 1.2 * max([floor, *tops])
+    labels = [wrapped(s.name, 16) + ("<br><b>refused</b>" if s.refused else "") for s in steps]
+    return _chart(
+        [d for d in data if d["x"]],
+        360,
+        dragmode=False,
+        shapes=[_floor_line(floor, "y")],
+        annotations=[{"x": 1, "xref": "paper", "xanchor": "right", "y": floor, "yanchor": "top", "showarrow": False,
+                      "text": f"noise floor {floor:.3g}", "font": {"color": FLOOR}}],
+        xaxis={"tickvals": places, "ticktext": labels, "range": [-0.5, len(steps) - 0.5], "automargin": True, "fixedrange": True},
+        yaxis={"title": {"text": "error"}, "range": [0, top], "gridcolor": "#e8edf2", "fixedrange": True},
+    )  # fmt: skip
+
+
+def ranking(
+    names: Sequence[str], gains: Sequence[float], intervals: Sequence[tuple[float, float]], kinds: Sequence[str]
+) -> Chart:
+    """Gain above the noise on held-out data with its interval, in percent; hatched: refused."""
+    fill = {"best": "#0072b2", "tied": "#56b4e9", "earned": "#8fa3b5", "not": "#ffffff"}
+    low = [max(0.0, 100 * (g - i[0])) for g, i in zip(gains, intervals, strict=True)]
+    high = [max(0.0, 100 * (i[1] - g)) for g, i in zip(gains, intervals, strict=True)]
+    trace = {
+        "type": "bar", "orientation": "h", "x": _short(100 * np.array(gains)), "y": [wrapped(n) for n in names],
+        "marker": {"color": [fill[k] for k in kinds], "line": {"color": "#56636f", "width": 1},
+                   "pattern": {"shape": ["/" if k == "not" else "" for k in kinds], "fgcolor": "#56636f", "size": 6}},
+        "error_x": {"type": "data", "array": _short(np.array(high)), "arrayminus": _short(np.array(low)), "symmetric": False,
+                    "color": "#1d2733", "thickness": 1.2, "width": 4}, "hovertemplate": "%{y}: %{x:.1f} %<extra></extra>",
+    }  # fmt: skip
+    least = min([100 * i[0] for i in intervals if np.isfinite(i[0])] + [0.0])
+    return _chart(
+        [trace],
+        90 + 36 * len(names),
+        showlegend=False,
+        dragmode=False,
+        margin={"l": 10, "r": 20, "t": 8, "b": 42},
+        xaxis={"title": {"text": "gain above the noise, held out (%)"}, "range": [max(least - 3, -25), 106], "fixedrange": True},
+        yaxis={"autorange": "reversed", "automargin": True, "ticksuffix": "  ", "fixedrange": True},
+    )  # fmt: skip
+
+
+def course(
+    curves: Sequence[tuple[str, Sequence[float], str]],
+    unit: str,
+    height: int = 260,
+    places: Sequence[str] | None = None,
+) -> Chart:
+    """Some numbers one after the other: (name, values, colour)."""
+    data = [
+        {"type": "scatter", "mode": "lines+markers", "x": list(range(len(values))), "y": _short(np.array(values, dtype=float)),
+         "name": name, "line": {"color": colour, "width": 2}, "marker": {"symbol": symbol, "size": 8 if places else 4}}
+        for (name, values, colour), symbol in zip(curves, ("circle", "square", "diamond", "x"), strict=False)
+    ]  # fmt: skip
+    axis: Chart = {"fixedrange": True, "automargin": True}
+    if places is not None:
+        axis |= {"tickvals": list(range(len(places))), "ticktext": [wrapped(p, 12) for p in places]}
+    return _chart(data, height, dragmode=False, xaxis=axis,
+                  yaxis={"title": {"text": unit}, "gridcolor": "#e8edf2", "rangemode": "tozero", "fixedrange": True})  # fmt: skip

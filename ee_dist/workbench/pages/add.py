@@ -1,0 +1,197 @@
+"""Add: effects on the model, a slider for each value, and the curves that follow the hand."""
+
+from __future__ import annotations
+
+import asyncio
+from html import escape
+from typing import Any
+
+from nicegui import ui
+
+from ee_dist.discrepancy.words import placed, plain, without_unit
+from ee_dist.effects.catalogue import CATALOGUE
+from ee_dist.workbench import verbs
+from ee_dist.workbench.bench import Entry
+from ee_dist.workbench.pages.curves import Curves
+from ee_dist.workbench.pages.view import Latest, View, heading, of, quiet
+
+STEPS = 400
+"""Positions of a slider."""
+Move = tuple[int, str, float]
+
+
+class AddView(View):
+    name, icon = "Add", "tune"
+    topics = frozenset({"model", "seen", "place", "look", "opened", "explained"})
+
+    def build(self) -> None:
+        self._built: tuple[Any, ...] = ()
+        self._sliders: dict[tuple[int, str], tuple[Any, Any]] = {}
+        self.moves = Latest[Move](self._move)
+        with ui.element("div").classes("two"):
+            with ui.element("section").classes("card pinned"):
+                heading("Measured and predicted")
+                self.where = quiet()
+                self.curves = Curves(self.page, 360)
+            with ui.element("section").classes("card"):
+                heading("Effects in the model")
+                with ui.row().classes("w-full items-center no-wrap"):
+                    self.choice = (
+                        ui.select({}, with_input=True, clearable=True, label="Add an effect: type to search")
+                        .classes("w-full").props("dense outlined use-input").mark("choice")
+                    )  # fmt: skip
+                    ui.button("Add", on_click=self._add).props("no-caps").mark("add")
+                self.physics = quiet()
+                self.choice.on_value_change(self._chosen)
+                with ui.row().classes("gap-2"):
+                    ui.button("Fit the values", icon="straighten", on_click=lambda: self.page.begin(verbs.FIT)).props(
+                        "outline no-caps dense"
+                    ).mark("fit")
+                    ui.button(
+                        "Let it go on by itself", icon="auto_awesome", on_click=lambda: self.page.begin(verbs.AUTO)
+                    ).props("outline no-caps dense").mark("auto")
+                    ui.button("Undo", icon="undo", on_click=self.page.undo).props("flat no-caps dense")
+                self.entries = ui.column().classes("w-full gap-0").mark("entries")
+
+    async def draw(self, topics: set[str]) -> None:
+        session, place = self.session, self.page.place
+        sight, seen = session.sight, session.seen
+        if sight is None or seen is None or place is None:
+            return
+        if not self.choice.options or topics & {"opened", "explained"}:
+            self.choice.set_options(self._options())
+        self._draw_entries()
+        self.where.set_text(
+            f"{plain(sight.problem.channels[place[1]])}, {sight.problem.trials[place[0]]}; choose another in Compare."
+        )
+        self.curves.draw(await of(session.do(sight.series, session.bench.terms, place)))
+
+    def _options(self) -> dict[str, str]:
+        """What explain found first, then the whole catalogue at every place."""
+        measured, found = self.session.measured, self.session.explained
+        if measured is None:
+            return {}
+        robot = measured.robot
+        names: dict[str, str] = {}
+        for c in () if found is None else found.candidates:
+            for t in c.terms:
+                names.setdefault(t.name, f"{placed(t.name)} (of the ranking)")
+        for effect in CATALOGUE.values():
+            for target in (*effect.targets(robot), *effect.shared(robot)):
+                name = f"{effect.name}@{target}" if target else effect.name
+                names.setdefault(name, placed(name))
+        return names
+
+    def _chosen(self) -> None:
+        name = self.choice.value
+        entry = CATALOGUE.get(str(name).partition("@")[0]) if name else None
+        self.physics.set_text("" if entry is None else f"{entry.physics} Mark in a residual: {entry.signature}")
+
+    async def _add(self) -> None:
+        if self.choice.value:
+            name = str(self.choice.value)
+            self.choice.set_value(None)
+            await self.page.act(self.session.add, name)
+
+    # -- entries and their sliders -------------------------------------------------------------------------------------
+
+    def _draw_entries(self) -> None:
+        entries = self.session.bench.entries
+        shape = tuple((e.name, e.on, e.origin, e.intervals, e.flags) for e in entries)
+        if shape != self._built:
+            self._built, self._sliders = shape, {}
+            self.entries.clear()
+            with self.entries:
+                if not entries:
+                    quiet("None yet: the robot as it is described.")
+                for k, entry in enumerate(entries):
+                    self._entry(k, entry)
+        for k, entry in enumerate(entries):
+            for name, value in entry.term.values:
+                slider, number = self._sliders.get((k, name), (None, None))
+                if slider is not None:
+                    slider.set_value(value)
+                    number.set_value(float(f"{value:.5g}"))
+
+    def _entry(self, k: int, entry: Entry) -> None:
+        with ui.element("div").classes("entry" + ("" if entry.on else " off")):
+            with ui.row().classes("w-full items-center no-wrap"):
+                ui.switch(
+                    value=entry.on, on_change=lambda e: self.page.act(self.session.switch, k, bool(e.value))
+                ).props(f'dense aria-label="{escape(placed(entry.name))} on or off"').mark(f"switch-{k}")
+                ui.label(placed(entry.name)).style("font-weight:600; flex:1 1 auto")
+                quiet(entry.origin)
+                ui.button(icon="straighten", on_click=lambda: self.page.begin(verbs.ADD, entry.name)).props(
+                    'flat dense aria-label="judge and fit"'
+                ).tooltip("Judge it on held-out data, and fit it").mark(f"judge-{k}")
+                ui.button(icon="delete", on_click=lambda: self.page.act(self.session.remove, k)).props(
+                    'flat dense aria-label="remove"'
+                ).mark(f"remove-{k}")
+            robot = self.session.measured.robot if self.session.measured else None
+            for p, (low, high) in zip(entry.candidate.effect.parameters, entry.candidate.bounds, strict=True):
+                unit = p.unit if robot is None else entry.candidate.effect.unit(p.name, robot, entry.term.target)
+                self._slider(k, entry, p.name, unit, low, high)
+            for flag in entry.flags:
+                quiet(flag)
+
+    def _slider(self, k: int, entry: Entry, name: str, unit: str, low: float, high: float) -> None:
+        value = dict(entry.term.values)[name]
+        shown = "" if unit in ("1", "channel") else f" ({unit})"
+        with ui.row().classes("w-full items-center no-wrap gap-2"):
+            with ui.column().classes("gap-0").style("flex: 1 1 auto; min-width: 0"):
+                quiet(f"{plain(without_unit(name, unit))}{shown}, {low:.3g} to {high:.3g}")
+                slider = ui.slider(min=low, max=high, step=(high - low) / STEPS, value=value).props(
+                    f'aria-label="{escape(plain(name))}"'
+                )
+                slider.mark(f"slider-{k}-{name}")
+                slider.on("update:model-value", lambda e: self.moves.ask((k, name, float(e.args))), throttle=0.02)
+                slider.on("change", self._release)
+                for label, a, b in entry.intervals:
+                    if label == name and high > low:
+                        left, right = (min(max((v - low) / (high - low), 0.0), 1.0) for v in (a, b))
+                        part = f"left:{100 * left:.1f}%; width:{100 * (right - left):.1f}%"
+                        ui.html(f'<div class="band"><i style="{part}"></i></div>', sanitize=False).classes("w-full")
+                        quiet(f"95 %: {a:.4g} to {b:.4g}")
+            number = (
+                ui.number(value=float(f"{value:.5g}"), min=low, max=high, format="%.5g")
+                .style("width:104px")
+                .props("dense outlined")
+            )
+            number.mark(f"number-{k}-{name}")
+            number.on("keydown.enter", lambda: self._typed(k, name, number.value))
+            number.on("blur", lambda: self._typed(k, name, number.value))
+        self._sliders[(k, name)] = (slider, number)
+
+    async def _move(self, move: Move) -> None:
+        """While the hand is on the slider: the curve first, the error over all trials when there is a moment for it."""
+        k, name, value = move
+        session, place = self.session, self.page.place
+        if place is None or k >= len(session.bench.entries):
+            return
+        glance = await of(session.attempt(session.slide, k, {name: value}, place))
+        if glance is None:
+            return
+        self.curves.draw(glance.series)
+        number = self._sliders.get((k, name), (None, None))[1]
+        if number is not None:
+            number.set_value(float(f"{value:.5g}"))
+        if session.sight is not None and len(session.sight.problem.trials) == 1:
+            self.page.show_error(glance.trial_error)
+        elif not self.moves.newer:
+            error = await of(session.attempt(session.glance_whole))
+            if error is not None:
+                self.page.show_error(error)
+
+    async def _release(self) -> None:
+        # The last move may still be on its way.
+        await asyncio.sleep(0.05)
+        while self.moves.newer:
+            await asyncio.sleep(0.02)
+        await self.page.act(self.session.release)
+
+    async def _typed(self, k: int, name: str, value: float | None) -> None:
+        entries = self.session.bench.entries
+        if value is None or k >= len(entries) or f"{dict(entries[k].term.values)[name]:.5g}" == f"{value:.5g}":
+            return
+        await self.moves.ask((k, name, float(value)))
+        await self._release()

@@ -1,0 +1,104 @@
+"""Compare: how far the model is off, and where: channel by trial, over time, against what the joint did, by regime."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+
+from ee_dist.discrepancy.words import compare_account
+from ee_dist.workbench import charts
+from ee_dist.workbench.pages.curves import Curves
+from ee_dist.workbench.pages.robot import RobotPanel
+from ee_dist.workbench.pages.view import View, heading, of, quiet
+from ee_dist.workbench.sight import Cloud, by_trial
+
+
+class CompareView(View):
+    name, icon = "Compare", "compare_arrows"
+    topics = frozenset({"seen", "place", "look", "kept"})
+
+    def build(self) -> None:
+        with ui.element("section").classes("card"):
+            self.headline = ui.label("").style("font-weight:600").mark("headline")
+            self.lines = ui.column().classes("gap-0")
+        with ui.element("div").classes("two"):
+            with ui.element("section").classes("card"):
+                heading("Measured and predicted")
+                quiet("Drag sideways to zoom: every row is drawn then. Double click shows all.")
+                self.curves = Curves(self.page)
+            with ui.element("section").classes("card"):
+                heading("Where it fails: channel by trial")
+                quiet("Click on a cell to look at it. Arrow keys move on from there.")
+                self.map = ui.plotly(charts.heat(np.zeros((1, 1)), ["-"], ["-"], None)).classes("w-full").mark("map")
+                self.map.on("plotly_click", self._clicked)
+                heading("By regime")
+                self.regimes = ui.plotly(charts.bars([], [], 1.0)).classes("w-full")
+        with ui.element("section").classes("card"):
+            heading("Residual against what the joint did")
+            self.cloud_note = quiet()
+            self.clouds = ui.element("div").classes("clouds")
+            self._parts: list[Cloud] = []
+            self._plots: list[Any] = []
+        self.robot = RobotPanel(self.page)
+
+    async def draw(self, topics: set[str]) -> None:
+        session, place = self.session, self.page.place
+        sight, seen = session.sight, session.seen
+        if sight is None or seen is None or place is None:
+            return
+        problem = sight.problem
+        if "seen" in topics:
+            account = compare_account(problem, seen.found)
+            self.headline.set_text(account.headline)
+            self.lines.clear()
+            with self.lines:
+                for line in account.lines:
+                    quiet(line)
+            regimes = seen.found.regimes
+            self.regimes.update_figure(
+                charts.bars([r.name for r in regimes], [r.error for r in regimes], seen.found.noise_floor)
+            )
+        if topics & {"seen", "place"}:
+            names = [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)]
+            self.map.update_figure(charts.heat(by_trial(problem, seen), problem.channels, names, place))
+            self._parts = await of(session.do(sight.clouds, seen.residual, place))
+        self.curves.draw(await of(session.do(sight.series, seen.terms, place)))
+        self._draw_clouds(problem.layout.units[place[1]])
+        if topics & {"kept", "seen", "place", "look"}:
+            self.robot.draw(topics)
+
+    def _draw_clouds(self, unit: str) -> None:
+        figures = [charts.cloud(p, unit, self.page.span_s) for p in self._parts]
+        self.cloud_note.set_text(
+            "What is in sight above is coloured; a box around points marks them above."
+            if figures
+            else "This channel belongs to no joint."
+        )
+        if len(figures) != len(self._plots):
+            self.clouds.clear()
+            with self.clouds:
+                self._plots = [ui.plotly(f).classes("w-full") for f in figures]
+            for plot in self._plots:
+                plot.on("plotly_selected", self._brushed)
+                plot.on("plotly_deselect", self._unbrushed)
+        else:
+            for plot, figure in zip(self._plots, figures, strict=True):
+                plot.update_figure(figure)
+
+    def _clicked(self, event: Any) -> None:
+        points = (event.args or {}).get("points") or []
+        if points and points[0].get("customdata") is not None:
+            trial, channel = points[0]["customdata"]
+            self.page.look_at((int(trial), int(channel)))
+
+    def _brushed(self, event: Any) -> None:
+        points = (event.args or {}).get("points") or []
+        times = [p["customdata"] for p in points if p.get("customdata") is not None]
+        self.page.brushed_s = np.array(sorted(times)) if times else None
+        self.page.changed("brush")
+
+    def _unbrushed(self, event: Any) -> None:
+        self.page.brushed_s = None
+        self.page.changed("brush")

@@ -1,0 +1,62 @@
+"""Curves of one channel of one trial: drawn thin, exact where one zooms in, and linked to what else is in sight."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from nicegui import ui
+
+from ee_dist.discrepancy.problem import Series
+from ee_dist.discrepancy.words import plain
+from ee_dist.trials.log import Array
+from ee_dist.viewing.curves import Overlay
+from ee_dist.workbench import charts
+from ee_dist.workbench.thin import stretch
+
+if TYPE_CHECKING:
+    from ee_dist.workbench.pages.page import Page
+
+
+class Curves:
+    """A chart of the place that the page looks at."""
+
+    def __init__(self, page: Page, height: int = 400) -> None:
+        self.page, self.height = page, height
+        self.plot = ui.plotly(charts.overlay(_empty(), "", height=height)).classes("w-full")
+        self.plot.on("plotly_relayout", self._zoomed)
+        self.drawn = 0
+
+    def draw(self, series: Series | None, mark: tuple[str, Array] | None = None, better: Array | None = None) -> None:
+        """``mark`` (T,) over the residual, ``better`` (T,) over the prediction."""
+        sight = self.page.session.sight
+        if series is None or sight is None:
+            return
+        problem = sight.problem
+        name = f"{plain(problem.channels[series.channel])}, {problem.trials[series.trial]}"
+        curve = Overlay(
+            name, problem.trials[series.trial], series.unit, series.times_s, series.measured, series.predicted, better
+        )
+        span = self.page.span_s
+        part = stretch(curve, *(span or (None, None)))
+        shown = None
+        if mark is not None:
+            shown = (mark[0], np.interp(part.curve.times_s, series.times_s, mark[1]))
+        key = f"{series.trial}:{series.channel}:{span is None}"
+        self.plot.update_figure(charts.overlay(part.curve, key, self.page.brushed_s, shown, self.height))
+        self.drawn += 1
+
+    def _zoomed(self, event: Any) -> None:
+        moved = event.args if isinstance(event.args, dict) else {}
+        if "xaxis.range[0]" in moved and "xaxis.range[1]" in moved:
+            self.page.span_s = (float(moved["xaxis.range[0]"]), float(moved["xaxis.range[1]"]))
+        elif moved.get("xaxis.autorange"):
+            self.page.span_s = None
+        else:
+            return
+        self.page.changed("span")
+
+
+def _empty() -> Overlay:
+    nothing = np.zeros(0)
+    return Overlay("", "", "1", nothing, nothing, nothing)

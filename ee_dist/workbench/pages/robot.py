@@ -1,0 +1,65 @@
+"""The robot and what the model says of it in 3-D, in rerun's viewer, at the instant that the curves show."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from nicegui import ui
+
+from ee_dist.workbench import verbs
+from ee_dist.workbench.pages.view import heading, quiet
+
+if TYPE_CHECKING:
+    from ee_dist.workbench.pages.page import Page
+
+SHOWN = """
+(() => { const frame = document.getElementById(%(id)s); if (!frame) return;
+  const probe = document.createElement('canvas');
+  if (!(navigator.gpu || probe.getContext('webgl2'))) {
+    frame.replaceWith(Object.assign(document.createElement('p'), {textContent:
+      'This browser draws no 3-D (no WebGL): open the recording below in rerun instead.'})); return; }
+  frame.src = %(address)s; })()
+"""
+
+
+def shown(element: str, recording: str) -> str:
+    """The script that opens a recording of the session's folder in a frame, once the page has it."""
+    viewer = "/viewer/index.html?hide_welcome_screen&persist=0&notebook=0&url="
+    address = f"{json.dumps(viewer)} + encodeURIComponent(location.origin + {json.dumps('/files/' + recording)})"
+    return SHOWN % {"id": json.dumps(element), "address": address}
+
+
+class RobotPanel:
+    """Asked for by a button: the viewer is 43 MB to load."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self._shown = ""
+        with ui.element("section").classes("card"):
+            heading("The robot, and the model's ghost")
+            self.note = quiet(
+                "Measured robot and predicted ghost side by side, in rerun, from task=compare of this model."
+            )
+            ui.button("Show in 3-D", icon="view_in_ar", on_click=self._ask).props("outline no-caps").mark("robot")
+            self.place = ui.element("div").classes("w-full")
+
+    async def _ask(self) -> None:
+        await self.page.act(self.page.session.keep)
+
+    def draw(self, topics: set[str]) -> None:
+        kept = self.page.session.kept
+        if kept is None or str(kept.folder) == self._shown:
+            return
+        recording = kept.folder / f"{verbs.COMPARE}.rrd"
+        if not recording.is_file():
+            self.note.set_text("Nothing is simulated in this way of comparing, so there is no robot to show.")
+            return
+        self._shown = str(kept.folder)
+        path = quote(recording.relative_to(self.page.session.folder).as_posix())
+        self.place.clear()
+        with self.place:
+            frame = ui.element("iframe").props('title="robot in 3-D"').style("width:100%; height:520px; border:0")
+            ui.link("the recording", f"/files/{path}").classes("quiet")
+        ui.run_javascript(shown(frame.html_id, path))

@@ -1,0 +1,42 @@
+"""Watch: the error falls, fitted and held out apart; what helps only where it was fitted is refused, in sight."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from ee_dist.workbench import charts
+from ee_dist.workbench.pages.view import View, heading, quiet
+
+
+class WatchView(View):
+    name, icon = "Watch", "trending_down"
+    topics = frozenset({"model", "seen", "progress"})
+
+    def build(self) -> None:
+        with ui.element("section").classes("card"):
+            heading("The ladder of errors")
+            quiet(
+                "Squares: on data that the values were not fitted to. Circles: where they were fitted. A hand that watches "
+                "the error has seen all the data, so what it sets (diamonds) has no held-out error: judge and fit it to get one."
+            )
+            self.plot = ui.plotly(charts.ladder((), 1.0)).classes("w-full")
+            self.steps = ui.column().classes("w-full gap-0").mark("ladder")
+
+    async def draw(self, topics: set[str]) -> None:
+        session = self.session
+        if session.sight is None or session.seen is None:
+            return
+        ladder, told = session.bench.ladder, session.sight.problem.told
+        self.plot.update_figure(charts.ladder(ladder, session.seen.found.noise_floor))
+        self.steps.clear()
+        with self.steps:
+            for s in ladder:
+                with ui.element("div").classes("entry" + (" refused" if s.refused else "")):
+                    held = (
+                        "nothing was held out"
+                        if s.error_heldout is None
+                        else f"held out {told(s.error_heldout)} ({s.held_out})"
+                    )
+                    ui.label(f"{s.name}: fitted {told(s.error_fit)}, {held}")
+                    if s.refused:
+                        ui.label(f"Refused: {s.refused}.").style("font-weight:600")

@@ -1,0 +1,128 @@
+"""What the long verbs found, small enough to travel between processes and to keep: the typed results of the tasks in brief."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.intervals import ParameterReport
+from ee_dist.discrepancy.evidence.judge import Judged
+from ee_dist.discrepancy.explain import Explanation
+from ee_dist.discrepancy.improve import Improvement
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import Account, confidence, placed, told_all
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
+from ee_dist.tasks.results.tables import TIED_STANDING, standing
+from ee_dist.workbench.bench import Step
+
+BEST, TIED, EARNED, REFUSED = "best", "tied", "earned", "not"
+NO_TRACE = "it changes nothing that was measured here"
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One proposal as it was judged. ``fixed`` and ``terms``: the model with it; ``explained`` and ``interval`` are shares of
+    what is above the noise, on held-out data."""
+
+    name: str
+    words: str
+    terms: Hypothesis
+    model: Hypothesis
+    error_heldout: float
+    explained: float
+    interval: tuple[float, float]
+    kind: str
+    why_not: str
+    sure: str
+    physics: str
+    signature: str
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What task=explain found. ``before``: the model that it refers to, its own values fitted anew."""
+
+    headline: str
+    lines: tuple[str, ...]
+    verdict: str
+    candidates: tuple[Ranked, ...]
+    before: Hypothesis
+    tried: int
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Improved:
+    """What task=improve found: the model, the interval of each value, and the steps of the ladder after the first."""
+
+    headline: str
+    lines: tuple[str, ...]
+    terms: Hypothesis
+    parameters: tuple[ParameterReport, ...]
+    steps: tuple[Step, ...]
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What task=compare says of a saved model."""
+
+    error: float
+    noise_floor: float
+    told: str
+    headline: str
+    folder: Path
+
+
+def of_explanation(problem: Problem, found: Explanation, account: Account, folder: Path) -> Explained:
+    best = found.candidates[0] if found.candidates else None
+    ranked = tuple(_ranked(problem, found, c, best) for c in found.candidates if best is not None)
+    return Explained(account.headline, account.lines, found.verdict, ranked, found.before, found.tried, folder)
+
+
+def _ranked(problem: Problem, found: Explanation, c: Judged, best: Judged) -> Ranked:
+    above = c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0
+    how = standing(c, best)
+    kind = REFUSED if not c.earned else {"best": BEST, TIED_STANDING: TIED}.get(how, EARNED)
+    entry = CATALOGUE[c.terms[0].effect]
+    return Ranked(
+        c.name,
+        told_all(c.terms, problem.robot),
+        c.terms,
+        (*found.fixed, *c.hypothesis),
+        c.error_heldout,
+        c.explained,
+        (above * c.interval[0], above * c.interval[1]),
+        kind,
+        c.why_not,
+        confidence(c),
+        entry.physics,
+        entry.signature,
+    )
+
+
+def of_improvement(found: Improvement, account: Account, folder: Path, first: int = 1, refused: str = "") -> Improved:
+    """``first``: the step of the ladder from which steps are new; ``refused``: why the last of them is."""
+    steps = [
+        Step(_name(found, k), r.error_fit, r.error_heldout, r.held_out)
+        for k, r in enumerate(found.ladder)
+        if k >= first
+    ]
+    if refused and steps:
+        last = steps[-1]
+        steps[-1] = Step(last.name, last.error_fit, last.error_heldout, last.held_out, refused)
+    return Improved(account.headline, account.lines, found.terms, tuple(found.parameters), tuple(steps), folder)
+
+
+def _name(found: Improvement, step: int) -> str:
+    rung = found.ladder[step]
+    less = f", without {' and '.join(map(placed, rung.dropped))}" if rung.dropped else ""
+    return placed(rung.name) + less
+
+
+def refusal(candidates: Sequence[Judged]) -> str:
+    """Why the only candidate of an explanation did not earn its place; empty where it did."""
+    return candidates[0].why_not if candidates else NO_TRACE

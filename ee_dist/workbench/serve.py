@@ -1,0 +1,111 @@
+"""The server of the page: one session, one port, nothing served but the page, its viewer and the session's own folder."""
+
+from __future__ import annotations
+
+import logging
+import os
+import secrets
+import socket
+import sys
+import webbrowser
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI, HTTPException, Response
+from fastapi.responses import FileResponse
+from nicegui import app as toolkit
+from nicegui import ui
+from rich.console import Console
+
+from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.errors import defect
+from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
+from ee_dist.workbench.guard import Guard, is_loopback
+from ee_dist.workbench.pages.page import show_session
+from ee_dist.workbench.pages.recovery import show_recovery
+from ee_dist.workbench.session import Session
+
+TITLE = "ee_dist workbench"
+
+
+def bound(host: str, port: int) -> socket.socket:
+    """A listening socket. Raises ConfigError where something listens there already, or the address is none of ours."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    sock = socket.socket(family, socket.SOCK_STREAM)
+    if os.name == "posix":
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        sock.bind((host, port))
+        sock.listen(64)
+    except OSError as error:
+        sock.close()
+        if port:
+            raise ConfigError(
+                f"task.port={port}: {error.strerror or error}; if another workbench is open there, look at "
+                f"http://{host}:{port}, or take a free port with task.port=0"
+            ) from None
+        raise ConfigError(f"task.host={host}: {error.strerror or error}; 127.0.0.1 is this machine") from None
+    return sock
+
+
+def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) -> None:
+    """Answer until ended. What cannot be opened is said before anything is served."""
+    session = Session(config, by, out)
+    if config.log:
+        show_recovery(Path(config.log), out)
+    elif config.measured:
+        session.load(config.measured, config.model)
+    elif config.model:
+        raise ConfigError(
+            "model=: of which log? name it with measured=LOG, or leave the model out and drop a log on the page"
+        )
+    sock = bound(host, port)
+    token = "" if is_loopback(host) else secrets.token_urlsafe(24)
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    _files(app, out)
+    if not config.log:
+        show_session(session)
+    if session.measured is not None:
+        session.attempt(session.begin)
+    # What nobody foresaw goes to a file and, in a line, to the page: the terminal stays readable.
+    toolkit.on_exception(lambda error: session.say(defect(error, out)))
+    for name in ("nicegui", "uvicorn", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    ui.run_with(app, title=TITLE, show_welcome_message=False, reconnect_timeout=20.0)
+    server = uvicorn.Server(
+        uvicorn.Config(Guard(app, token), log_config=None, access_log=False, timeout_graceful_shutdown=1)
+    )
+    address = f"http://{host if ':' not in host else f'[{host}]'}:{sock.getsockname()[1]}/"
+    address += f"?token={token}" if token else ""
+    Console().print(f"The workbench: {address} (Ctrl-C ends it)", highlight=False, soft_wrap=True)
+    sys.stdout.flush()
+    if show and (os.environ.get("DISPLAY") or sys.platform in ("darwin", "win32")):
+        webbrowser.open(address)
+    try:
+        server.run(sockets=[sock])
+    finally:
+        session.close()
+        sock.close()
+
+
+def _files(app: FastAPI, folder: Path) -> None:
+    """What is served besides the page: files of the session's folder, and the viewer."""
+    root = folder.resolve()
+
+    @app.get("/files/{path:path}")
+    def file(path: str) -> FileResponse:
+        found = (root / path).resolve()
+        if not found.is_relative_to(root) or not found.is_file() or any(p.startswith(".") for p in Path(path).parts):
+            raise HTTPException(404)
+        return FileResponse(found)
+
+    @app.get("/viewer/{name:path}")
+    def viewer(name: str) -> Response:
+        try:
+            part = web_viewer().get(name or "index.html")
+        except WebViewerError as error:
+            return Response(str(error), status_code=503, media_type="text/plain")
+        if part is None:
+            raise HTTPException(404)
+        headers = {"cache-control": "public, max-age=3600", "rerun-final-length": str(len(part.content))}
+        return Response(part.content, media_type=part.kind, headers=headers)

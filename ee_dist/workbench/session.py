@@ -1,0 +1,367 @@
+"""One session on the workbench: a log, a model, what was found, and the way back. It outlives the pages that show it.
+
+All that changes it runs on one thread, one thing after the other (``do``); pages read it, which is safe, since what it
+holds is immutable. Long verbs run in another process and come back here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ee_dist.discrepancy.problem import Series
+from ee_dist.discrepancy.search.candidates import parse
+from ee_dist.discrepancy.words import placed
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.tasks import export
+from ee_dist.tasks.config import Config, EvaluatorConfig
+from ee_dist.tasks.errors import USER_ERRORS, defect
+from ee_dist.tasks.measurements import Measurements, load
+from ee_dist.tasks.results.tables import command, setting
+from ee_dist.tasks.ways import AUTO, way_of
+from ee_dist.trials.log import Array
+from ee_dist.workbench import commands, verbs
+from ee_dist.workbench.bench import Bench, Step, bench_of
+from ee_dist.workbench.results import Compared, Explained, Improved
+from ee_dist.workbench.sight import Place, Seen, Sight
+from ee_dist.workbench.verbs import Ended, Request
+from ee_dist.workbench.worker import BusyError, Progress, Worker
+
+T = TypeVar("T")
+STEPS = "steps"
+MODEL_FILE = "model.yaml"
+MOST_UNDONE = 200
+
+
+class NothingOpenError(ValueError):
+    """There is no log on the bench."""
+
+
+@dataclass(frozen=True, eq=False)
+class Glance:
+    """What a hand on a slider sees: one channel of one trial, and errors as the sight of the moment weighs them."""
+
+    terms: Hypothesis
+    series: Series | None
+    residual: Array
+    trial_error: float
+
+
+class Session:
+    """``folder`` is where it writes. ``busy`` is told in ``progress``; ``notice`` is the last thing to tell the user."""
+
+    def __init__(self, config: Config, by: str, folder: Path) -> None:
+        self.config, self.by, self.folder = config, by, folder
+        # Here single simulations are wanted at once: no Ray, and no cache that grows with every move of a slider.
+        self.live = replace(config, evaluator=EvaluatorConfig("serial", cache=False, recent=True))
+        self.measured: Measurements | None = None
+        self.sight: Sight | None = None
+        self.seen: Seen | None = None
+        self.bench = Bench()
+        self.explained: Explained | None = None
+        self.kept: Compared | None = None
+        self.commands: tuple[str, ...] = ()
+        self.notice = ""
+        self.worker = Worker(self._heard, self._ended)
+        self._began: str | None = None
+        self._past: list[Bench] = []
+        self._gripped = False
+        self._files: dict[Hypothesis, Path | str | None] = {}
+        self._listeners: list[Callable[[str], None]] = []
+        self._one = ThreadPoolExecutor(1, "ee_dist bench")
+        self._guard = threading.Lock()
+
+    # -- threads and listeners -----------------------------------------------------------------------------------------
+
+    def do(self, act: Callable[..., T], *arguments: Any) -> Future[T]:
+        """Run it on the session's thread, after what runs there."""
+        return self._one.submit(act, *arguments)
+
+    def attempt(self, act: Callable[..., T], *arguments: Any) -> Future[T | None]:
+        """The same, where what goes wrong is told to the user, in a line, and gives None."""
+        return self.do(self._attempted, act, *arguments)
+
+    def _attempted(self, act: Callable[..., T], *arguments: Any) -> T | None:
+        try:
+            return act(*arguments)
+        except (*USER_ERRORS, BusyError, NothingOpenError) as error:
+            self.say(" ".join(str(error).split()))
+        except OSError as error:
+            self.say(f"{error.filename or 'the folder of this session'}: {error.strerror or error}")
+        except Exception as error:
+            self.say(defect(error, self.folder))
+        return None
+
+    def listen(self, told: Callable[[str], None]) -> Callable[[], None]:
+        """``told`` hears what changed (topics: opened, model, seen, explained, progress, kept, notice), from any thread. What is
+        returned ends it."""
+        with self._guard:
+            self._listeners.append(told)
+
+        def end() -> None:
+            with self._guard:
+                if told in self._listeners:
+                    self._listeners.remove(told)
+
+        return end
+
+    def tell(self, topic: str) -> None:
+        with self._guard:
+            listeners = list(self._listeners)
+        for told in listeners:
+            told(topic)
+
+    def say(self, text: str) -> None:
+        self.notice = text
+        self.tell("notice")
+
+    def close(self) -> None:
+        self.worker.close()
+        self._one.shutdown(wait=False, cancel_futures=True)
+
+    # -- what is open --------------------------------------------------------------------------------------------------
+
+    def load(self, measured: Any, model: str | None) -> Measurements:
+        """Read and check the files, and put the model on the bench. Raises ConfigError, LogError, RecordingError."""
+        config = replace(self.config, measured=measured, model=model)
+        found = load(config)
+        way_of(found, self.by)
+        self.worker.cancel()
+        self.measured, self._began = found, model
+        self.sight, self.seen, self.explained, self.kept = None, None, None, None
+        self.bench, self._past, self._gripped = bench_of(found.robot, found.model), [], False
+        self._files = {found.model: model}
+        self.commands = ()
+        self.tell("opened")
+        return found
+
+    def begin(self) -> None:
+        """Compare the model as it is; what ``load`` began. Raises what the way of comparing raises."""
+        measured = self._open()
+        self.sight = Sight(measured, self.live, way_of(measured, self.by))
+        self.seen = self.sight.seen(self.bench.terms)
+        error = self.seen.found.error
+        self.bench = self.bench.stepped(Step("the model as it was", error, error, "nothing was fitted"))
+        self._note("compare", self.bench.terms)
+        self.worker.warm()
+        self.tell("seen")
+
+    def place(self) -> Place:
+        """Where the error is worst."""
+        return self._sight().worst(self._seen())
+
+    def _open(self) -> Measurements:
+        if self.measured is None:
+            raise NothingOpenError("no log is open: drop one on the page")
+        return self.measured
+
+    def _sight(self) -> Sight:
+        if self.sight is None:
+            raise NothingOpenError("no log is open yet")
+        return self.sight
+
+    def _seen(self) -> Seen:
+        if self.seen is None:
+            raise NothingOpenError("no log is open yet")
+        return self.seen
+
+    # -- the model -----------------------------------------------------------------------------------------------------
+
+    def change(self, to: Bench) -> None:
+        """Another bench, which undo takes back, compared anew."""
+        self._remember()
+        self.bench = to
+        self._gripped = False
+        self.tell("model")
+        self.settle()
+
+    def add(self, name: str, values: Mapping[str, float] | None = None) -> None:
+        """``effect@target`` onto the model, at neutral or with values. Raises EffectError."""
+        self.change(self.bench.added(parse(self._open().robot, name), values))
+
+    def switch(self, index: int, on: bool) -> None:
+        self.change(self.bench.switched(index, on))
+
+    def remove(self, index: int) -> None:
+        self.change(self.bench.without(index))
+
+    def slide(self, index: int, values: Mapping[str, float], place: Place) -> Glance:
+        """A slider is moved, and the hand is still on it: what is to be drawn. The last ``release`` is undone as one step."""
+        if not self._gripped:
+            self._remember()
+            self._gripped = True
+        self.bench = self.bench.valued(index, values)
+        return self.glance(place)
+
+    def glance(self, place: Place) -> Glance:
+        sight, terms = self._sight(), self.bench.terms
+        residual = sight.trial_residual(terms, place[0])
+        return Glance(terms, sight.series(terms, place), residual, sight.trial_error(residual, place[0]))
+
+    def glance_whole(self) -> float:
+        """The error over all trials, as the sight of the moment weighs it."""
+        return self._sight().error(self.bench.terms)
+
+    def release(self) -> None:
+        """The hand is off the slider."""
+        if self._gripped:
+            self._gripped = False
+            self.tell("model")
+            self.settle()
+
+    def undo(self) -> bool:
+        """Back to the bench before the last change; False where there is none."""
+        if not self._past:
+            return False
+        self.bench, self._gripped = self._past.pop(), False
+        self.tell("model")
+        self.settle(step=False)
+        return True
+
+    @property
+    def undoable(self) -> int:
+        return len(self._past)
+
+    def settle(self, step: bool = True) -> None:
+        """Compare the model as it stands now, weighed by itself, as task=compare will; keep it as a file."""
+        terms = self.bench.terms
+        if self.seen is None or self.seen.terms != terms:
+            self.sight = self._sight().weighed(terms)
+            self.seen = self.sight.seen(terms)
+            if step:
+                self.bench = _by_hand(self.bench, self.seen.found.error)
+                self._note("compare", terms)
+        self.tell("seen")
+
+    def _remember(self) -> None:
+        self._past = [*self._past, self.bench][-MOST_UNDONE:]
+
+    def file_of(self, terms: Hypothesis) -> Path | str | None:
+        """The model file of these terms, written once; None for the robot as it is described."""
+        if terms not in self._files:
+            path = self.folder / STEPS / f"{len(self._files):03d}.yaml"
+            commands.written(path, self._open(), terms, self._began, ["A step of a session on the workbench."])
+            self._files[terms] = path
+        return self._files[terms]
+
+    def _asked(self, terms: Hypothesis) -> Config:
+        return commands.asked(self.config, self._open(), self.file_of(terms))
+
+    def _note(self, task: str, terms: Hypothesis, *more: str) -> None:
+        line = commands.line(task, self._asked(terms), self.by if self.by != AUTO else AUTO, *more)
+        if not self.commands or self.commands[-1] != line:
+            self.commands = (*self.commands, line)
+
+    # -- long verbs ----------------------------------------------------------------------------------------------------
+
+    def start(self, verb: str, effect: str = "") -> None:
+        """Begin a long verb on the model as it stands. Raises BusyError, EffectError."""
+        measured = self._open()
+        terms = self.bench.terms
+        if effect:
+            parse(measured.robot, effect)
+        config = self._asked(terms)
+        folder = fresh(self.folder / verb)
+        more = {verbs.ADD: (f"effect={effect}",), verbs.FIT: ("effect=none",), verbs.AUTO: ("effect=auto",)}
+        self.worker.start(Request(verb, config, self.by, folder, effect, bool(terms)))
+        task = "improve" if verb in more else verb
+        if verb == verbs.ADD:
+            self._note("explain", terms, f"task.only=[{effect}]")
+        self._note(task, terms, *more.get(verb, ()))
+
+    def cancel(self) -> None:
+        self.worker.cancel()
+
+    @property
+    def progress(self) -> Progress | None:
+        return self.worker.progress
+
+    def keep(self) -> Path:
+        """The model as a file of its own, which task=compare then looks at. Raises BusyError, OSError."""
+        if self.worker.progress is not None:
+            raise BusyError("a search is under way: keep the model when it is done, or cancel it")
+        measured, terms = self._open(), self.bench.terms
+        path = self.folder / MODEL_FILE
+        notes = [f"{s.name}: error {s.error_fit:.4g}" for s in self.bench.ladder]
+        commands.written(path, measured, terms, self._began, ["Kept on the workbench.", *notes])
+        config = commands.asked(self.config, measured, path)
+        self.worker.start(Request(verbs.COMPARE, config, self.by, fresh(self.folder / verbs.COMPARE)))
+        self.commands = (*self.commands, commands.line("compare", config, self.by))
+        return path
+
+    def export(self, to: str) -> Path:
+        """The model for other simulators, by task=export. Raises what it raises."""
+        config = replace(self._asked(self.bench.terms), to=to)
+        if config.model is None:
+            path = self.folder / MODEL_FILE
+            commands.written(path, self._open(), self.bench.terms, self._began)
+            config = replace(config, model=str(path))
+        folder = fresh(self.folder / f"export_{to}")
+        with contextlib.redirect_stdout(io.StringIO()):
+            export.run(config, export.Options(to=to), folder)
+        self.commands = (*self.commands, command(["task=export", setting("model", str(config.model)), f"to={to}"]))
+        self.tell("kept")
+        return folder
+
+    def _heard(self, progress: Progress) -> None:
+        self.tell("progress")
+
+    def _ended(self, request: Request, ended: Ended) -> None:
+        self.do(self._after, request, ended)
+
+    def _after(self, request: Request, ended: Ended) -> None:
+        """On the session's thread: take in what a long verb found."""
+        result = ended.result
+        if ended.failed:
+            self.say(ended.failed)
+        elif isinstance(result, Explained):
+            self.explained = result
+            self.tell("explained")
+        elif isinstance(result, Compared):
+            self.kept = result
+            self.tell("kept")
+        elif isinstance(result, Improved):
+            self._improved(result, request)
+        self.tell("progress")
+
+    def _improved(self, found: Improved, request: Request) -> None:
+        robot = self._open().robot
+        self._remember()
+        self._gripped = False
+        bench = self.bench.fitted(robot, found.terms, found.parameters).stepped(*found.steps)
+        refused = found.steps[-1].refused if found.steps else ""
+        self.bench = bench
+        if refused:
+            # It helps only where it was fitted: shown on the ladder, and off unless the user says otherwise.
+            for k, entry in enumerate(bench.entries):
+                if entry.name == request.effect:
+                    self.bench = bench.switched(k, False)
+            self.notice = f"Refused: {placed(request.effect)}: {refused}. It is on the bench, switched off."
+            self.tell("notice")
+        self._files.setdefault(found.terms, found.folder / MODEL_FILE)
+        self.tell("model")
+        self.settle(step=False)
+
+
+def _by_hand(bench: Bench, error: float) -> Bench:
+    """The ladder with what a hand did: one rung for the same set of effects, however long their sliders are moved."""
+    on = " and ".join(placed(e.name) for e in bench.entries if e.on) or "nothing"
+    step = Step(f"by hand: {on}", error, None)
+    if bench.ladder and bench.ladder[-1].name == step.name:
+        return replace(bench, ladder=(*bench.ladder[:-1], step))
+    return bench.stepped(step)
+
+
+def fresh(folder: Path) -> Path:
+    """The folder, or with a number behind it the first that does not exist."""
+    number, found = 1, folder
+    while found.exists():
+        number += 1
+        found = folder.with_name(f"{folder.name}_{number}")
+    return found

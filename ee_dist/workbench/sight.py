@@ -1,0 +1,138 @@
+"""What the page draws of a hypothesis: its error, where it sits, and the curves of one trial and channel.
+
+Everything here is what task=compare computes, asked for piece by piece so that a slider need not wait for all of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ee_dist.discrepancy.compare import Comparison, circumstances, compare, rows_of
+from ee_dist.discrepancy.problem import Problem, Series, error
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.tasks.config import Config
+from ee_dist.tasks.measurements import Measurements
+from ee_dist.tasks.ways import Way
+from ee_dist.trials.log import Array
+
+Place = tuple[int, int]
+"""A trial and a channel, by number."""
+AGAINST = ("position", "speed", "command", "load")
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A hypothesis looked at whole, as task=compare does. ``residual`` (n,)."""
+
+    terms: Hypothesis
+    residual: Array
+    found: Comparison
+
+    @property
+    def finite(self) -> bool:
+        return bool(np.isfinite(self.residual).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Residuals (k,) of a channel in its unit against what its joint did (k,), at ``times_s`` (k,)."""
+
+    against: str
+    unit: str
+    times_s: Array
+    x: Array
+    residual: Array
+
+
+class Sight:
+    """Measurements under one way of comparing, weighed by one model. Not for several threads at once."""
+
+    def __init__(self, measured: Measurements, config: Config, way: Way) -> None:
+        self.measured, self.config, self.way = measured, config, way
+        self.problem: Problem = way.make(measured, config)
+        self._single: dict[int, Problem] = {}
+
+    def weighed(self, terms: Hypothesis) -> Sight:
+        """The same by another model: a model's predictability says how much each value counts, so task=compare of a saved
+        model gives the error of the sight that is weighed by it."""
+        return Sight(replace(self.measured, model=terms), self.config, self.way)
+
+    def seen(self, terms: Hypothesis) -> Seen:
+        residual = self.problem.residuals([terms])[0]
+        if not np.isfinite(residual).all():
+            return Seen(terms, residual, _nothing(self.problem))
+        return Seen(terms, residual, compare(self.problem, residual))
+
+    def error(self, terms: Hypothesis) -> float:
+        """The one error number over all trials; infinite where the model cannot be simulated."""
+        return error(self.problem.residuals([terms])[0])
+
+    def trial_residual(self, terms: Hypothesis, trial: int) -> Array:
+        """(n,) where only the values of one trial are not zero."""
+        return np.asarray(self.problem.residuals([terms], [trial])[0])
+
+    def trial_error(self, residual: Array, trial: int) -> float:
+        return error(residual[self.problem.trial_of == trial])
+
+    def series(self, terms: Hypothesis, place: Place) -> Series | None:
+        """Measured and predicted of one channel of one trial, simulating that trial alone."""
+        trial, channel = place
+        found = [s for s in self._of(trial).series(terms) if s.channel == channel]
+        if not found:
+            return None
+        return replace(found[0], trial=trial)
+
+    def clouds(self, residual: Array, place: Place) -> list[Cloud]:
+        """The residual (n,) of a channel in a trial against what its joint did there; none where it belongs to no joint."""
+        trial, channel = place
+        layout, problem = self.problem.layout, self.problem
+        j = layout.joint_of_channel[channel]
+        if j is None:
+            return []
+        mine = np.flatnonzero((problem.trial_of == trial) & (problem.channel_of == channel) & layout.reading)
+        if not len(mine) or not np.isfinite(residual[mine]).all():
+            return []
+        at = rows_of(problem, trial, layout.time_s[mine])
+        around = circumstances(problem, trial)
+        slide = problem.robot.joint(problem.robot.motor_names[j]).kind == "slide"
+        units = dict(zip(AGAINST, ("m", "m/s", "m", "N") if slide else ("rad", "rad/s", "rad", "N.m"), strict=True))
+        raw, out = problem.raw(residual)[mine], []
+        for name in AGAINST:
+            x = getattr(around, name)[at, j]
+            if np.isfinite(x).all() and np.ptp(x) > 0:
+                out.append(Cloud(name, units[name], layout.time_s[mine], x, raw))
+        return out
+
+    def worst(self, seen: Seen) -> Place:
+        """The channel and trial that the largest part of the error sits in, among readings that can be drawn."""
+        problem = self.problem
+        table = by_trial(problem, seen)
+        drawn = {c for c in range(len(problem.channels)) if (problem.layout.reading & (problem.channel_of == c)).any()}
+        table = np.where([c in drawn for c in range(table.shape[1])], table, -1.0)
+        trial, channel = np.unravel_index(int(np.argmax(table)), table.shape)
+        return int(trial), int(channel)
+
+    def _of(self, trial: int) -> Problem:
+        if len(self.problem.measured) == 1:
+            return self.problem
+        if trial not in self._single:
+            alone = replace(self.measured, trials=(self.measured.trials[trial],))
+            self._single[trial] = self.way.make(alone, self.config)
+        return self._single[trial]
+
+
+def by_trial(problem: Problem, seen: Seen) -> Array:
+    """(trials, channels) root mean square of the residual; 0 where there is no value."""
+    width = len(problem.channels)
+    cell = problem.trial_of * width + problem.channel_of
+    count = np.bincount(cell, minlength=len(problem.trials) * width)
+    energy = np.bincount(cell, weights=np.nan_to_num(seen.residual, posinf=0.0) ** 2, minlength=len(count))
+    return np.sqrt(energy / np.maximum(count, 1)).reshape(-1, width)
+
+
+def _nothing(problem: Problem) -> Comparison:
+    """Of a model that cannot be simulated."""
+    floor, source = problem.noise_floor()
+    return Comparison(np.inf, floor, source, problem.error_definition, [], [], {}, np.zeros((0, 0)), [])
