@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.words import compare_account
 from ee_dist.workbench import charts
 from ee_dist.workbench.pages.curves import Curves
@@ -50,7 +51,7 @@ class CompareView(View):
             return
         problem = sight.problem
         if "seen" in topics:
-            account = compare_account(problem, seen.found)
+            account = compare_account(problem, seen.found, leftovers(problem, seen.residual))
             self.headline.set_text(account.headline)
             self.lines.clear()
             with self.lines:
