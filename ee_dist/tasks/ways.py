@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance, motor_torques
+from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.engines.one_joint import fits

@@ -11,165 +11,24 @@ Gautier, Brunot 2019; Gautier, Janot, Vandanjon 2013): regressor and force both 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.ndimage import binary_opening
-from scipy.signal import savgol_filter
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.discrepancy.problem import Layout, Mask, Problem, Series
+from ee_dist.discrepancy.problem import Layout, Problem, Series
+from ee_dist.discrepancy.ways.force_balance.balance import Balance
+from ee_dist.discrepancy.ways.force_balance.motion import Processing, motion_of
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.effects.catalogue import Hypothesis, apply
-from ee_dist.effects.controller_laws import CONTROLLER_LAWS
-from ee_dist.effects.laws import LawContext, find_law
-from ee_dist.engines.friction import Friction
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.sampling import LowPass, decimated
-from ee_dist.robots.inertia import felt_inertia
-from ee_dist.robots.instruments import MOTOR_TORQUE
-from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, parameters, regressor, rotors
-from ee_dist.robots.model import DRIVE_NUMBERS, Drive, Robot
-from ee_dist.trials.log import Array, SensorLog
+from ee_dist.measurements.sampling import decimated
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
 
-INSTANT_S = 1e-9
-"""Time step at which the drive path's implicit friction is that of the instant."""
-KEPT = 4
-"""Geometries whose regressors are kept."""
-PASSED = 1 / 20
-"""Cut-off of the positions' low-pass as a share of their rate: above it, differences twice over are mostly noise."""
-REST_NOISE = 3.0
-"""Standard deviations of the readings' slope below which a joint rests."""
-REST_WINDOWS = 1
-"""Lengths of that line that a rest lasts at least."""
-FINEST = 1e-5
-"""Share of a joint's travel that no reading resolves."""
 LEAST_NOISE = 0.002
 """Share of the force below which no difference counts, noise or not."""
-
-
-@dataclass(frozen=True)
-class Processing:
-    """What is done to the measurements: low-pass of the positions (None: at a twentieth of the rate, 50 Hz at 1 kHz), rows
-    dropped at the start (where the filter settles), one row kept of ``keep_every``, blocks of time judged apart."""
-
-    low_pass: LowPass | None = None
-    drop_rows: int = 49
-    keep_every: int = 10
-    blocks: int = 12
-
-    def filter_for(self, step_s: float) -> LowPass:
-        return self.low_pass or LowPass(cutoff_hz=PASSED / step_s)
-
-
-@dataclass(eq=False)
-class Moved:
-    """The regressor (T, M, 10 P) of one geometry along a motion, under gravity ``pull`` (3,); what other gravity adds to it
-    for each m/s^2 along x, y, z, once that is asked for."""
-
-    all_of_it: Array
-    pull: Array
-    by_pull: Array | None = None
-    last: tuple[bytes, Array] | None = None
-    """Masses and gravity asked for last, and the torque (T, M)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A measured motion (T, M): positions, speeds, accelerations; ``torque`` that the drives gave; ``rest``: where a joint
-    did not move, as far as its readings tell."""
-
-    position: Array
-    speed: Array
-    acceleration: Array
-    torque: Array
-    rest: Mask
-    known: dict[tuple[object, ...], Moved] = field(default_factory=dict)
-
-    def needed(self, robot: Robot) -> Array:
-        """(T, M) torque that the motion needs. What depends on geometry and gravity is computed once for each."""
-        shape, pull, masses = geometry(robot), gravity(robot), parameters(robot)
-        if shape not in self.known:
-            if len(self.known) >= KEPT:
-                self.known.pop(next(iter(self.known)))
-            self.known[shape] = Moved(regressor(robot, self.position, self.speed, self.acceleration), pull)
-        known = self.known[shape]
-        # Most hypotheses change the drives alone.
-        asked = masses.tobytes() + pull.tobytes()
-        if known.last is None or known.last[0] != asked:
-            torque = known.all_of_it @ masses
-            if (pull != known.pull).any():
-                if known.by_pull is None:
-                    known.by_pull = gravity_regressor(robot, self.position)
-                torque = torque + np.tensordot(pull - known.pull, known.by_pull @ masses, 1)
-            known.last = asked, torque
-        return np.asarray(known.last[1] + rotors(robot) * self.acceleration)
-
-
-def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
-    """Raises MeasurementError where the log lacks positions or torques, or is too short."""
-    joints = _positions(log, robot)
-    torques = motor_torques(log, robot)
-    if joints is None or torques is None:
-        what = "joint positions" if joints is None else "torques of the drives"
-        hint = ""
-        if joints is not None and any(s.kind == "torque" for s in robot.sensors):
-            hint = (
-                "; a sensor of kind torque shows what friction leaves of them: if it measures the motor, as a current does, "
-                f"describe it as kind {MOTOR_TORQUE}"
-            )
-        raise MeasurementError(f"the log of {robot.name} has no {what}: a balance of forces needs both{hint}")
-    if len(log) < processing.drop_rows + 10 * processing.keep_every:
-        raise MeasurementError(f"the log of {robot.name} has only {len(log)} rows: too few for the filters")
-    dt = float(np.median(np.diff(log.times_s)))
-    smooth = processing.filter_for(dt)
-    position = np.stack([smooth(q, dt) for q in joints.T], axis=1)
-    speed = np.gradient(position, dt, axis=0)
-    acceleration = np.gradient(speed, dt, axis=0)
-    cut = slice(processing.drop_rows, None)
-    return Motion(
-        position[cut], speed[cut], acceleration[cut], np.array(torques[cut]), at_rest(joints, dt, processing)[cut]
-    )
-
-
-def at_rest(joints: Array, dt: float, processing: Processing) -> Mask:
-    """(T, M): where readings (T, M) tell no motion: a line laid through them over half a period of the filter's cut-off does
-    not rise by more than their noise allows. A filter smears the moment in which a joint sticks; the readings do not."""
-    rows = max(int(0.5 / processing.filter_for(dt).cutoff_hz / dt) // 2 * 2 + 1, 5)
-    slope = savgol_filter(joints, rows, 1, deriv=1, delta=dt, axis=0)
-    noise = np.maximum(np.sqrt(np.median(roughness(joints), axis=0) / 0.455), FINEST * np.ptp(joints, axis=0))
-    still = np.abs(slope) <= REST_NOISE * noise * math.sqrt(12.0 / rows**3) / dt
-    # A reversal is slow for a moment too: rest lasts.
-    return np.asarray(binary_opening(still, np.ones((REST_WINDOWS * rows, 1), dtype=bool)))
-
-
-def motor_torques(log: SensorLog, robot: Robot) -> Array | None:
-    """(T, M) what the motors gave, before friction: the log's torques, else what sensors of motor torque read; None without.
-
-    A sensor shows the step before its reading. Differences of positions are of both steps about a row: so is the mean of a
-    reading and the next.
-    """
-    if log.torques is not None:
-        return log.torques
-    read = _channels(log, robot, MOTOR_TORQUE)
-    return None if read is None else np.concatenate([(read[:-1] + read[1:]) / 2, read[-1:]])
-
-
-def _positions(log: SensorLog, robot: Robot) -> Array | None:
-    """(T, M) as the sensors read them, noise and all; else as the log knows them; None without."""
-    read = _channels(log, robot, "position")
-    return log.joints if read is None else read
-
-
-def _channels(log: SensorLog, robot: Robot, kind: str) -> Array | None:
-    """(T, M) what the sensors of one kind read, if every drive has one."""
-    of = {s.target: k for k, s in enumerate(robot.sensors) if s.kind == kind}
-    if not set(robot.motor_names) <= set(of):
-        return None
-    return np.array(log.sensors[:, [of[m] for m in robot.motor_names]])
 
 
 class ForceBalance(Problem):
@@ -190,6 +49,7 @@ class ForceBalance(Problem):
         self.processing = processing or Processing()
         self.motions = [motion_of(t.log, robot, self.processing) for t in trials]
         self.models = [apply(robot, t.setup) for t in trials]
+        self.balances = [Balance(m, self.processing.keep_every) for m in self.motions]
         names = robot.motor_names
         every = self.processing.keep_every
         forces = [decimated(m.torque, every) for m in self.motions]
@@ -210,12 +70,12 @@ class ForceBalance(Problem):
     def _noise(self, forces: Sequence[Array]) -> float:
         """Noise of the force, as a share of it: from second differences. What a model accounts for is no noise, so the
         least of what the measured force shows and of what the model as it is leaves over."""
-        every = self.processing.keep_every
-        left = [decimated(left_over(m, motion), every) for m, motion in zip(self.models, self.motions, strict=True)]
+        left = [balance(model) for model, balance in zip(self.models, self.balances, strict=True)]
         found = []
         for series in (forces, left):
-            if all(np.isfinite(s).all() for s in series):
-                parts = [np.median(roughness(s / self.size), axis=0) / 0.455 for s in series]
+            whole = [s for s in series if s is not None]
+            if len(whole) == len(series):
+                parts = [np.median(roughness(s / self.size), axis=0) / 0.455 for s in whole]
                 found.append(float(np.sqrt(np.mean(parts))))
         return min(found)
 
@@ -270,8 +130,7 @@ class ForceBalance(Problem):
         out = np.zeros((len(hypotheses), len(self.segment_of)))
         for row, hypothesis in enumerate(hypotheses):
             for k in chosen:
-                left = left_over(apply(self.models[k], hypothesis), self.motions[k])
-                kept = decimated(left, self.processing.keep_every) if np.isfinite(left).all() else None
+                kept = self.balances[k](apply(self.models[k], hypothesis))
                 out[row, self.slices[k]] = np.inf if kept is None else (kept / self.scale).ravel()
         return out
 
@@ -303,39 +162,3 @@ class ForceBalance(Problem):
 
     def noise_floor(self) -> tuple[float, str]:
         return 1.0, "estimated: second differences of the force"
-
-
-def left_over(robot: Robot, motion: Motion) -> Array:
-    """(T, M): what the drives gave at the joints, less what the motion needed, in terms of the measured force."""
-    needed = motion.needed(robot)
-    q, qd = motion.position, motion.speed
-    p, uses = _fields(robot.drives)
-    active = motion.torque * p["strength"]
-    torque = active - p["spring"] * (q - p["spring_rest"]) + p["offset_torque"]
-    # What rests goes on resting through the instant: friction takes what it must, up to its limit.
-    rubbed = np.where(motion.rest, -motion.acceleration * INSTANT_S, qd)
-    rows = np.arange(len(q))
-    for law in robot.laws:
-        if law.name in CONTROLLER_LAWS:
-            continue
-        k = robot.motor_names.index(law.joint)
-        context = LawContext({n: np.full(len(q), v) for n, v in law.values}, INSTANT_S)
-        context.position, context.speed, context.torque = q[:, k], qd[:, k], torque[:, k]
-        torque[rows, k] += find_law(law.name)(context)
-    if Friction.rows(p).any():
-        inertia = felt_inertia(robot)[None, :]
-        friction = Friction(p, uses, inertia, INSTANT_S)
-        # The load on a joint is all that its motion needed beyond its own inertia.
-        load = inertia * motion.acceleration - needed
-        friction.record(-load, rubbed)
-        torque = friction(torque, active, rubbed)
-    # In terms of what was measured: a weak motor would otherwise shrink the residual along with the force.
-    return (torque - needed) / np.maximum(p["strength"], 1e-3)
-
-
-def _fields(drives: Sequence[Drive]) -> tuple[dict[str, Array], dict[str, bool]]:
-    """Numbers of the drives by field, (1, M) each, and whether any is not neutral."""
-    names = list(DRIVE_NUMBERS)
-    p = {n: np.array([[getattr(d, n) for d in drives]], dtype=float) for n in names}
-    neutral = {n: Drive.__dataclass_fields__[n].default for n in names}
-    return p, {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}

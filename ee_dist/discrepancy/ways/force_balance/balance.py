@@ -1,0 +1,108 @@
+"""What a model leaves of the measured forces, joint by joint: a hypothesis seldom changes more than one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ee_dist.discrepancy.ways.force_balance.motion import Motion
+from ee_dist.effects.controller_laws import CONTROLLER_LAWS
+from ee_dist.effects.laws import LawContext, find_law
+from ee_dist.engines.friction import DRY, LOADED, SIDED, SLOPED, Friction
+from ee_dist.measurements.sampling import decimated
+from ee_dist.robots.inertia import felt_inertia
+from ee_dist.robots.model import DRIVE_NUMBERS, Drive, Robot
+from ee_dist.trials.log import Array
+
+INSTANT_S = 1e-9
+"""Time step at which the drive path's implicit friction is that of the instant."""
+RUBBING = (*DRY, *LOADED, *SIDED, *SLOPED)
+SEEN = (
+    "strength",
+    "spring",
+    "spring_rest",
+    "offset_torque",
+    "stribeck_speed",
+    "rotor_inertia",
+    "torque_limit",
+    *RUBBING,
+)
+"""Fields of a drive that a balance of forces sees: neither the controller nor what lies between motor and joint."""
+MOST_VALUES = 8_000_000
+"""Values that are kept of what joints leave: 64 MB."""
+
+
+class Balance:
+    """What models leave along one motion, every ``keep_every`` th row of it."""
+
+    def __init__(self, motion: Motion, keep_every: int) -> None:
+        self.motion, self.keep_every = motion, keep_every
+        self._kept: dict[tuple[object, ...], Array | None] = {}
+        self._most = max(MOST_VALUES * keep_every // max(len(motion.torque), 1), 64)
+
+    def __call__(self, robot: Robot) -> Array | None:
+        """(rows, M) of ``left_over``, decimated; None where a model leaves the finite numbers."""
+        asked, needed = self.motion.needed(robot)
+        inertia = felt_inertia(robot)
+        laws = {d.joint: tuple(law for law in robot.laws if law.joint == d.joint) for d in robot.drives}
+        keys = [
+            (k, asked, tuple(getattr(d, n) for n in SEEN), laws[d.joint], inertia[k] if _rubs(d) else 0.0)
+            for k, d in enumerate(robot.drives)
+        ]
+        missing = [k for k, key in enumerate(keys) if key not in self._kept]
+        if missing:
+            if len(self._kept) + len(missing) > self._most:
+                self._kept.clear()
+                missing = list(range(len(keys)))
+            left = left_over(robot, self.motion, needed, missing)
+            whole = np.asarray(np.isfinite(left).all(axis=0))
+            kept = decimated(np.where(whole, left, 0.0), self.keep_every)
+            for i, k in enumerate(missing):
+                self._kept[keys[k]] = kept[:, i] if whole[i] else None
+        columns = [self._kept[key] for key in keys]
+        return None if any(c is None for c in columns) else np.stack(columns, axis=1)  # type: ignore[arg-type]
+
+
+def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]) -> Array:
+    """(T, J) at some joints: what the drives gave, less what the motion needed (T, M), in terms of the measured force."""
+    drives = [robot.drives[k] for k in joints]
+    q, qd, qdd, given = (
+        np.ascontiguousarray(a[:, joints]) for a in (motion.position, motion.speed, motion.acceleration, motion.torque)
+    )
+    needed = needed[:, joints] + np.array([d.rotor_inertia for d in drives]) * qdd
+    p, uses = _fields(drives)
+    active = given * p["strength"]
+    torque = active - p["spring"] * (q - p["spring_rest"]) + p["offset_torque"]
+    place = {d.joint: k for k, d in enumerate(drives)}
+    for law in robot.laws:
+        if law.name in CONTROLLER_LAWS or law.joint not in place:
+            continue
+        k = place[law.joint]
+        context = LawContext({n: np.full(len(q), v) for n, v in law.values}, INSTANT_S)
+        context.position, context.speed, context.torque = q[:, k], qd[:, k], torque[:, k]
+        torque[:, k] += find_law(law.name)(context)
+    if Friction.rows(p).any():
+        # What rests goes on resting through the instant: friction takes what it must, up to its limit.
+        rubbed = np.where(motion.rest[:, joints], -qdd * INSTANT_S, qd)
+        inertia = felt_inertia(robot)[None, joints]
+        friction = Friction(p, uses, inertia, INSTANT_S)
+        # The load on a joint is all that its motion needed beyond its own inertia.
+        load = inertia * qdd - needed
+        friction.record(-load, rubbed)
+        torque = friction(torque, active, rubbed)
+    # In terms of what was measured: a weak motor would otherwise shrink the residual along with the force.
+    return np.asarray((torque - needed) / np.maximum(p["strength"], 1e-3))
+
+
+def _rubs(drive: Drive) -> bool:
+    return any(getattr(drive, n) != 0 for n in RUBBING)
+
+
+def _fields(drives: Sequence[Drive]) -> tuple[dict[str, Array], dict[str, bool]]:
+    """Numbers of the drives by field, (1, J) each, and whether any is not neutral."""
+    names = list(DRIVE_NUMBERS)
+    table = np.array([[getattr(d, n) for n in names] for d in drives], dtype=float)
+    p = {n: np.ascontiguousarray(table[None, :, i]) for i, n in enumerate(names)}
+    neutral = {n: Drive.__dataclass_fields__[n].default for n in names}
+    return p, {n: bool(np.any(p[n] != neutral[n])) for n in names if isinstance(neutral[n], float)}

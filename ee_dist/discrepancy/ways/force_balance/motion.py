@@ -1,0 +1,152 @@
+"""A measured motion as a balance of forces sees it: filtered, differentiated, and with the torque that it needs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.ndimage import binary_opening
+from scipy.signal import savgol_filter
+
+from ee_dist.discrepancy.problem import Mask
+from ee_dist.discrepancy.ways.open_loop.prediction import roughness
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.sampling import LowPass
+from ee_dist.robots.instruments import MOTOR_TORQUE
+from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, parameters, regressor
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array, SensorLog
+
+KEPT = 4
+"""Geometries whose regressors are kept."""
+PASSED = 1 / 20
+"""Cut-off of the positions' low-pass as a share of their rate: above it, differences twice over are mostly noise."""
+REST_NOISE = 3.0
+"""Standard deviations of the readings' slope below which a joint rests."""
+REST_WINDOWS = 1
+"""Lengths of that line that a rest lasts at least."""
+FINEST = 1e-5
+"""Share of a joint's travel that no reading resolves."""
+
+
+@dataclass(frozen=True)
+class Processing:
+    """What is done to the measurements: low-pass of the positions (None: at a twentieth of the rate, 50 Hz at 1 kHz), rows
+    dropped at the start (where the filter settles), one row kept of ``keep_every``, blocks of time judged apart."""
+
+    low_pass: LowPass | None = None
+    drop_rows: int = 49
+    keep_every: int = 10
+    blocks: int = 12
+
+    def filter_for(self, step_s: float) -> LowPass:
+        return self.low_pass or LowPass(cutoff_hz=PASSED / step_s)
+
+
+@dataclass(eq=False)
+class Moved:
+    """The regressor (T, M, 10 P) of one geometry along a motion, under gravity ``pull`` (3,); what other gravity adds to it
+    for each m/s^2 along x, y, z, once that is asked for."""
+
+    all_of_it: Array
+    pull: Array
+    by_pull: Array | None = None
+    last: tuple[bytes, Array] | None = None
+    """Masses and gravity asked for last, and the torque (T, M)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A measured motion (T, M): positions, speeds, accelerations; ``torque`` that the drives gave; ``rest``: where a joint
+    did not move, as far as its readings tell."""
+
+    position: Array
+    speed: Array
+    acceleration: Array
+    torque: Array
+    rest: Mask
+    known: dict[tuple[object, ...], Moved] = field(default_factory=dict)
+
+    def needed(self, robot: Robot) -> tuple[object, Array]:
+        """(T, M) torque that the motion of the parts needs, without that of the rotors; equal keys have equal torques. What
+        depends on geometry and gravity is computed once for each."""
+        shape, pull, masses = geometry(robot), gravity(robot), parameters(robot)
+        if shape not in self.known:
+            if len(self.known) >= KEPT:
+                self.known.pop(next(iter(self.known)))
+            self.known[shape] = Moved(regressor(robot, self.position, self.speed, self.acceleration), pull)
+        known = self.known[shape]
+        # Most hypotheses change the drives alone.
+        asked = masses.tobytes() + pull.tobytes()
+        if known.last is None or known.last[0] != asked:
+            torque = known.all_of_it @ masses
+            if (pull != known.pull).any():
+                if known.by_pull is None:
+                    known.by_pull = gravity_regressor(robot, self.position)
+                torque = torque + np.tensordot(pull - known.pull, known.by_pull @ masses, 1)
+            known.last = asked, torque
+        return (shape, asked), known.last[1]
+
+
+def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
+    """Raises MeasurementError where the log lacks positions or torques, or is too short."""
+    joints = _positions(log, robot)
+    torques = motor_torques(log, robot)
+    if joints is None or torques is None:
+        what = "joint positions" if joints is None else "torques of the drives"
+        hint = ""
+        if joints is not None and any(s.kind == "torque" for s in robot.sensors):
+            hint = (
+                "; a sensor of kind torque shows what friction leaves of them: if it measures the motor, as a current does, "
+                f"describe it as kind {MOTOR_TORQUE}"
+            )
+        raise MeasurementError(f"the log of {robot.name} has no {what}: a balance of forces needs both{hint}")
+    if len(log) < processing.drop_rows + 10 * processing.keep_every:
+        raise MeasurementError(f"the log of {robot.name} has only {len(log)} rows: too few for the filters")
+    dt = float(np.median(np.diff(log.times_s)))
+    smooth = processing.filter_for(dt)
+    position = np.stack([smooth(q, dt) for q in joints.T], axis=1)
+    speed = np.gradient(position, dt, axis=0)
+    acceleration = np.gradient(speed, dt, axis=0)
+    cut = slice(processing.drop_rows, None)
+    return Motion(
+        position[cut], speed[cut], acceleration[cut], np.array(torques[cut]), at_rest(joints, dt, processing)[cut]
+    )
+
+
+def at_rest(joints: Array, dt: float, processing: Processing) -> Mask:
+    """(T, M): where readings (T, M) tell no motion: a line laid through them over half a period of the filter's cut-off does
+    not rise by more than their noise allows. A filter smears the moment in which a joint sticks; the readings do not."""
+    rows = max(int(0.5 / processing.filter_for(dt).cutoff_hz / dt) // 2 * 2 + 1, 5)
+    slope = savgol_filter(joints, rows, 1, deriv=1, delta=dt, axis=0)
+    noise = np.maximum(np.sqrt(np.median(roughness(joints), axis=0) / 0.455), FINEST * np.ptp(joints, axis=0))
+    still = np.abs(slope) <= REST_NOISE * noise * math.sqrt(12.0 / rows**3) / dt
+    # A reversal is slow for a moment too: rest lasts.
+    return np.asarray(binary_opening(still, np.ones((REST_WINDOWS * rows, 1), dtype=bool)))
+
+
+def motor_torques(log: SensorLog, robot: Robot) -> Array | None:
+    """(T, M) what the motors gave, before friction: the log's torques, else what sensors of motor torque read; None without.
+
+    A sensor shows the step before its reading. Differences of positions are of both steps about a row: so is the mean of a
+    reading and the next.
+    """
+    if log.torques is not None:
+        return log.torques
+    read = _channels(log, robot, MOTOR_TORQUE)
+    return None if read is None else np.concatenate([(read[:-1] + read[1:]) / 2, read[-1:]])
+
+
+def _positions(log: SensorLog, robot: Robot) -> Array | None:
+    """(T, M) as the sensors read them, noise and all; else as the log knows them; None without."""
+    read = _channels(log, robot, "position")
+    return log.joints if read is None else read
+
+
+def _channels(log: SensorLog, robot: Robot, kind: str) -> Array | None:
+    """(T, M) what the sensors of one kind read, if every drive has one."""
+    of = {s.target: k for k, s in enumerate(robot.sensors) if s.kind == kind}
+    if not set(robot.motor_names) <= set(of):
+        return None
+    return np.array(log.sensors[:, [of[m] for m in robot.motor_names]])
