@@ -123,9 +123,10 @@ SOURCES = "robot_sources"
 """Key in a recording's metadata under which ``source_digests`` stand, as JSON."""
 
 
-def sources_text(source: Any, folder: str | Path = ".") -> str:
-    """``source_digests`` as the text that goes into a recording's metadata under SOURCES."""
-    return json.dumps(source_digests(source, folder), sort_keys=True)
+def sources_text(source: Any, folder: str | Path = ".", more: Any = None) -> str:
+    """``source_digests`` as the text that goes into a recording's metadata under SOURCES; ``more``: of a second source."""
+    second = {} if more is None else source_digests(more, folder)
+    return json.dumps(source_digests(source, folder) | second, sort_keys=True)
 
 
 def changed_sources(metadata: Mapping[str, str]) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ from ee_dist.measurements.readers import FORMATS, kind_of
 from ee_dist.measurements.report import Report, describe
 from ee_dist.recording.records import TrialRecord
 from ee_dist.recording.writer import RunWriter
+from ee_dist.robots.agree import SOURCES, sources_text
 from ee_dist.robots.describe import BUILT_IN, load_robot, robot_of
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError, one_of
@@ -79,7 +80,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     reports = [report for _, report in found]
     text = describe(reports)
     out.mkdir(parents=True, exist_ok=True)
-    with RunWriter(out / options.output, robot, {"task": "import", "mapping": str(mapping.source)}) as writer:
+    metadata = {"task": "import", "mapping": str(mapping.source), SOURCES: sources_of(mapping, config)}
+    with RunWriter(out / options.output, robot, metadata) as writer:
         for record, _ in found:
             writer.trial(record)
     (out / "report.txt").write_text(text + "\n", encoding="utf-8")
@@ -160,6 +162,15 @@ def robot_of_mapping(mapping: Mapping, config: Config) -> tuple[Robot, tuple[str
     if mapping.robot is not None:
         return load_robot(mapping.robot, mapping.folder)
     return robot_of(config.robot.name, config.robot.urdf, config.robot.drives)
+
+
+def sources_of(mapping: Mapping, config: Config) -> str:
+    """Digests of the files that the robot was read from, as the recording keeps them: a later change is then noticed."""
+    if mapping.robot is not None:
+        return sources_text(mapping.robot, mapping.folder)
+    robot = config.robot
+    named = {} if robot.urdf is None else {robot.name: robot.urdf}
+    return sources_text(named, more=robot.drives or robot.name)
 
 
 def files_of(measured: Any, kind: str | None = None) -> list[Path]:

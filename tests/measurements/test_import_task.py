@@ -14,6 +14,8 @@ import odd_files
 import pytest
 
 from ee_dist.__main__ import main
+from ee_dist.recording.reader import read_run
+from ee_dist.robots.agree import changed_sources
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data"
@@ -51,6 +53,12 @@ def test_a_file_without_a_mapping_becomes_a_recording(tmp_path: Path, command: C
     command(f"measured={log}", f"task.mapping={out / 'mapping.yaml'}", f"hydra.run.dir={tmp_path / 'again'}")
     second = json.loads((tmp_path / "again" / "summary.json").read_text())
     assert first["result_digest"] == second["result_digest"]
+    kept = [read_run(d / "measured.mcap").metadata for d in (out, tmp_path / "again")]
+    assert [changed_sources(m) for m in kept] == [(), ()]
+    robot.write_text(robot.read_text() + "\n# another gear\n")
+    for metadata in kept:
+        (line,) = changed_sources(metadata)
+        assert str(robot) in line and "has changed since the import" in line
 
 
 def test_what_no_file_can_say_is_asked_in_one_line(tmp_path: Path, command: Command) -> None:
