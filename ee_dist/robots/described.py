@@ -9,8 +9,9 @@ from typing import Any
 from ee_dist.basics.names import did_you_mean
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
-from ee_dist.robots.model import COMMANDS, Drive, Joint, Robot, RobotError, Sensor, Wiring, World
+from ee_dist.robots.model import COMMANDS, Drive, Joint, Part, Robot, RobotError, Sensor, Wiring, World
 from ee_dist.robots.numbers import checked, number
+from ee_dist.robots.pivots import PIVOT_HINT, about_centre
 
 KEYS = (
     "name",
@@ -19,6 +20,7 @@ KEYS = (
     "has_floor",
     "start_position_m",
     "gravity_m_s2",
+    "inertia_about",
     "drives",
     "sensors",
 )
@@ -73,7 +75,9 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
         raise RobotError(f"{where}: start_position_m: expected three numbers, not {quoted(start)}")
     gravity = GRAVITY_M_S2 if body.gravity_m_s2 is None else body.gravity_m_s2
     step = TIME_STEP_S if body.time_step_s is None else body.time_step_s
-    notes = list(body.notes)
+    # A hint that was taken need not be given again.
+    taken = data.get("inertia_about") == "joint"
+    notes = [n for n in body.notes if not (taken and n.startswith(PIVOT_HINT))]
     passive = [j.name for j in body.moving if j.name not in {d.joint for d in drives}]
     if passive:
         notes.append(f"joints without a drive swing freely: {', '.join(passive)}")
@@ -81,7 +85,7 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
         notes.append(f"the base {quoted(body.parts[0].name)} has no mass in the file: 1 kg is assumed")
     robot = Robot(
         name=str(data.get("name", body.name)),
-        parts=body.parts,
+        parts=_parts(body, data.get("inertia_about", "centre"), where),
         joints=body.joints,
         drives=drives,
         sensors=sensors,
@@ -93,6 +97,16 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
         time_step_s=number(data.get("time_step_s", step), f"{where}: time_step_s"),
     )
     return checked(robot, where), tuple(notes)
+
+
+def _parts(body: Body, about: Any, where: str) -> tuple[Part, ...]:
+    """The parts; with inertias about the joints, those that a hinge carries are brought to their centres."""
+    if about not in ("centre", "joint"):
+        raise RobotError(
+            f"{where}: inertia_about: expected 'centre' (of mass, as URDF means it) or 'joint', not {about!r}"
+        )
+    hinged = {j.child for j in body.joints if j.kind == "hinge"}
+    return tuple(about_centre(p, where) if about == "joint" and p.name in hinged else p for p in body.parts)
 
 
 def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:

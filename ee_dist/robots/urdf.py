@@ -18,6 +18,7 @@ from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, folded
 from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
+from ee_dist.robots.pivots import PIVOT_HINT
 from ee_dist.robots.xml import XmlError, read_xml
 
 CONTINUOUS_RAD = 200 * math.pi
@@ -178,7 +179,8 @@ class _Reader:
                 found.append(part.name)
         if found:
             self.notes.append(
-                f"hint: the inertia of {_list(found)} looks as if it were about the joint; URDF means the centre of mass"
+                f"{PIVOT_HINT}{_list(found)} looks as if it were about the joint; URDF means the centre of mass: "
+                "if it is, add 'inertia_about: joint' to the robot's description"
             )
 
     def order(self, root: str, joints: list[Joint]) -> list[str]:

@@ -14,6 +14,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.robots.describe import load_robot, robot_of
+from ee_dist.robots.described import robot_of_body
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.serial import robot_from_json, robot_to_json
 from ee_dist.robots.urdf import UrdfError, read_urdf, turn_of_rpy
@@ -171,6 +172,8 @@ def test_broken_xml_names_the_line(tmp_path: Path) -> None:
         ),
         ("urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: smell}]", "no sensor kind 'smell'"),
         ("urdf: ARM\nfree_bas: true", "unknown key 'free_bas'; did you mean free_base"),
+        ("urdf: ARM\ninertia_about: hinge", "inertia_about: expected 'centre' .*'joint', not 'hinge'"),
+        ("urdf: ARM\ninertia_about: joint", "has more inertia about the joint than the .* they are about its centre"),
         ("urdf: ARM\ntime_step_s: 2", "seconds, not milliseconds"),
         ("urdf: ARM\ndrives: {elbow: {kp: .nan}}", "drives: elbow: kp: nan; expected 0 to 1e"),
         ("urdf: ARM\ndrives: {elbow: {kp: -1}}", "drives: elbow: kp: -1; expected 0 to 1e"),
@@ -308,7 +311,13 @@ def test_a_joint_without_limits_has_no_stops_and_a_finite_scale(tmp_path: Path) 
 def test_an_inertia_about_the_joint_is_hinted_at(tmp_path: Path) -> None:
     thin = 4 / 3 * 1.0 * 0.25**2
     about_joint, about_centre = link("arm", com="0 0 0.25", inertia=thin), link("arm", com="0 0 0.25", inertia=thin / 4)
-    assert "hint" in read(tmp_path, link("base"), hinge("a", "base", "arm"), about_joint).notes[0]
+    body = read(tmp_path, link("base"), hinge("a", "base", "arm"), about_joint)
+    assert "add 'inertia_about: joint'" in body.notes[0]
+    # Of a moment that stands at every axis, what no body can have about its length is taken down.
+    robot, notes = robot_of_body(body, {"inertia_about": "joint"}, "arm.yaml")
+    assert not [n for n in notes if "hint" in n]
+    assert sorted(robot.part("arm").inertia_kg_m2[:3]) == pytest.approx([thin / 4, thin / 4, thin / 2])
+    MuJoCoEngine(threads=1).rollout([Rollout(robot, Commands(np.zeros((1, 0))), 2)])
     assert not read(tmp_path, link("base"), hinge("a", "base", "arm"), about_centre).notes
 
 
