@@ -127,7 +127,7 @@ def forget_sweep() -> None:
     """Remove what Hydra noted of a sweep, none of whose jobs left anything."""
     if _sweep is not None and held(_sweep) == [_SWEEP]:
         (_sweep / _SWEEP).unlink()
-        remove_made((_sweep, *_made) if _sweep in _made else _made)
+        remove_made()
 
 
 def shown(folder: Path) -> str:

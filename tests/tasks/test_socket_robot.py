@@ -22,7 +22,8 @@ from ee_dist.trials.hardware import HardwareError, Limiter, Limits, Reading
 ROBOT = Path(__file__).parents[2] / "docs" / "examples" / "socket_robot.py"
 FAST = (
     "evaluator=serial", "engine=mujoco", "budget.compensating_trials=1", "budget.polish=0", "budget.population=4",
-    "budget.diagnosis_population=4", "budget.crossovers=1", "budget.generations=1", "budget.diagnosis_generations=1",
+    "budget.diagnosis_population=4", "budget.tournament=2", "budget.crossovers=1", "budget.generations=1",
+    "budget.diagnosis_generations=1",
 )  # fmt: skip
 
 
