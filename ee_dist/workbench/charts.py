@@ -25,9 +25,13 @@ NUMBERED = 150
 """Cells of a map up to which each has its number in it."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
 _CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["toImage", "lasso2d", "autoScale2d"]}
+_STILL = {"displayModeBar": False, "responsive": True}
+"""Of charts in which there is nothing to zoom into."""
 
 
 def _chart(data: list[Chart], height: int, **layout: Any) -> Chart:
+    for axis in ("xaxis", "yaxis"):
+        layout[axis] = {"zeroline": False, **layout.get(axis, {})}
     return {
         "data": data,
         "layout": {
@@ -38,9 +42,10 @@ def _chart(data: list[Chart], height: int, **layout: Any) -> Chart:
             "paper_bgcolor": "rgba(0,0,0,0)",
             "plot_bgcolor": "#ffffff",
             "hovermode": "closest",
+            "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "#8899aa", "activecolor": "#0072b2"},
             **layout,
         },
-        "config": _CONFIG,
+        "config": _STILL if layout.get("dragmode") is False else _CONFIG,
     }
 
 
@@ -119,8 +124,9 @@ def cloud(part: Cloud, channel_unit: str, span_s: tuple[float, float] | None = N
         dragmode="select",
         margin={"l": 52, "r": 8, "t": 8, "b": 38},
         xaxis={"title": {"text": f"{part.against} ({part.unit})", "standoff": 4}, "gridcolor": "#e8edf2",
-               "zerolinecolor": "#8899aa"},
-        yaxis={"title": {"text": f"residual ({channel_unit})"}, "gridcolor": "#e8edf2", "zerolinecolor": "#8899aa"},
+               "zeroline": True, "zerolinecolor": "#8899aa"},
+        yaxis={"title": {"text": f"residual ({channel_unit})"}, "gridcolor": "#e8edf2",
+               "zeroline": True, "zerolinecolor": "#8899aa"},
     )  # fmt: skip
 
 

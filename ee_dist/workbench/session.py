@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ee_dist.discrepancy.problem import Series
+from ee_dist.discrepancy.problem import Series, error
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import Hypothesis
@@ -37,6 +37,8 @@ T = TypeVar("T")
 STEPS = "steps"
 MODEL_FILE = "model.yaml"
 MOST_UNDONE = 200
+AT_ONCE = 3
+"""Trials up to which all are simulated at each move of a slider."""
 
 
 class NothingOpenError(ValueError):
@@ -45,12 +47,14 @@ class NothingOpenError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Glance:
-    """What a hand on a slider sees: one channel of one trial, and errors as the sight of the moment weighs them."""
+    """What a hand on a slider sees: one channel of one trial, and errors as the sight of the moment weighs them. ``error``:
+    over all trials; None where these are so many that it is asked for when the hand rests."""
 
     terms: Hypothesis
     series: Series | None
     residual: Array
     trial_error: float
+    error: float | None
 
 
 class Session:
@@ -146,8 +150,8 @@ class Session:
         measured = self._open()
         self.sight = Sight(measured, self.live, way_of(measured, self.by))
         self.seen = self.sight.seen(self.bench.terms)
-        error = self.seen.found.error
-        self.bench = self.bench.stepped(Step("the model as it was", error, error, "nothing was fitted"))
+        off = self.seen.found.error
+        self.bench = self.bench.stepped(Step("the model as it was", off, off, "nothing was fitted"))
         self._note("compare", self.bench.terms)
         self.worker.warm()
         self.tell("seen")
@@ -201,8 +205,11 @@ class Session:
 
     def glance(self, place: Place) -> Glance:
         sight, terms = self._sight(), self.bench.terms
-        residual = sight.trial_residual(terms, place[0])
-        return Glance(terms, sight.series(terms, place), residual, sight.trial_error(residual, place[0]))
+        few = len(sight.problem.trials) <= AT_ONCE
+        # Few trials are one batch of the engine, and take hardly longer than one.
+        residual = sight.whole_residual(terms) if few else sight.trial_residual(terms, place[0])
+        whole = error(residual) if few else None
+        return Glance(terms, sight.series(terms, place), residual, sight.trial_error(residual, place[0]), whole)
 
     def glance_whole(self) -> float:
         """The error over all trials, as the sight of the moment weighs it."""

@@ -65,9 +65,13 @@ class Sight:
             return Seen(terms, residual, _nothing(self.problem))
         return Seen(terms, residual, compare(self.problem, residual))
 
+    def whole_residual(self, terms: Hypothesis) -> Array:
+        """(n,) of all trials."""
+        return np.asarray(self.problem.residuals([terms])[0])
+
     def error(self, terms: Hypothesis) -> float:
         """The one error number over all trials; infinite where the model cannot be simulated."""
-        return error(self.problem.residuals([terms])[0])
+        return error(self.whole_residual(terms))
 
     def trial_residual(self, terms: Hypothesis, trial: int) -> Array:
         """(n,) where only the values of one trial are not zero."""

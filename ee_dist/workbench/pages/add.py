@@ -114,7 +114,7 @@ class AddView(View):
                     number.set_value(float(f"{value:.5g}"))
 
     def _entry(self, k: int, entry: Entry) -> None:
-        with ui.element("div").classes("entry" + ("" if entry.on else " off")):
+        with ui.element("div").classes("entry w-full" + ("" if entry.on else " off")):
             with ui.row().classes("w-full items-center no-wrap"):
                 ui.switch(
                     value=entry.on, on_change=lambda e: self.page.act(self.session.switch, k, bool(e.value))
@@ -175,8 +175,8 @@ class AddView(View):
         number = self._sliders.get((k, name), (None, None))[1]
         if number is not None:
             number.set_value(float(f"{value:.5g}"))
-        if session.sight is not None and len(session.sight.problem.trials) == 1:
-            self.page.show_error(glance.trial_error)
+        if glance.error is not None:
+            self.page.show_error(glance.error)
         elif not self.moves.newer:
             error = await of(session.attempt(session.glance_whole))
             if error is not None:

@@ -78,7 +78,7 @@ class ExplainView(View):
 
     def _candidate(self, k: int, c: Ranked) -> None:
         refused = c.kind == REFUSED
-        with ui.element("div").classes("entry" + (" refused" if refused else "")):
+        with ui.element("div").classes("entry w-full" + (" refused" if refused else "")):
             ui.label(f"{k + 1}. {c.words}").style("font-weight:600")
             why = f": {c.why_not}" if refused else ""
             quiet(f"{WORDS[c.kind]}{why}. {c.sure[:1].upper()}{c.sure[1:]}.")

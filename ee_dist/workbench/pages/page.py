@@ -28,8 +28,9 @@ CALM = (
     "<script>addEventListener('unhandledrejection', (e) => "
     "{ if (String(e.reason).includes('displayed plot div')) e.preventDefault(); });</script>"
 )
+MOVES = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
 STYLE = Path(__file__).with_name("style.css")
-KEYS = "Keys: 1 to 5 choose a view, e explains, u takes back, Esc cancels a search."
+KEYS = "Keys: 1 to 5 choose a view, arrows another trial or channel in Compare, e explains, u takes back, Esc cancels a search."
 
 
 def show_session(session: Session) -> None:
@@ -152,9 +153,8 @@ class Page:
             names = ", ".join(f.name for f in measured.files[:3])
             self.title.set_text(f"{plain(measured.robot.name)}: {names}")
             way = "" if sight is None else f", compared by {plain(sight.way.name)}"
-            count = len(measured.trials)
             self.subtitle.set_text(
-                f"{count} trial{'s' if count != 1 else ''}{way}; {len(session.bench.terms)} effects in the model"
+                f"{_many(len(measured.trials), 'trial')}{way}; {_many(len(session.bench.terms), 'effect')} in the model"
             )
         if seen is not None and sight is not None and topics & {"seen", "opened"}:
             self.show_error(seen.found.error)
@@ -212,6 +212,15 @@ class Page:
         self.place, self.span_s, self.brushed_s = place, None, None
         self.changed("place")
 
+    def _step(self, trials: int, channels: int) -> None:
+        """To the next trial or channel."""
+        sight = self.session.sight
+        if self.place is None or sight is None:
+            return
+        size = (len(sight.problem.trials), len(sight.problem.channels))
+        trial, channel = ((self.place[k] + by) % size[k] for k, by in enumerate((trials, channels)))
+        self.look_at((trial, channel))
+
     def show(self, name: str) -> None:
         self.tabs.set_value(name)
 
@@ -221,6 +230,8 @@ class Page:
         key = event.key.name
         if key in ("1", "2", "3", "4", "5"):
             self.show(self.views[int(key) - 1].name)
+        elif key in MOVES and self.in_front is self.views[0]:
+            self._step(*MOVES[key])
         elif key == "u":
             await self.undo()
         elif key == "e":
@@ -228,3 +239,7 @@ class Page:
             await self.begin(verbs.EXPLAIN)
         elif key == "Escape":
             self.session.cancel()
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}" + ("" if count == 1 else "s")

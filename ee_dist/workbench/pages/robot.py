@@ -46,7 +46,7 @@ class RobotPanel:
             self.place = ui.element("div").classes("w-full")
 
     async def _ask(self) -> None:
-        await self.page.act(self.page.session.keep)
+        await self.page.begin(verbs.COMPARE)
 
     def draw(self, topics: set[str]) -> None:
         kept = self.page.session.kept

@@ -31,7 +31,7 @@ class WatchView(View):
         self.steps.clear()
         with self.steps:
             for s in ladder:
-                with ui.element("div").classes("entry" + (" refused" if s.refused else "")):
+                with ui.element("div").classes("entry w-full" + (" refused" if s.refused else "")):
                     held = (
                         "nothing was held out"
                         if s.error_heldout is None

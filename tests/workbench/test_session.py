@@ -1,0 +1,135 @@
+"""The session behind the page: what a hand does to a model, how it is undone, and that its numbers are task=compare's."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import signal
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.evidence.intervals import ParameterReport
+from ee_dist.effects.catalogue import EffectError, term
+from ee_dist.tasks import compare
+from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
+from ee_dist.workbench import verbs
+from ee_dist.workbench.bench import FIT, HAND, Step
+from ee_dist.workbench.results import Improved
+from ee_dist.workbench.session import Session
+from ee_dist.workbench.verbs import Ended, Request
+from ee_dist.workbench.worker import Worker
+
+FRICTION = "coulomb_friction@servo"
+
+
+@pytest.fixture
+def session(recording, tmp_path, monkeypatch):
+    monkeypatch.setattr(Worker, "warm", lambda _: None)
+    found = Session(Config(engine=EngineConfig("mujoco")), "auto", tmp_path / "bench")
+    found.load(str(recording), None)
+    found.begin()
+    yield found
+    found.close()
+
+
+def compared(session: Session, model) -> float:
+    asked = Config(engine=EngineConfig("mujoco"), evaluator=EvaluatorConfig("serial"))
+    config = replace(asked, measured=str(session.measured.files[0]), model=str(model))
+    with contextlib.redirect_stdout(io.StringIO()):
+        return compare.run(config, compare.Options(rerun=False), session.folder / "by_command")[1].error
+
+
+def test_a_slider_lowers_the_error_and_undo_brings_it_back(session):
+    start = session.seen.found.error
+    session.add(FRICTION)
+    assert session.seen.found.error == pytest.approx(start)  # at neutral it does nothing
+    place = session.place()
+    errors = [session.slide(0, {"torque_nm": v}, place).error for v in (0.03, 0.08, 0.13)]
+    assert errors == sorted(errors, reverse=True) and errors[-1] < 0.3 * start
+    assert session.seen.found.error == pytest.approx(start)  # nothing is settled while the hand is on it
+    session.release()
+    assert session.seen.found.error < 0.3 * start
+    assert [s.error_heldout is None for s in session.bench.ladder] == [False, True]
+    assert session.undo() and dict(session.bench.entries[0].term.values) == {"torque_nm": 0.0}
+    assert session.undo() and session.bench.entries == () and session.seen.found.error == pytest.approx(start)
+    assert not session.undo()
+
+
+def test_the_error_on_the_page_is_that_of_compare(session):
+    session.add(FRICTION, {"torque_nm": 0.09})
+    path = session.file_of(session.bench.terms)
+    assert compared(session, path) == session.seen.found.error
+    assert f"model={os.path.relpath(path)}" in session.commands[-1] and "task=compare" in session.commands[-1]
+
+
+def test_terms_go_off_and_on(session):
+    bare = session.seen.found.error
+    session.add(FRICTION, {"torque_nm": 0.13})
+    good = session.seen.found.error
+    session.switch(0, False)
+    assert session.seen.found.error == pytest.approx(bare) and session.bench.terms == ()
+    session.switch(0, True)
+    assert session.seen.found.error == good
+    session.add(FRICTION, {"torque_nm": 0.1})
+    assert len(session.bench.entries) == 1 and session.bench.entries[0].origin == HAND
+    session.remove(0)
+    assert session.bench.entries == ()
+
+
+def test_values_keep_to_their_bounds_and_names_to_the_catalogue(session):
+    session.add(FRICTION)
+    with pytest.raises(ValueError, match="lies outside"):
+        session.slide(0, {"torque_nm": 99.0}, session.place())
+    with pytest.raises(EffectError, match="did you mean"):
+        session.add("coulomb_frction@servo")
+    assert session.attempt(session.add, "gremlin@servo").result() is None
+    assert "no effect named 'gremlin'" in session.notice
+
+
+def test_curves_and_clouds_are_of_the_place_asked_for(session):
+    trial, channel = session.place()
+    series = session.sight.series((), (trial, channel))
+    log = session.measured.trials[trial].log
+    np.testing.assert_array_equal(series.measured, log.sensors[:, channel])
+    clouds = session.sight.clouds(session.seen.residual, (trial, channel))
+    assert {"position", "speed", "command"} <= {c.against for c in clouds}
+    assert all(len(c.x) == len(c.residual) == len(c.times_s) for c in clouds)
+
+
+def test_what_helps_only_the_fit_is_refused_in_sight(session):
+    session.add("stribeck_friction@servo")
+    values = (("torque_nm", 0.01), ("speed_rad_s", 1.0))
+    names = [p.name for p in session.bench.entries[0].candidate.effect.parameters]
+    fitted = term("stribeck_friction", "servo", **dict(zip(names, (v for _, v in values), strict=False)))
+    reports = (ParameterReport(0, names[0], 0.01, -0.02, 0.04, "not told from neutral"),)
+    step = Step("stribeck friction at servo", 8.0, 9.5, "windows", "its gain on held-out data is no more than luck")
+    found = Improved("", (), (fitted,), reports, (step,), session.folder)
+    request = Request(verbs.ADD, session.config, "auto", session.folder, "stribeck_friction@servo")
+    session._after(request, Ended(found))
+    entry = session.bench.entries[0]
+    assert not entry.on and entry.origin == FIT and entry.intervals == ((names[0], -0.02, 0.04),)
+    assert "no more than luck" in session.notice and session.bench.ladder[-1].refused
+    assert session.bench.terms == ()
+
+
+def until(true, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def test_a_search_that_is_killed_or_cancelled_loses_nothing(session):
+    session.add(FRICTION, {"torque_nm": 0.05})
+    before = session.bench
+    session.start(verbs.EXPLAIN)
+    os.kill(session.worker.pid, signal.SIGKILL)
+    until(lambda: session.progress is None and "nothing is lost" in session.notice)
+    session.start(verbs.EXPLAIN)
+    session.cancel()
+    until(lambda: "cancelled" in session.notice)
+    assert session.bench is before and session.explained is None and session.progress is None
