@@ -257,6 +257,8 @@ LOGS: Rows = (
     ("task=study log=t.csv", "log=t.csv: no finished run below it; a run is finished when it"),
     ("task=compare measured=weights.mcap", "expected 22 for 2 sensors"),
     ("task=reveal log=nowhere", "no such folder; name that of a trial"),
+    ("task=workbench task.port=99999", "must be from 0 to 65 535"),
+    ("task=workbench task.port=many", "expected a whole number"),
 )
 """Recordings, and the verbs that read them."""
 
