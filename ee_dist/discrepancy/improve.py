@@ -138,6 +138,9 @@ def improve(
             fit = fit_one(search, best.model, [best.u], None, WIDTHS if problem.rugged else WIDTHS[2:])
             current = Current(best.model.parts, fit.u)
             rung = _rung(search, best, [j.name for j in last.tied[1:]])
+            # Shown are the values of a fit of all data, which the model keeps; the errors are those of data held out.
+            rung.terms = (*search.fixed, *current.hypothesis)
+            rung.added = current.hypothesis[len(current.parts) - len(best.proposal.parts) :]
             rung.alternatives = [(j.proposal, j.own) for j in last.tied[1:] if len(j.proposal.parts) == 1]
             current, rung.dropped = _pruned(search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool))
             ladder.append(rung)

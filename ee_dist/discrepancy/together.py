@@ -23,8 +23,12 @@ from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.effects.groups import groups
 from ee_dist.trials.log import Array
 
-MOST_AT_ONCE = 14
+MOST_AT_ONCE = 20
 """Effects that are tried together."""
+FAMILIES = ("body", "drive", "world")
+"""Of these families: what is wrong with a robot a little everywhere."""
+BEGIN = 0.02
+"""Share of each bound to begin from: at neutral some effects have no slope."""
 LEFT_OUT = 0.25
 """Share of WORTH that leaving an effect out may cost: it is one of many."""
 
@@ -45,9 +49,13 @@ def together(search: Search, current: Current, own: int, screened: Sequence[Scre
     if len(new) < 2:
         return None
     parts = (*current.parts, *new)
-    start = np.concatenate([current.u, np.zeros(len(new))])
-    prior = PRIOR * unsure(search, [(Model(parts), start)])
-    fit = fit_all(search, [(Model(parts), start)], None, WIDTHS[1:], prior)[0]
+    model, kept_values = Model(parts), sum(c.size for c in parts[:own])
+    # What was added greedily stands in for what was not: once from there, and once from a little of everything.
+    greedy = np.concatenate([current.u, np.zeros(len(new))])
+    afresh = np.where(np.arange(len(greedy)) < kept_values, greedy, BEGIN * model.upper)
+    prior = PRIOR * unsure(search, [(model, greedy)])
+    fits = fit_all(search, [(model, greedy), (model, afresh)], None, (*WIDTHS[:2], *WIDTHS), prior)
+    fit = min(fits, key=lambda f: f.energy)
     free = np.concatenate([np.full(c.size, k >= own) for k, c in enumerate(parts)])
     path = thinned(fit.slopes, fit.u, np.repeat(np.arange(len(parts)), [c.size for c in parts]), free, prior)
     models = []
@@ -85,7 +93,11 @@ def plain(search: Search, screened: Sequence[Screened]) -> list[Candidate]:
     able = [
         s
         for s in screened
-        if s.candidate.size == 1 and not s.candidate.inert and s.candidate.target not in several and s.reach > 1.0
+        if s.candidate.effect.family in FAMILIES
+        and s.candidate.size == 1
+        and not s.candidate.inert
+        and s.candidate.target not in several
+        and s.reach > 1.0
     ]
     return [s.candidate for s in sorted(able, key=lambda s: -s.promise)[:MOST_AT_ONCE]]
 
