@@ -76,6 +76,11 @@ import pytest
         (["task=trial", "task.excitations=['steps:seed=-1']"], "seed -1 must be a whole number from 0"),
         (["task=import", "measured=/dev/zero", "task.mapping=/dev/zero"], "/dev/zero: not an ordinary file"),
         (["task=trial", "+hidden=" + "x" * 5000], "no effect named"),
+        (["task=workbench", "task.port=99999"], "task.port=99999: must be from 0 to 65 535"),
+        (["task=workbench", "measured=nowhere.mcap"], "measured=nowhere.mcap: no such file"),
+        (["task=workbench", "log=nowhere"], "log=nowhere: no such run"),
+        (["task=workbench", "model=nowhere.yaml"], "nowhere.yaml: no such file"),
+        (["task=workbench", "log=a", "measured=b"], "log= follows a recovery, measured= compares a model with a log"),
     ],
 )  # fmt: skip
 def test_one_line_and_a_status(cli, arguments, said):
