@@ -27,7 +27,6 @@ from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
 from ee_dist.discrepancy.search.slopes import WIDTHS
-from ee_dist.discrepancy.together import together
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
@@ -112,7 +111,7 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             ladder.append(_rung(search, judged))
     else:
-        exchanges, thorough = 0, not problem.rugged
+        exchanges = 0
         stopped = f"{most} effects were added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             names = {c.name for c in current.parts}
@@ -121,13 +120,9 @@ def improve(
             if best is None:
                 found = None
                 # Where fits search rather than follow slopes, a look ahead costs minutes.
-                if not problem.rugged and leftovers(problem, last.base):
-                    if thorough:
-                        thorough = False
-                        found = _together(search, current, own, last)
-                    if found is None and exchanges < EXCHANGES:
-                        exchanges += 1
-                        found = _exchanged(search, current, ladder, own, pool, effort)
+                if exchanges < EXCHANGES and not problem.rugged and leftovers(problem, last.base):
+                    exchanges += 1
+                    found = _exchanged(search, current, ladder, own, pool, effort)
                 if found is not None:
                     current, rung = found
                     ladder.append(rung)
@@ -235,28 +230,6 @@ def _pruned(
     name = current.parts[own + cheapest].name
     fit = fit_all(search, [(model, start)], None, WIDTHS[2:])[0]
     return Current(model.parts, fit.u), (name,)
-
-
-def _together(search: Search, current: Current, own: int, last: Examined) -> tuple[Current, Rung] | None:
-    """The model with all plain effects that the data need beside one another, where none earned its place alone."""
-    cut = _cut(search.problem)
-    found = together(search, current, own, last.screened, cut)
-    if found is None:
-        return None
-    changed = Current(found.parts, found.u)
-    had, has = {c.name for c in current.parts}, {c.name for c in found.parts}
-    added = tuple(t for t in changed.hypothesis if t.name not in had)
-    rung = Rung(
-        " + ".join(t.name for t in added),
-        added,
-        (*search.fixed, *changed.hypothesis),
-        float(np.sqrt(found.held.seen)),
-        error(found.held.residual),
-        per_segment(search.problem, found.held.residual),
-        cut.name,
-        dropped=tuple(c.name for c in current.parts if c.name not in has),
-    )
-    return changed, rung
 
 
 def _exchanged(

@@ -66,8 +66,7 @@ class Intake:
         return self.path
 
     def open_recording(self, path: Path) -> None:
-        self.session.load(str(path), None)
-        self.session.begin()
+        self._open(path, [])
 
     def propose(self, path: Path, robot: str, answers: Answers) -> Proposed:
         """What task=import would take the columns for. Raises MeasurementError, RobotError, ConfigError."""
@@ -110,10 +109,12 @@ class Intake:
                  f"task.noise={NOISE}", f"engine={config.engine.name}"]  # fmt: skip
         with contextlib.redirect_stdout(io.StringIO()):
             trial.run(config, options, folder)
-        self._open(folder / "trial.mcap", [command(words)])
+        self.session.load(str(folder / "trial.mcap"), None)
+        self.session.commands = (command(words),)
+        self.session.begin()
 
     def _open(self, recording: Path, before: list[str]) -> None:
-        self.session.load(str(recording), None)
+        self.session.load(str(recording), self.session.config.model)
         self.session.commands = tuple(before)
         self.session.begin()
 

@@ -17,6 +17,7 @@ from nicegui import app as toolkit
 from nicegui import ui
 from rich.console import Console
 
+from ee_dist.effects.model_file import read_model
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.errors import defect
 from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
@@ -56,9 +57,7 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     elif config.measured:
         session.load(config.measured, config.model)
     elif config.model:
-        raise ConfigError(
-            "model=: of which log? name it with measured=LOG, or leave the model out and drop a log on the page"
-        )
+        read_model(config.model)  # A wrong one is said now, not when a log is dropped.
     sock = bound(host, port)
     token = "" if is_loopback(host) else secrets.token_urlsafe(24)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)

@@ -76,6 +76,7 @@ class Session:
         self._began: str | None = None
         self._past: list[Bench] = []
         self._gripped = False
+        self._slid: tuple[int, frozenset[str]] | None = None
         self._files: dict[Hypothesis, Path | str | None] = {}
         self._listeners: list[Callable[[str], None]] = []
         self._one = ThreadPoolExecutor(1, "ee_dist bench")
@@ -139,7 +140,8 @@ class Session:
         self.worker.cancel()
         self.measured, self._began = found, model
         self.sight, self.seen, self.explained, self.kept = None, None, None, None
-        self.bench, self._past, self._gripped = bench_of(found.robot, found.model), [], False
+        self.bench, self._past = bench_of(found.robot, found.model), []
+        self._gripped, self._slid = False, None
         self._files = {found.model: model}
         self.commands = ()
         self.tell("opened")
@@ -196,11 +198,13 @@ class Session:
         self.change(self.bench.without(index))
 
     def slide(self, index: int, values: Mapping[str, float], place: Place) -> Glance:
-        """A slider is moved, and the hand is still on it: what is to be drawn. The last ``release`` is undone as one step."""
-        if not self._gripped:
+        """A slider is moved, and the hand is still on it: what is to be drawn. Moves of one slider in a row, also by many
+        strokes of a key, are undone as one step."""
+        bench = self.bench.valued(index, values)
+        if self._slid != (index, frozenset(values)):
             self._remember()
-            self._gripped = True
-        self.bench = self.bench.valued(index, values)
+        self._slid, self._gripped = (index, frozenset(values)), True
+        self.bench = bench
         return self.glance(place)
 
     def glance(self, place: Place) -> Glance:
@@ -226,7 +230,7 @@ class Session:
         """Back to the bench before the last change; False where there is none."""
         if not self._past:
             return False
-        self.bench, self._gripped = self._past.pop(), False
+        self.bench, self._gripped, self._slid = self._past.pop(), False, None
         self.tell("model")
         self.settle(step=False)
         return True
@@ -247,6 +251,7 @@ class Session:
         self.tell("seen")
 
     def _remember(self) -> None:
+        self._slid = None
         self._past = [*self._past, self.bench][-MOST_UNDONE:]
 
     def file_of(self, terms: Hypothesis) -> Path | str | None:

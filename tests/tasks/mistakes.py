@@ -259,6 +259,10 @@ LOGS: Rows = (
     ("task=reveal log=nowhere", "no such folder; name that of a trial"),
     ("task=workbench task.port=99999", "must be from 0 to 65 535"),
     ("task=workbench task.port=many", "expected a whole number"),
+    ("task=workbench measured=nowhere.mcap", "measured=nowhere.mcap: no such file"),
+    ("task=workbench log=nowhere", "log=nowhere: no such run"),
+    ("task=workbench model=nowhere.yaml", "nowhere.yaml: no such file"),
+    ("task=workbench log=a measured=b", "log= follows a recovery, measured= compares a model with a log"),
 )
 """Recordings, and the verbs that read them."""
 

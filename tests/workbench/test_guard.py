@@ -53,3 +53,12 @@ def test_two_workbenches_on_one_port():
 def test_the_viewer_is_cut_off_from_elsewhere():
     page = '<html><head><link rel="x"\n href="https://fonts.example/a"/><link rel="icon" href="f.ico"/></head></html>'
     assert "fonts.example" not in cut_off(page) and "f.ico" in cut_off(page) and "window.fetch" in cut_off(page)
+
+
+def test_without_the_toolkit_it_says_what_to_install(monkeypatch, tmp_path):
+    from ee_dist.tasks.config import Config
+    from ee_dist.workbench import task
+
+    monkeypatch.setattr(task.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ConfigError, match=r"pip install -c constraints.txt -e '\.\[workbench\]'"):
+        task.run(Config(), task.Options(), tmp_path)

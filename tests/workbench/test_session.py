@@ -54,6 +54,8 @@ def test_a_slider_lowers_the_error_and_undo_brings_it_back(session):
     session.release()
     assert session.seen.found.error < 0.3 * start
     assert [s.error_heldout is None for s in session.bench.ladder] == [False, True]
+    session.slide(0, {"torque_nm": 0.12}, place)
+    session.release()  # the same slider again: one step back with the moves before
     assert session.undo() and dict(session.bench.entries[0].term.values) == {"torque_nm": 0.0}
     assert session.undo() and session.bench.entries == () and session.seen.found.error == pytest.approx(start)
     assert not session.undo()

@@ -149,7 +149,7 @@ def cross_fit(
     problem = search.problem
     residuals = [np.zeros(len(problem.segment_of)) for _ in starts]
     seen, count = np.zeros(len(starts)), 0
-    prior = PRIOR * unsure(search, starts)
+    prior = PRIOR * _unsure(search, starts)
     fits: list[list[Fit]] = [[] for _ in starts]
     for fold in range(cut.folds):
         mask = cut.seen(problem, fold)
@@ -163,7 +163,7 @@ def cross_fit(
     return [HeldOut(cut, r, float(s) / max(count, 1), tuple(f)) for r, s, f in zip(residuals, seen, fits, strict=True)]
 
 
-def unsure(search: Search, starts: Sequence[tuple[Model, Array]]) -> float:
+def _unsure(search: Search, starts: Sequence[tuple[Model, Array]]) -> float:
     """By how much less a value is determined than noise alone would have it: what is above the noise does not average out
     from one value to the next, but at best over some pieces of a segment."""
     problem = search.problem

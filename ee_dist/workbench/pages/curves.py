@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from nicegui import ui
@@ -12,16 +12,14 @@ from ee_dist.discrepancy.words import plain
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
 from ee_dist.workbench import charts
+from ee_dist.workbench.pages.desk import Desk
 from ee_dist.workbench.thin import stretch
-
-if TYPE_CHECKING:
-    from ee_dist.workbench.pages.page import Page
 
 
 class Curves:
     """A chart of the place that the page looks at."""
 
-    def __init__(self, page: Page, height: int = 400) -> None:
+    def __init__(self, page: Desk, height: int = 400) -> None:
         self.page, self.height = page, height
         self.plot = ui.plotly(charts.overlay(_empty(), "", height=height)).classes("w-full")
         self.plot.on("plotly_relayout", self._zoomed)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from nicegui import ui
 
 from ee_dist.workbench import verbs
+from ee_dist.workbench.pages.desk import Desk
 from ee_dist.workbench.pages.view import heading, quiet
-
-if TYPE_CHECKING:
-    from ee_dist.workbench.pages.page import Page
 
 SHOWN = """
 (() => { const frame = document.getElementById(%(id)s); if (!frame) return;
@@ -34,7 +31,7 @@ def shown(element: str, recording: str) -> str:
 class RobotPanel:
     """Asked for by a button: the viewer is 43 MB to load."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Desk) -> None:
         self.page = page
         self._shown = ""
         with ui.element("section").classes("card"):

@@ -6,12 +6,11 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 from html import escape
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from nicegui import ui
 
-if TYPE_CHECKING:
-    from ee_dist.workbench.pages.page import Page
+from ee_dist.workbench.pages.desk import Desk
 
 T = TypeVar("T")
 
@@ -53,7 +52,7 @@ class View:
     icon = ""
     topics: frozenset[str] = frozenset()
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Desk) -> None:
         self.page, self.session = page, page.session
         self.stale: set[str] = set(self.topics)
 
