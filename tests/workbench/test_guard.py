@@ -59,6 +59,6 @@ def test_without_the_toolkit_it_says_what_to_install(monkeypatch, tmp_path):
     from ee_dist.tasks.config import Config
     from ee_dist.workbench import task
 
-    monkeypatch.setattr(task.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(task.importlib.util, "find_spec", lambda _: None)
     with pytest.raises(ConfigError, match=r"pip install -c constraints.txt -e '\.\[workbench\]'"):
         task.run(Config(), task.Options(), tmp_path)
