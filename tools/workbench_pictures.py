@@ -26,7 +26,7 @@ def main() -> None:
     with Bench(out, *arguments, "hydra.run.dir=bench", "overwrite=true") as bench, Person() as person:
         person.go(bench.address)
         person.waits_for("The model is off")
-        person.click("Explain")
+        person.open("Explain")
         person.click("What is missing?")
         person.wait("document.body.innerText.includes('Ranked, with 95 % intervals')", 600.0)
         person.click("Add and fit", "button")
@@ -35,7 +35,7 @@ def main() -> None:
         for width in WIDTHS:
             person.go(bench.address, width=width)
             for view in VIEWS:
-                person.click(view, "[role=tab]")
+                person.open(view)
                 time.sleep(3.0)
                 person.picture(out / f"workbench_{view.lower()}_{width}.png")
         print(*(sorted(p.name for p in out.glob("*.png"))), sep="\n")

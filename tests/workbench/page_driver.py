@@ -93,15 +93,29 @@ class Person(HeadlessBrowser):
 
     def click(self, label: str, role: str = "button, [role=tab]") -> None:
         """What is in sight and has this text, icon or label for readers of screens."""
-        place = self.wait(
-            f"""(() => {{ const wanted = {json.dumps(label)};
+        find = f"""(() => {{ const wanted = {json.dumps(label)};
             const fits = (e) => e.offsetParent !== null && !e.disabled && (e.getAttribute('aria-label') === wanted
               || [...e.querySelectorAll('*')].concat(e).some((n) => n.children.length === 0 && n.textContent.trim() === wanted));
             const found = [...document.querySelectorAll({json.dumps(role)})].find(fits);
             if (!found) return null; found.scrollIntoView({{block: 'center'}}); const r = found.getBoundingClientRect();
             return [r.x + r.width / 2, r.y + r.height / 2]; }})()"""
-        )
+        # Charts that are drawn meanwhile move it: not before it stays where it is.
+        place = self.wait(find)
+        while (now := self.wait(find)) != place:
+            place = now
+            time.sleep(0.1)
         self.press(*place)
+
+    def open(self, view: str) -> None:
+        """A tab of the page, until it is in front."""
+        chosen = f"[...document.querySelectorAll('[role=tab][aria-selected=true]')].some((t) => t.innerText.includes('{view}'))"
+        for _ in range(10):
+            self.click(view, "[role=tab]")
+            for _ in range(30):
+                if self.evaluate(chosen):
+                    return
+                time.sleep(0.1)
+        raise AssertionError(f"the view {view} does not come to the front")
 
     def press(self, x: float, y: float) -> None:
         for kind in ("mousePressed", "mouseReleased"):

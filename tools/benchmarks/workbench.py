@@ -40,6 +40,7 @@ def measure(robot: str) -> tuple[float, float, float]:
     effect, plan = CASES[robot]
     with tempfile.TemporaryDirectory() as folder:
         config = Config(robot=RobotConfig(name=robot), engine=EngineConfig("mujoco"), hidden=effect)
+        (Path(folder) / "trial").mkdir()
         with contextlib.redirect_stdout(io.StringIO()):
             trial.run(config, trial.Options(excitations=[plan], repeats=1), Path(folder) / "trial")
         session = Session(config, "auto", Path(folder) / "bench")
