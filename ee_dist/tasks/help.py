@@ -109,7 +109,6 @@ def overview() -> str:
         "  +scenario=8 budget=quick     a small run, to see every part work",
         "  -m +scenario=1,5,9 seed=0,1  a sweep, each run in a folder of its own",
         "  engine=mujoco   evaluator=serial   hydra.run.dir=FOLDER   with every verb",
-        "",
         f"{PROGRAM} task=explain --help     settings of a verb: name any",
         "To read: docs/tutorial.md, docs/bring_your_robot.md, docs/effects.md",
     ]
