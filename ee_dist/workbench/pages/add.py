@@ -29,7 +29,7 @@ class AddView(View):
         self._sliders: dict[tuple[int, str], tuple[Any, Any]] = {}
         self.moves = Latest[Move](self._move)
         with ui.element("div").classes("two"):
-            with ui.element("section").classes("card pinned"):
+            with ui.element("section").classes("card pinned below"):
                 heading("Measured and predicted")
                 self.where = quiet()
                 self.curves = Curves(self.page, 360)
