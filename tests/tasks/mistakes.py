@@ -221,6 +221,20 @@ MODELS: Rows = (
 )
 """Model files."""
 
+WORKBENCH: Rows = (
+    ("task=workbench task.port=99999", "task.port=99999: must be from 0 to 65 535"),
+    ("task=workbench task.by=guess", "task.by=guess: no such choice"),
+    ("task=workbench measured=nowhere.mcap", "measured=nowhere.mcap: no such file"),
+    ("task=workbench measured=notes.mcap", "expected a recording written by ee_dist"),
+    ("task=workbench model=effect.yaml", "did you mean viscous_friction or coulomb_friction or"),
+    ("task=workbench log=nowhere", "log=nowhere: no such run"),
+    (
+        "task=workbench log=trial.mcap measured=trial.mcap",
+        "log= follows a recovery, measured= compares a model with a log",
+    ),
+)
+"""The page."""
+
 LOGS: Rows = (
     ("task=view log=nowhere.mcap", "nowhere.mcap: no such file"),
     ("task=view log=notes.mcap", "expected a recording written by ee_dist"),
@@ -415,4 +429,4 @@ WHOLE: Rows = (
 )
 """Mistakes that Hydra itself meets: told by the whole program."""
 
-TABLE: Rows = (*COMPOSITION, *VALUES, *TRIALS, *ROBOTS, *MODELS, *LOGS, *IMPORTS, *PLUGINS)
+TABLE: Rows = (*COMPOSITION, *VALUES, *TRIALS, *ROBOTS, *MODELS, *WORKBENCH, *LOGS, *IMPORTS, *PLUGINS)
