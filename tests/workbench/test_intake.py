@@ -1,0 +1,58 @@
+"""What comes onto the bench from outside: dropped files, and runs that are still being written."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from ee_dist.tasks.config import Config, ConfigError, EngineConfig
+from ee_dist.workbench.intake import Answers, Intake, options_of
+from ee_dist.workbench.session import Session
+from ee_dist.workbench.worker import Worker
+
+
+@pytest.fixture
+def intake(tmp_path, monkeypatch):
+    monkeypatch.setattr(Worker, "warm", lambda _: None)
+    session = Session(Config(engine=EngineConfig("mujoco")), "auto", tmp_path / "bench")
+    yield Intake(session)
+    session.close()
+
+
+def test_a_dropped_file_keeps_to_its_folder(intake):
+    path = intake.place_for("../../.ssh/../ke ys.csv")
+    assert path.parent == intake.session.folder / "dropped" and path.name == "ke ys.csv"
+
+
+def test_a_dropped_csv_is_taken_in_and_compared(intake):
+    path = intake.place_for("swing.csv")
+    t = np.arange(0.0, 2.0, 0.004)
+    rows = zip(t, 0.4 * np.sin(2 * t - 0.05), 0.4 * np.sin(2 * t), strict=True)
+    path.write_text("time_s,position_rad,command_rad\n" + "\n".join(f"{a:.4f},{b:.6f},{c:.6f}" for a, b, c in rows))
+    found = intake.propose(path, "servo_pendulum", Answers())
+    assert any("position_rad" in r[1] for r in found.rows) and "position_rad" in found.text
+    intake.take_in("servo_pendulum", Answers(), found.text)
+    session = intake.session
+    assert session.seen is not None and len(session.measured.trials) == 1
+    assert "task=import" in session.commands[0] and "task=compare" in session.commands[1]
+
+
+def test_what_is_typed_is_checked():
+    assert options_of(Answers(joints="a, -", gains="1, 2.5", unit="deg")).gains == [1.0, 2.5]
+    with pytest.raises(ConfigError, match="motor gains: expected numbers"):
+        options_of(Answers(gains="strong"))
+
+
+def test_a_run_is_followed_while_it_grows(recording, tmp_path):
+    pytest.importorskip("nicegui", reason="needs the extra 'workbench'")
+    from ee_dist.workbench.pages.recovery import Followed
+
+    followed = Followed(tmp_path, tmp_path / "out")
+    assert not followed.look() and "waiting" in followed.note
+    part = tmp_path / "recovery.mcap.part"
+    part.write_bytes(recording.read_bytes()[:64])
+    assert not followed.look() and "looking again" in followed.note
+    shutil.copy(recording, part)
+    assert followed.look() and len(followed.run.trials) == 1 and not followed.look()
