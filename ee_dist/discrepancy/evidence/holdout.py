@@ -130,10 +130,10 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
     # Where the drives were released there is no command: nearly at the same time in repeats, and not to the row.
     first, second = motions[0][:rows], motions[1][:rows]
     both, either = (f(np.isfinite(first), np.isfinite(second)) for f in (np.logical_and, np.logical_or))
-    if both.sum() < SAME_LENGTH * either.sum():
+    if not both.any() or both.sum() < SAME_LENGTH * either.sum():
         return False
     gap = np.sqrt(np.mean((first - second) ** 2, where=both))
-    varies = np.nan_to_num(np.nanvar(first, axis=0)) if both.any() else np.zeros(1)
+    varies = [np.nanvar(column) for column in first.T if np.isfinite(column).any()]
     return bool(gap <= SAME_MOTION * np.sqrt(np.mean(varies)))
 
 
