@@ -168,10 +168,11 @@ def plain(error: OmegaConfBaseException, prefix: str = "") -> str:
     if isinstance(cause, ValueError) and not isinstance(cause, OmegaConfBaseException):
         text = str(cause)
     key = f"{prefix}{error.full_key}" if error.full_key else ""
-    if key:
-        for pattern, expected in _EXPECTED:
-            match = re.match(pattern, text)
-            if match:
-                value = f"={match.group(1)}" if match.groups() else ""
-                return f"{key}{value}: expected {expected.format(key=key)}"
+    for pattern, expected in _EXPECTED:
+        match = re.match(pattern, text)
+        if match:
+            value = f"={match.group(1)}" if match.groups() else ""
+            # What lies within a list has no name of its own.
+            where = f"{key}{value}: " if key else f"{text}: "
+            return f"{where}expected {expected.format(key=key or 'setting')}"
     return f"{key}: {text}" if key else text

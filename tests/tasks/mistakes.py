@@ -104,7 +104,6 @@ VALUES: Rows = (
         '+scenario=8 "scenario.changes=[{effect: motor_weak, target: knee_front_left, loss: nan}]"',
         "must be a number (1), not nan",
     ),
-    ("+scenario=8 scenario.changes=[motor_weak]", "expected a list of mappings"),
     (
         '+scenario=8 "scenario.changes=[{target: knee_front_left}]"',
         "an entry without 'effect': {'target': 'knee_front_left'}",
@@ -418,6 +417,7 @@ PLUGINS: Rows = (
 """Files of effects of one's own."""
 
 WHOLE: Rows = (
+    ("+scenario=8 scenario.changes=[motor_weak]", "expected a list of mappings"),
     ("task=explian --help", "did you mean explain or online or export?"),
     ("+scenario=8 --foo", "settings are written key=value, and --help lists them"),
     ("+scenario=8 hydra.run.dir=", "hydra.run.dir=: which folder? a run writes into one of its own,"),
