@@ -206,7 +206,7 @@ def effect(
             name,
             family,
             transform,
-            _asked(name, targets),
+            _Asked(name, targets),
             parameters,
             physics,
             signature,
@@ -220,19 +220,23 @@ def effect(
     return register
 
 
-def _asked(name: str, targets: Callable[[Robot], tuple[str, ...]]) -> Callable[[Robot], tuple[str, ...]]:
-    """``targets``, of which a user's own may fail or give something else: then it raises EffectError."""
+@dataclass(frozen=True)
+class _Asked:
+    """``targets`` of the effect ``name``, of which a user's own may fail or give something else: then it raises EffectError."""
 
-    def ask(robot: Robot) -> tuple[str, ...]:
+    name: str
+    targets: Callable[[Robot], tuple[str, ...]]
+
+    def __call__(self, robot: Robot) -> tuple[str, ...]:
         try:
-            found = targets(robot)
+            found = self.targets(robot)
         except (Exception, SystemExit) as error:
-            raise EffectError(f"{name}: its targets failed on {robot.name}: {type(error).__name__}: {error}") from error
+            raise EffectError(
+                f"{self.name}: its targets failed on {robot.name}: {type(error).__name__}: {error}"
+            ) from error
         if not isinstance(found, (tuple, list)) or not all(isinstance(t, str) for t in found):
-            raise EffectError(f"{name}: its targets gave {quoted(found)}; expected a tuple of names")
+            raise EffectError(f"{self.name}: its targets gave {quoted(found)}; expected a tuple of names")
         return tuple(found)
-
-    return ask
 
 
 def find(name: str) -> Effect:
