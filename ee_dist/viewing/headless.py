@@ -16,6 +16,8 @@ from typing import IO, Self
 from rerun.experimental import ViewerClient, ViewerState
 
 START_S = 30.0
+LAY_OUT_S = 4.0
+"""Time in which a view must come to the screen."""
 LOAD_S = 60.0
 BEGINNING = b"RRF"
 """What every recording of rerun begins with; one digit follows, its format."""
@@ -143,12 +145,17 @@ class HeadlessViewer:
         view_id = None if view is None else self._view_id(view)
         last = b""
         deadline = time.monotonic() + limit_s
+        laid_out = time.monotonic() + LAY_OUT_S
         while time.monotonic() < deadline:
             try:
                 png = self.client.take_screenshot(view_id)
             except ConnectionError as error:
                 if view is None:
                     raise ViewerError(f"the viewer gave no picture: {error}") from error
+                if time.monotonic() < laid_out:
+                    # A view that the blueprint has is drawn a little later on a busy machine.
+                    time.sleep(0.1)
+                    continue
                 raise ViewerError(f"the view {view!r} is not on the screen: it lies behind another tab") from error
             if png == last and time.monotonic() > self._started + GREETING_S:
                 return png
