@@ -13,7 +13,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from effect_robots import Bench
 
-from ee_dist.effects import catalogue, laws
 from ee_dist.engines.contract import Engine
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.pybullet.engine import PyBulletEngine
@@ -32,13 +31,3 @@ def pybullet() -> Iterator[PyBulletEngine]:
     engine = PyBulletEngine()
     yield engine
     engine.close()
-
-
-@pytest.fixture
-def own_catalogue() -> Iterator[None]:
-    """Leaves the catalogue as it was, whatever the test registers."""
-    kept = [(d, dict(d)) for d in (catalogue._registry, catalogue._plugins, laws.LAWS)]
-    yield
-    for registry, before in kept:
-        registry.clear()
-        registry.update(before)

@@ -34,11 +34,9 @@ for path in paths:
 sys.stdout.buffer.write(pickle.dumps(log))
 """
 
-pytestmark = pytest.mark.usefixtures("own_catalogue")
-
 
 @pytest.fixture
-def example(tmp_path: Path, own_catalogue: None) -> Path:
+def example(tmp_path: Path) -> Path:
     file = tmp_path / "cogging.py"
     file.write_text(BLOCKS[0])
     load_plugin(file)

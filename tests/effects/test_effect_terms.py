@@ -123,7 +123,6 @@ def test_taking_away_more_rotor_than_there_is_is_refused() -> None:
         ({"parameters": (Parameter("x", "1", 0.0, math.inf, 0.0),)}, "x has no finite bounds"),
     ],
 )
-@pytest.mark.usefixtures("own_catalogue")
 def test_an_effect_that_contradicts_itself_is_refused(facts: dict[str, object], message: str) -> None:
     stated = {"family": "drive", "targets": motors, "physics": "...", "signature": "..."} | facts
     with pytest.raises(EffectError, match=message):

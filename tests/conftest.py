@@ -1,0 +1,21 @@
+"""What holds for every test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from ee_dist.effects import catalogue, laws
+
+
+@pytest.fixture(autouse=True)
+def own_catalogue() -> Iterator[None]:
+    """Leaves the catalogue as it was: an effect that one test's plugin registers is a candidate in no other test."""
+    registries: tuple[dict, ...] = (catalogue._registry, catalogue._plugins, laws.LAWS)
+    kept = [dict(registry) for registry in registries]
+    yield
+    for registry, before in zip(registries, kept, strict=True):
+        if registry != before:
+            registry.clear()
+            registry.update(before)
