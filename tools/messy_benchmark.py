@@ -27,7 +27,8 @@ import numpy as np
 from benchmarks.arm6 import desk_arm_6
 
 from ee_dist.discrepancy.draw import draw
-from ee_dist.discrepancy.improve import Improvement, improve
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.pool import pool_of

@@ -11,7 +11,8 @@ import numpy as np
 from real_tables import Page
 
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Effort
-from ee_dist.discrepancy.improve import Improvement, improve
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.cloud import follow_cloud

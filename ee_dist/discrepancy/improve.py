@@ -8,17 +8,18 @@ dry friction is twice what it should be.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.holdout import WINDOWS, Cut, HeldOut, cross_fit, travelling, windows
+from ee_dist.discrepancy.everywhere import everywhere, pruned
+from ee_dist.discrepancy.evidence.holdout import PRIOR, WINDOWS, Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import LUCK, WORTH, Judged, judge, least_energy
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
-from ee_dist.discrepancy.examine import NEAR, STANDARD_EFFORT, Current, Effort, Examined, examine
+from ee_dist.discrepancy.examine import FAR, NEAR, STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, begin
+from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fit import fit_all, fit_one
@@ -27,61 +28,21 @@ from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
 from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.discrepancy.search.valley import LARGE, follow_valley
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
+FEW = 2
+"""Effects that the search may add before it looks whether much is a little wrong everywhere."""
 EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
-MOST = 12
+MOST = 24
 """Effects that are added at most unless told otherwise."""
 NO_MORE = "no further effect earns its place: {why}"
 NOTHING_LEFT = "nothing is left that counts, above the noise and above the resolution at which channels are compared"
 ASKED = "the effects asked for were added"
 REFITTED = "only the model's own values were to be fitted"
 EXPLAINED, BETTER = "explained", "better_not_explained"
-
-
-@dataclass(eq=False)
-class Rung:
-    """A step of the ladder: the model with ``added`` (and without ``dropped``). ``held`` (segments,) is the held-out energy,
-    ``held_out`` what was held out."""
-
-    name: str
-    added: Hypothesis
-    terms: Hypothesis
-    error_fit: float
-    error_heldout: float
-    held: Array
-    held_out: str
-    interval: tuple[float, float] = (0.0, 0.0)
-    tied_with: list[str] = field(default_factory=list)
-    dropped: tuple[str, ...] = ()
-    alternatives: list[tuple[Proposal, Array]] = field(default_factory=list)
-    """What was tied with it, and the values that suited then."""
-
-
-@dataclass(eq=False)
-class Improvement:
-    """``terms``: the final model, fitted on all data. ``verdict``: ``explained`` (nothing is left above the noise),
-    ``better_not_explained``, ``unexplained`` (nothing could be added) or ``nothing_missing``; ``explained``: the share of the
-    squared error above the noise that the model takes off held-out data. ``last``: what was tried on top of it."""
-
-    verdict: str
-    explained: float
-    ladder: list[Rung]
-    terms: Hypothesis
-    parameters: list[ParameterReport]
-    base: Array
-    residual: Array
-    noise_floor: float
-    floor_source: str
-    left: list[Leftover]
-    stopped: str
-    last: Examined | None = None
-
-    def ties(self, step: int) -> list[str]:
-        """What the measurements do not tell from the effect that step ``step`` (from 1) of ``effect=auto`` added."""
-        return self.ladder[step].tied_with if 1 <= step < len(self.ladder) else []
 
 
 def improve(
@@ -111,27 +72,39 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             ladder.append(_rung(search, judged))
     else:
-        exchanges = 0
+        exchanges, looked, spread = 0, -1, False
         stopped = f"{most} effects were added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             names = {c.name for c in current.parts}
-            last = examine(search, current, [c for c in pool if c.name not in names], effort)
+            last = _examined(search, current, [c for c in pool if c.name not in names], effort)
             best = last.best
-            if best is None:
-                found = None
-                # Where fits search rather than follow slopes, a look ahead costs minutes.
-                if exchanges < EXCHANGES and not problem.rugged and leftovers(problem, last.base):
-                    exchanges += 1
-                    found = _exchanged(search, current, ladder, own, pool, effort)
+            if len(current.parts) != looked and _many(problem, last, len(current.parts) - own, spread):
+                found = everywhere(search, current, own, pool, _cut(problem))
+                looked = len(current.parts)
                 if found is not None:
-                    current, rung = found
+                    current, looked, spread = found.current, len(found.current.parts), True
+                    ladder += found.rungs
+                    continue
+            if best is None:
+                exchanged = None
+                # Where fits search rather than follow slopes, a look ahead costs minutes.
+                few = not problem.rugged and len(current.u) < LARGE
+                if exchanges < EXCHANGES and few and leftovers(problem, last.base):
+                    exchanges += 1
+                    exchanged = _exchanged(search, current, ladder, own, pool, effort)
+                if exchanged is not None:
+                    current, rung = exchanged
                     ladder.append(rung)
                     continue
                 nearest = last.judged[0].why_not if last.judged else LUCK
                 stopped = NO_MORE.format(why=nearest) if leftovers(problem, last.base) else NOTHING_LEFT
                 break
-            fit = fit_one(search, best.model, [best.u], None, WIDTHS if problem.rugged else WIDTHS[2:])
-            current = Current(best.model.parts, fit.u)
+            model, start = best.model, best.u
+            if len(model.parts) == len(best.proposal.parts):
+                # It was judged on top of a model that stayed as it was.
+                model, start = Model((*current.parts, *model.parts)), np.concatenate([current.u, start])
+            fit = fit_one(search, model, [start], None, WIDTHS if problem.rugged else WIDTHS[2:])
+            current = Current(model.parts, fit.u)
             rung = _rung(search, best, [j.name for j in last.tied[1:]])
             # Shown are the values of a fit of all data, which the model keeps; the errors are those of data held out.
             rung.terms = (*search.fixed, *current.hypothesis)
@@ -140,6 +113,24 @@ def improve(
             current, rung.dropped = _pruned(search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool))
             ladder.append(rung)
     return _finish(search, current, ladder, as_it_is, stopped, last)
+
+
+def _examined(search: Search, current: Current, pool: Sequence[Candidate], effort: Effort) -> Examined:
+    """Where fits search rather than follow slopes, a model of many values stays as it is while effects are judged on it."""
+    if search.problem.rugged and len(current.u) >= LARGE:
+        return examine(search.on(current.hypothesis), Current(), pool, effort)
+    return examine(search, current, pool, effort)
+
+
+def _many(problem: Problem, found: Examined, added: int, spread: bool) -> bool:
+    """Whether much is left although the search had its chance with few effects; or, where it is known to be ``spread`` over
+    many places, anything when no single one is left that stands out."""
+    best = found.best
+    if best is not None and added < FEW:
+        return False
+    energy = float((found.base**2).sum()) if best is None else float(best.held.sum())
+    enough = NEAR if spread and best is None else FAR
+    return energy > enough**2 * float(problem.floor.sum())
 
 
 def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:
@@ -211,6 +202,11 @@ def _pruned(
     old = range(own, len(current.parts) - added)
     if not old:
         return current, ()
+    if len(current.u) >= LARGE:
+        fit = follow_valley(search, Model(current.parts), current.u, search.everything, PRIOR, 1, WIDTHS[-1])
+        kept = pruned(search, fit, own, tried, added)
+        names = {c.name for c in kept.parts}
+        return kept, tuple(c.name for c in current.parts if c.name not in names)
     problem, places = search.problem, _places(current.parts)
     models = [(Model(current.parts), current.u)]
     for k in old:

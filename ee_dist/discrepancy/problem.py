@@ -107,6 +107,10 @@ class Problem(ABC):
     def series(self, hypothesis: Hypothesis) -> list[Series]:
         """Measured and predicted, trial by trial and channel by channel."""
 
+    def smooth(self, residual: Array) -> Array:
+        """(n,) residual values as they follow a parameter smoothly: before large ones are softened."""
+        return residual
+
     def natural(self, error: float) -> float:
         """An error in ``natural_unit``."""
         return error

@@ -13,7 +13,8 @@ from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
-from ee_dist.discrepancy.improve import EXPLAINED, Improvement, Rung
+from ee_dist.discrepancy.improve import EXPLAINED
+from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term

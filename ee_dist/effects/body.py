@@ -35,6 +35,7 @@ def part_lost(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     signature="Torques and sag grow with the acceleration and the tilt of the part; nothing changes at rest if it is carried "
     "by the structure.",
     reference=PAPER,
+    everywhere=True,
 )
 def part_mass(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     part = robot.part(target)

@@ -28,6 +28,7 @@ STABLE = 1.8
     physics="The motor makes more or less torque of the same voltage than its data sheet says; its back-EMF stays.",
     signature="Residual torque in proportion to the voltage or duty cycle.",
     searchable=False,
+    everywhere=True,
 )
 def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     scale = 1.0 + values["change"]
@@ -77,6 +78,7 @@ def back_emf(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     signature="Residual command in proportion to the position error.",
     ranges=scales.always(factor=(0.2, 5.0)),
     worth_proposing=is_arm,
+    everywhere=True,
 )
 def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, kp=d.kp * values["factor"]))

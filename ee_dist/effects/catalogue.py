@@ -88,6 +88,8 @@ class Effect:
     """Values worth trying on a robot at a target, for parameters whose scale depends on them."""
     worth_proposing: Callable[[Robot], bool] | None = None
     """On which robots ``explain`` proposes it, where that is not all of them."""
+    everywhere: bool = False
+    """Whether a little of it is in every real robot, at each of its targets."""
 
     def shared(self, robot: Robot) -> tuple[str, ...]:
         """Groups of joints or sensors that it can act on with one set of values (see groups.py)."""
@@ -187,6 +189,7 @@ def effect(
     searchable: bool = True,
     ranges: Ranges | None = None,
     worth_proposing: Callable[[Robot], bool] | None = None,
+    everywhere: bool = False,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
@@ -214,6 +217,7 @@ def effect(
             searchable,
             ranges,
             worth_proposing,
+            everywhere,
         )
         return transform
 

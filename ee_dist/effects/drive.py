@@ -101,6 +101,7 @@ def supply_sag(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     parameters=(Parameter("change", "1", -0.5, 0.5, 0.0, "change of the commanded position, as a share of it", 0.01),),
     physics="The drive reads a larger or smaller position than was sent: a wrong scale between command and angle.",
     signature="The joint's position is a scaled copy of the prediction, at any speed and load; nothing shows at zero.",
+    everywhere=True,
 )
 def command_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def scaled(drive: Drive) -> Drive:
@@ -121,6 +122,7 @@ def _delays(robot: Robot, target: str) -> dict[str, Range]:
     physics="A command takes effect late: bus, filter and firmware hold it back.",
     signature="The joint's motion is the prediction shifted in time: the residual is speed times delay, and zero at rest.",
     ranges=_delays,
+    everywhere=True,
 )
 def command_delay(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def later(drive: Drive) -> Drive:
@@ -144,6 +146,7 @@ def _zeros(robot: Robot, target: str) -> dict[str, Range]:
     physics="The controller's zero is not the joint's: a horn mounted a tooth off, or a calibration lost.",
     signature="A constant shift of one joint, from the first step, at any speed and load.",
     ranges=_zeros,
+    everywhere=True,
 )
 def zero_offset(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def shifted(drive: Drive) -> Drive:
@@ -192,6 +195,7 @@ def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     signature="Residual torque proportional to joint acceleration, not to speed or position; steps rise late and overshoot.",
     reference="Featherstone 2008, Rigid Body Dynamics Algorithms, section 9.6",
     ranges=_rotors,
+    everywhere=True,
 )
 def rotor_inertia(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def heavier(drive: Drive) -> Drive:

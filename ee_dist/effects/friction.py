@@ -39,6 +39,7 @@ def _viscous_range(robot: Robot, target: str) -> dict[str, Range]:
     signature="Residual torque is a straight line through zero against speed; the joint lags when it moves, not at rest.",
     reference=SURVEY,
     ranges=_viscous_range,
+    everywhere=True,
 )
 def viscous_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, viscous=d.viscous + values["damping_nm_s_rad"]))
@@ -58,6 +59,7 @@ def _dry_range(robot: Robot, target: str) -> dict[str, Range]:
     "it was stopped.",
     reference=SURVEY,
     ranges=_dry_range,
+    everywhere=True,
 )
 def coulomb_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, coulomb=d.coulomb + values["torque_nm"]))

@@ -11,7 +11,8 @@ import yaml
 from rich.console import Console
 
 from ee_dist.discrepancy.explain import explain, gained_untouched
-from ee_dist.discrepancy.improve import MOST, Improvement, improve
+from ee_dist.discrepancy.improve import MOST, improve
+from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
 from ee_dist.discrepancy.search.pool import pool_of

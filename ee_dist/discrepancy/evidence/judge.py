@@ -96,15 +96,24 @@ def least_energy(tried: int, parameters: int = 1) -> float:
     return 2.0 * math.log(max(tried, 2)) + 8.0 + 2.0 * parameters
 
 
-def judge(problem: Problem, base: Array, found: HeldOut, proposal: Proposal, model: Model, tried: int) -> Judged:
-    """``base`` (n,): held-out residual of the model without the proposal, under the same cut."""
+def judge(
+    problem: Problem,
+    base: Array,
+    found: HeldOut,
+    proposal: Proposal,
+    model: Model,
+    tried: int,
+    least: float = 1.0,
+) -> Judged:
+    """``base`` (n,): held-out residual of the model without the proposal, under the same cut. ``least``: mean square of a
+    residual value from which it counts: 1, the resolution at which channels are compared, or less where noise is less."""
     cut = found.cut
     before, held = per_segment(problem, base), per_segment(problem, found.residual)
     gained = cut.by_unit(before - held)
     low, high = bootstrap(gained, groups=cut.groups)
     total, gain = float(before.sum()), float(gained.sum())
     floor = float(problem.floor.sum())
-    dispersion = max(1.0, float(held.sum()) / len(base))
+    dispersion = max(least, float(held.sum()) / len(base))
     # Where a model is wrong all over, useless effects take more off it by luck, in proportion.
     enough = least_energy(tried, max(1, proposal.size)) * dispersion + CAUTION * problem.gained
     above = max(total - floor, 1e-12)

@@ -11,10 +11,14 @@ from ee_dist.discrepancy.search.cloud import effort_of, follow_cloud
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, follow_slopes
+from ee_dist.discrepancy.search.valley import ITERATIONS, LARGE, follow_valley
 from ee_dist.trials.log import Array
 
 ROUGH_WIDTHS = (0.12, 0.06, 0.06, 0.03, 0.012)
 """Finite differences of the iterations where the error jumps: more of the wide ones."""
+
+SHORT = 8
+"""Iterations of a fit of many values from a start that is good already."""
 
 
 def fit_all(
@@ -26,8 +30,19 @@ def fit_all(
     leading: Array | None = None,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given. ``leading``: known
-    slopes of the first values (see slopes.py); where the error is rugged none are of use."""
+    slopes of the first values (see slopes.py); where the error is rugged none are of use. Models of many values are
+    fitted one by one (see valley.py)."""
     chosen = search.everything if mask is None else mask
+    many = [leading is None and len(u) >= LARGE for _, u in starts]
+    if any(many):
+        few = [pair for pair, large in zip(starts, many, strict=True) if not large]
+        rest = iter(fit_all(search, few, mask, widths, prior) if few else ())
+        return [
+            follow_valley(search, m, u, chosen, prior, ITERATIONS if len(widths) > 2 else SHORT, widths[0])
+            if large
+            else next(rest)
+            for (m, u), large in zip(starts, many, strict=True)
+        ]
     if not search.problem.rugged:
         return follow_slopes(search, starts, chosen, widths, prior, leading)
     return _rugged(search, starts, chosen, len(widths), prior)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from ee_dist.discrepancy.compare import Comparison
-from ee_dist.discrepancy.improve import Rung
+from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed
 from ee_dist.trials.log import Array

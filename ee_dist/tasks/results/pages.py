@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.explain import Explanation
-from ee_dist.discrepancy.improve import Improvement
+from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account, added, named, plain, told
 from ee_dist.tasks.measurements import Measurements

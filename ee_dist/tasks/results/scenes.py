@@ -11,7 +11,7 @@ import numpy as np
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
-from ee_dist.discrepancy.improve import Improvement
+from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
 from ee_dist.discrepancy.words import Account, above, placed, told_all
 from ee_dist.effects.catalogue import Hypothesis, apply

@@ -9,7 +9,7 @@ from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import Explanation
-from ee_dist.discrepancy.improve import Improvement, Rung
+from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account

@@ -13,7 +13,7 @@ from rich.table import Table
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
-from ee_dist.discrepancy.improve import Improvement
+from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account, named, percent, plain, told_all
 from ee_dist.tasks.results.labels import step_name, worst_trials

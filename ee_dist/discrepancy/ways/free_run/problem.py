@@ -155,6 +155,10 @@ class FreeRun(Problem):
     def noise_floor(self) -> tuple[float, str]:
         return 1.0, "estimated: second differences of the measured positions"
 
+    def smooth(self, residual: Array) -> Array:
+        """The error itself, in units of the noise, instead of its root."""
+        return np.asarray(residual * np.abs(residual))
+
     def natural(self, value: float) -> float:
         """Mean absolute position error, rad or m."""
         return value**2 * self.noise

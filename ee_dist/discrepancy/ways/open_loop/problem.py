@@ -244,6 +244,10 @@ class OpenLoop(Problem):
         source = self.scale.source
         return float(np.sqrt(self.floor.mean())), f"{source}, and what calibration left" if self._unmodelled else source
 
+    def smooth(self, residual: Array) -> Array:
+        """Before softening."""
+        return np.asarray(SOFT * np.sinh(residual / SOFT))
+
     # -- views of a residual -----------------------------------------------------------------------------------------
 
     def blocks(self, trial: int, residual: Array) -> Array:

@@ -1,0 +1,306 @@
+"""What is a little wrong everywhere: all such effects, at all places, fitted at once, and then left out one by one.
+
+A real robot differs from its model in a hundred small ways. A search that adds one effect after another puts the first of
+them where twenty small ones would be right, and is caught there. This goes the other way round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, Cut, cross_fit
+from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
+from ee_dist.discrepancy.examine import Current, calm_trials
+from ee_dist.discrepancy.ladder import Rung
+from ee_dist.discrepancy.problem import error, per_segment
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.refit import Refit
+from ee_dist.discrepancy.search.screen import screen
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import slopes_at
+from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.effects.groups import members_of
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+TWIN = 0.99
+"""Correlation of two effects' marks from which the data cannot hold them apart, and the one later in the catalogue stays out."""
+FEWEST = 3
+"""Effects that must be there to be fitted at once."""
+WIDTHS = (0.12, 0.3)
+"""Finite differences to begin with: each leads down another side of a ridge, and which is right shows at the end."""
+FEWEST_TRIED, MOST_TRIED, VALUES_TRIED = 3, 12, 120
+"""Effects that are tried one by one beside all that may be a little wrong, as far as ``VALUES_TRIED`` values in sum allow."""
+ROUNDS = 3
+"""How often terms are left out and the rest is fitted anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class Everywhere:
+    """The model with all that earned its place, and the steps that lead there, one a kind of effect."""
+
+    current: Current
+    rungs: list[Rung]
+
+
+def everywhere(search: Search, current: Current, own: int, pool: Sequence[Candidate], cut: Cut) -> Everywhere | None:
+    """On top of the current model, whose first ``own`` parts stay. None where it does not earn its place on held-out data."""
+    as_it_is = search.on(current.hypothesis).base()
+    without = as_it_is
+    if current.parts:
+        without = cross_fit(search, [(Model(current.parts), current.u)], cut)[0].residual
+    calm = search.among(calm_trials(search.problem, as_it_is))
+    look = _Look(search, calm, own, tuple(pool), current, cut, without)
+    found = look.kept(current)
+    if any(not c.effect.everywhere for c in current.parts[own:]):
+        # What was added so far may stand in for what is wrong everywhere: then without it, unless that is worse.
+        places = _places(current.parts)
+        bare = look.kept(Current(current.parts[:own], _values(current.u, places, range(own))))
+        if bare is not None and (found is None or bare.held < found.held + look.luck(bare.held)):
+            found = bare
+    return look.steps(found) if found is not None else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A model that is worth its terms. ``held``: its energy on held-out data; ``ties``: what is as good as one of its effects."""
+
+    model: Current
+    held: float
+    ties: Mapping[str, list[str]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """``without`` (n,): held-out residual of the ``current`` model; ``calm``: the search on predictable trials."""
+
+    search: Search
+    calm: Search
+    own: int
+    pool: tuple[Candidate, ...]
+    current: Current
+    cut: Cut
+    without: Array
+
+    def luck(self, energy: float) -> float:
+        """By how much held-out energy of about this size may differ for no reason."""
+        problem = self.search.problem
+        return least_energy(len(self.pool)) * max(float(problem.floor.mean()), energy / len(problem.floor))
+
+    def kept(self, base: Current) -> _Kept | None:
+        """The base with all that is worth keeping; None where that is not worth more than the current model."""
+        robot = self.search.problem.robot
+        base = _apart(robot, base, self.own)
+        few = [c for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)]
+        few = _distinct(self.calm, base, few)
+        if not few or len(base.parts) + len(few) < FEWEST:
+            return None
+        model, u = Model((*base.parts, *few)), np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
+        everything = self.calm.everything
+        fits = [follow_valley(self.calm, model, u, everything, PRIOR, width=width) for width in WIDTHS]
+        fit = min(fits, key=lambda f: f.energy)
+        # What stands out may show only where all the rest may move, and the rest be of use only beside it.
+        return self._worth(fit, {}) or self._beside(model, u, fit)
+
+    def _worth(self, fit: Fit, ties: Mapping[str, list[str]]) -> _Kept | None:
+        """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data."""
+        kept = pruned(self.calm, fit, self.own, len(self.pool))
+        names = {c.name for c in self.current.parts}
+        added = tuple(c for c in kept.parts if c.name not in names)
+        if not added:
+            return None
+        model = Model(kept.parts)
+        (held,) = cross_fit(self.search, [(model, kept.u)], self.cut)
+        # Many small effects may each be below the resolution, and not all together.
+        noise = float(self.search.problem.floor.mean())
+        judged = judge(self.search.problem, self.without, held, Proposal(added), model, len(self.pool), noise)
+        return _Kept(kept, float(judged.held.sum()), ties) if judged.earned else None
+
+    def _beside(self, model: Model, start: Array, alone: Fit) -> _Kept | None:
+        """The model with one more effect, of those that promise most on top of its fit ``alone``."""
+        search = self.calm
+        refit = Refit(slopes_at(search, alone.model, alone.u))
+        screened = screen(search.on(alone.hypothesis), self._others(model), refit=refit)
+        few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
+        fits = []
+        for s in few[: max(FEWEST_TRIED, min(MOST_TRIED, VALUES_TRIED // max(len(start), 1)))]:
+            more = s.starts[0] if s.candidate.size > 1 else np.zeros(s.candidate.size)
+            both, u = Model((*model.parts, s.candidate)), np.concatenate([start, more])
+            fits.append(follow_valley(search, both, u, search.everything, PRIOR))
+        if not fits:
+            return None
+        best = min(fits, key=lambda f: f.energy)
+        noise = max(float(search.problem.floor.mean()), best.energy / len(best.residual))
+        ties = [f.model.parts[-1].name for f in fits if f is not best and f.energy - best.energy < TIE_ENERGY * noise]
+        return self._worth(best, {best.model.parts[-1].name: ties})
+
+    def _others(self, model: Model) -> list[Candidate]:
+        names = {c.name for c in model.parts}
+        return [c for c in self.pool if c.name not in names]
+
+    def steps(self, found: _Kept) -> Everywhere:
+        """One step a kind of effect, those that matter most first; kinds that help only together are one step."""
+        search, problem, kept, own = self.search, self.search.problem, found.model, self.own
+        places = _places(kept.parts)
+        names = {c.name for c in self.current.parts}
+        gone = tuple(c.name for c in self.current.parts[own:] if c.name not in {p.name for p in kept.parts})
+        # What the ladder has already is not shown as a step again.
+        chosen = [k for k, c in enumerate(kept.parts) if k < own or c.name in names]
+        shown, energy = set(chosen), np.inf
+        rungs: list[Rung] = []
+        order = self._order(kept)
+        for kind in order:
+            chosen = sorted(
+                [*chosen, *(k for k, c in enumerate(kept.parts) if c.effect.name == kind and k not in shown)]
+            )
+            model = Model(tuple(kept.parts[k] for k in chosen))
+            start = _values(kept.u, places, chosen)
+            (held,) = cross_fit(search, [(model, start)], self.cut)
+            now = float(held.residual @ held.residual)
+            if now >= energy and kind != order[-1]:
+                continue
+            mine = [k for k in chosen if k not in shown]
+            terms = model.hypothesis(start)
+            rungs.append(
+                Rung(
+                    _label([kept.parts[k] for k in mine]),
+                    tuple(t for k, t in zip(chosen, terms, strict=True) if k in mine),
+                    (*search.fixed, *terms),
+                    float(np.sqrt(held.seen)),
+                    error(held.residual),
+                    per_segment(problem, held.residual),
+                    self.cut.name,
+                    tied_with=[t for k in mine for t in found.ties.get(kept.parts[k].name, [])],
+                    dropped=() if rungs else gone,
+                )
+            )
+            shown, energy = set(chosen), now
+        return Everywhere(kept, rungs)
+
+    def _order(self, kept: Current) -> list[str]:
+        """Kinds of effect that are new, by what the model would lose without them."""
+        names, places = {c.name for c in self.current.parts}, _places(kept.parts)
+        new = [k for k, c in enumerate(kept.parts) if k >= self.own and c.name not in names]
+        kinds = list(dict.fromkeys(kept.parts[k].effect.name for k in new))
+        rests = [[k for k, c in enumerate(kept.parts) if k not in new or c.effect.name != kind] for kind in kinds]
+        rows = self.search.residuals(
+            [Model(tuple(kept.parts[k] for k in rest)).hypothesis(_values(kept.u, places, rest)) for rest in rests]
+        )
+        costs = [float(r @ r) if np.isfinite(r).all() else np.inf for r in rows]
+        return [kinds[i] for i in np.argsort(costs, kind="stable")[::-1]]
+
+
+def pruned(search: Search, fit: Fit, own: int, tried: int, newest: int = 0) -> Current:
+    """The model without the terms whose values these data do not tell from neutral, fitted anew: one after the other the term
+    that would cost least, by its value and what the others can make up for (Wald's test). The first ``own`` and the
+    ``newest`` parts stay."""
+    for _ in range(ROUNDS):
+        keep = _worth(search, fit, own, tried, newest)
+        if len(keep) == len(fit.model.parts):
+            break
+        places = _places(fit.model.parts)
+        model = Model(tuple(fit.model.parts[k] for k in keep))
+        start = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
+        fit = follow_valley(search, model, start, fit.mask, PRIOR, width=0.03)
+    return Current(fit.model.parts, fit.u)
+
+
+def _worth(search: Search, fit: Fit, own: int, tried: int, newest: int) -> list[int]:
+    """Numbers of the parts to keep."""
+    problem, places = search.problem, _places(fit.model.parts)
+    count = max(1, int(fit.mask.sum()))
+    floor = float(problem.floor[fit.mask].sum())
+    pieces = PIECES * len(np.unique(problem.segment_of[fit.mask]))
+    # Noise averages out from value to value, what is above it at best from piece to piece.
+    luck = floor / count + max(0.0, fit.energy - floor) / pieces
+    kept = list(range(len(fit.model.parts)))
+    while len(kept) > own:
+        at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
+        normal = fit.slopes[:, at].T @ fit.slopes[:, at] + PRIOR * np.eye(len(at))
+        inverse, u, costs, first = np.linalg.inv(normal), fit.u[at], [], 0
+        for k in kept:
+            size = fit.model.parts[k].size
+            mine = slice(first, first + size)
+            first += size
+            spread = inverse[mine, mine]
+            cost = float(u[mine] @ np.linalg.solve(spread, u[mine])) if size else np.inf
+            stays = k < own or k >= len(fit.model.parts) - newest
+            costs.append(np.inf if stays else cost - luck * least_energy(tried, max(size, 1)))
+        cheapest = int(np.argmin(costs))
+        if costs[cheapest] > 0:
+            break
+        # What the others make up for goes into them, as far as slopes tell.
+        size = fit.model.parts[kept[cheapest]].size
+        first = sum(fit.model.parts[k].size for k in kept[:cheapest])
+        mine = slice(first, first + size)
+        moved = u - inverse[:, mine] @ np.linalg.solve(inverse[mine, mine], u[mine])
+        fit.u[at] = moved
+        kept.pop(cheapest)
+    return kept
+
+
+def _label(parts: Sequence[Candidate]) -> str:
+    """Names of effects, those at several places as ``effect@each of 3 joints``."""
+    names = []
+    for kind in dict.fromkeys(c.effect.name for c in parts):
+        mine = [c for c in parts if c.effect.name == kind]
+        where = "parts" if mine[0].effect.family == "body" else "joints"
+        names.append(mine[0].name if len(mine) == 1 else f"{kind}@each of {len(mine)} {where}")
+    return " + ".join(names)
+
+
+def _group(robot: Robot, c: Candidate) -> bool:
+    return bool(members_of(robot, c.target, c.effect.targets(robot)))
+
+
+def _apart(robot: Robot, current: Current, own: int) -> Current:
+    """The model with each shared effect of this kind taken apart into its members, with the values that they shared."""
+
+    parts: list[Candidate] = []
+    values: list[Array] = []
+    for k, (c, place) in enumerate(zip(current.parts, _places(current.parts), strict=True)):
+        u = current.u[place]
+        if k < own or not c.effect.everywhere or not _group(robot, c):
+            parts.append(c)
+            values.append(u)
+            continue
+        for target in members_of(robot, c.target, c.effect.targets(robot)):
+            member = candidate(robot, c.effect, target)
+            if member.name not in {p.name for p in (*parts, *current.parts)}:
+                parts.append(member)
+                values.append(np.clip(member.shares(c.values(u)), member.lower, member.upper))
+    return Current(tuple(parts), np.concatenate([*values, np.zeros(0)]))
+
+
+def _distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[Candidate]:
+    """Those whose mark shows, and is not that of another."""
+    few = list(few)
+    model = Model((*base.parts, *few))
+    start = np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
+    marks = slopes_at(search, model, start, 0.02)
+    size = np.linalg.norm(marks, axis=0)
+    shows = size > 1e-3 * max(float(size.max(initial=0.0)), 1e-12)
+    marks = marks / np.maximum(size, 1e-12)
+    places, kept = _places(model.parts), list(range(len(base.u)))
+    found = []
+    for c, place in zip(few, places[len(base.parts) :], strict=True):
+        mine = range(place.start, place.stop)
+        alike = np.abs(marks[:, kept].T @ marks[:, place]) if kept else np.zeros((1, c.size))
+        if shows[place].all() and float(alike.max(initial=0.0)) < TWIN:
+            found.append(c)
+            kept += mine
+    return found
+
+
+def _places(parts: Sequence[Candidate]) -> list[slice]:
+    edges = np.concatenate([[0], np.cumsum([c.size for c in parts])]).astype(int)
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
+
+
+def _values(u: Array, places: Sequence[slice], chosen: Sequence[int]) -> Array:
+    return np.concatenate([*(u[places[k]] for k in chosen), np.zeros(0)])

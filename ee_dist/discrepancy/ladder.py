@@ -1,0 +1,55 @@
+"""What improve gives: the steps of the ladder, and the model in the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ee_dist.discrepancy.evidence.intervals import ParameterReport
+from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.examine import Examined
+from ee_dist.discrepancy.search.candidates import Proposal
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.trials.log import Array
+
+
+@dataclass(eq=False)
+class Rung:
+    """A step of the ladder: the model with ``added`` (and without ``dropped``). ``held`` (segments,) is the held-out energy,
+    ``held_out`` what was held out."""
+
+    name: str
+    added: Hypothesis
+    terms: Hypothesis
+    error_fit: float
+    error_heldout: float
+    held: Array
+    held_out: str
+    interval: tuple[float, float] = (0.0, 0.0)
+    tied_with: list[str] = field(default_factory=list)
+    dropped: tuple[str, ...] = ()
+    alternatives: list[tuple[Proposal, Array]] = field(default_factory=list)
+    """What was tied with it, and the values that suited then."""
+
+
+@dataclass(eq=False)
+class Improvement:
+    """``terms``: the final model, fitted on all data. ``verdict``: ``explained`` (nothing is left above the noise),
+    ``better_not_explained``, ``unexplained`` (nothing could be added) or ``nothing_missing``; ``explained``: the share of the
+    squared error above the noise that the model takes off held-out data. ``last``: what was tried on top of it."""
+
+    verdict: str
+    explained: float
+    ladder: list[Rung]
+    terms: Hypothesis
+    parameters: list[ParameterReport]
+    base: Array
+    residual: Array
+    noise_floor: float
+    floor_source: str
+    left: list[Leftover]
+    stopped: str
+    last: Examined | None = None
+
+    def ties(self, step: int) -> list[str]:
+        """What the measurements do not tell from the effect that step ``step`` (from 1) of ``effect=auto`` added."""
+        return self.ladder[step].tied_with if 1 <= step < len(self.ladder) else []

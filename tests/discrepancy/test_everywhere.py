@@ -1,0 +1,143 @@
+"""A robot that is a little wrong everywhere, and one in which something stands out beside that."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.everywhere import everywhere, pruned
+from ee_dist.discrepancy.evidence.holdout import travelling, windows
+from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.problem import Layout, Problem, error
+from ee_dist.discrepancy.search.candidates import Candidate, candidate
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.robots.describe import load_robot
+
+ROWS, TRIALS, NOISE = 240, 3, 0.1
+PLAIN = ("coulomb_friction", "viscous_friction", "zero_offset", "command_gain", "part_mass")
+OTHER = ("backdrive_friction", "load_friction", "torque_limit", "motor_weak")
+
+
+class Curved(Problem):
+    """A linear mixture of what every effect does, then bent: no simulation, but values that stand in for one another."""
+
+    way = "curved"
+
+    def __init__(self, robot, truth: dict[str, float], seed: int = 0) -> None:
+        rng = np.random.default_rng(seed)
+        self.robot = robot
+        n = ROWS * TRIALS
+        self.marks = {name: rng.normal(size=n) + 2.0 * rng.normal() for name in (*PLAIN, *OTHER)}
+        common = rng.normal(size=n)
+        for name in PLAIN:
+            self.marks[name] = self.marks[name] + 2.0 * common
+        self.noise = NOISE * rng.normal(size=n)
+        self.truth = self._bent(truth)
+        segment = np.arange(n) // 40
+        self.measured = tuple(_Trial(f"t{k}", rng.normal(size=(ROWS, 1))) for k in range(TRIALS))
+        self.layout = Layout(
+            tuple(f"s{k}" for k in range(segment[-1] + 1)), np.arange(segment[-1] + 1) * 40 // ROWS, segment,
+            np.zeros(n, dtype=int), np.tile(np.arange(ROWS) * 0.01, TRIALS), np.ones(n, dtype=bool),
+            np.full(n, NOISE**2), np.zeros(n), ("x",), ("rad",), (0,),
+        )  # fmt: skip
+        self.error_definition = "root mean square"
+
+    def _bent(self, values: dict[str, float]) -> np.ndarray:
+        s = 3.0 * sum((v * self.marks[name] for name, v in values.items()), np.zeros(ROWS * TRIALS))
+        return s + 0.05 * s**2
+
+    def residuals(self, hypotheses, trials=None):
+        rows = []
+        for h in hypotheses:
+            values = {t.effect: float(candidate(self.robot, t.effect, t.target).shares(dict(t.values))[0]) for t in h}
+            rows.append(self.truth + self.noise - self._bent(values))
+        out = np.array(rows)
+        if trials is not None:
+            out = np.where(np.isin(self.trial_of, trials), out, 0.0)
+        return out
+
+    def noise_floor(self):
+        return NOISE, "stated"
+
+    def raw(self, residual):
+        return residual
+
+    def series(self, hypothesis: Hypothesis):
+        return []
+
+
+class _Trial:
+    setup = ()
+
+    def __init__(self, name: str, commands: np.ndarray) -> None:
+        self.name = name
+        self.log = type("Log", (), {"commands": commands, "joints": None})()
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot("servo_pendulum")[0]
+
+
+def pool_of(robot) -> list[Candidate]:
+    return [c for n in (*PLAIN, *OTHER) for c in [candidate(robot, n, "arm" if n == "part_mass" else "servo")]]
+
+
+def look(problem: Problem, pool: list[Candidate]):
+    cut = (travelling(problem) or [windows(problem)])[0]
+    return everywhere(Search(problem), Current(), 0, pool, cut)
+
+
+def names(found) -> set[str]:
+    return {c.effect.name for c in found.current.parts}
+
+
+def test_all_that_is_a_little_wrong_is_found_and_nothing_else(robot):
+    truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2, "zero_offset": -0.15, "part_mass": 0.12}
+    problem = Curved(robot, truth)
+    found = look(problem, pool_of(robot))
+    assert names(found) == set(truth)
+    values = {c.effect.name: u for c, u in zip(found.current.parts, found.current.u, strict=True)}
+    assert values == pytest.approx(truth, abs=0.02)
+    errors = [r.error_heldout for r in found.rungs]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 1.1 * NOISE
+    assert {t.effect for r in found.rungs for t in r.added} == set(truth)
+
+
+def test_what_stands_out_beside_it_is_found_too(robot):
+    truth = {"coulomb_friction": 0.1, "viscous_friction": 0.1, "zero_offset": -0.1, "backdrive_friction": 0.9}
+    found = improve(Curved(robot, truth), pool_of(robot))
+    assert {t.effect for t in found.terms} == set(truth)
+    assert found.ladder[-1].error_heldout < 1.2 * NOISE
+
+
+def test_an_untouched_robot_gets_nothing(robot):
+    assert look(Curved(robot, {}), pool_of(robot)) is None
+
+
+def test_the_models_own_terms_stay_and_useless_ones_go(robot):
+    problem, search = Curved(robot, {"viscous_friction": 0.2}), None
+    search = Search(problem)
+    few = [c for c in pool_of(robot) if c.effect.name in PLAIN[:3]]
+    fit = follow_valley(search, Model(tuple(few)), np.zeros(3), search.everything, 1.0)
+    kept = pruned(search, fit, 1, 20)
+    assert [c.effect.name for c in kept.parts] == ["coulomb_friction", "viscous_friction"]
+
+
+def test_a_valley_is_followed_within_bounds_and_on_the_trials_asked_for(robot):
+    truth = {"coulomb_friction": 0.3, "viscous_friction": 0.2, "zero_offset": -0.3}
+    problem = Curved(robot, truth)
+    search = Search(problem)
+    model = Model(tuple(c for c in pool_of(robot) if c.effect.name in truth))
+    mask = problem.trial_of != 2
+    fit = follow_valley(search, model, np.zeros(3), mask)
+    assert (fit.u >= model.lower).all() and (fit.u <= model.upper).all()
+    assert fit.slopes.shape == (int(mask.sum()), 3)
+    assert fit.residual[~mask].any()
+    assert error(fit.residual) < 1.1 * NOISE
+    assert fit.energy == pytest.approx(float((fit.residual[mask] ** 2).sum()))
