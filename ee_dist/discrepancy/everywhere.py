@@ -36,6 +36,8 @@ WIDTHS = (0.12, 0.3)
 """Finite differences to begin with: each leads down another side of a ridge, and which is right shows at the end."""
 FEWEST_TRIED, MOST_TRIED, VALUES_TRIED = 3, 12, 120
 """Effects that are tried one by one beside all that may be a little wrong, as far as ``VALUES_TRIED`` values in sum allow."""
+AGAIN = 0.03
+"""The same where the values are nearly right already."""
 ROUNDS = 3
 """How often terms are left out and the rest is fitted anew."""
 
@@ -48,14 +50,18 @@ class Everywhere:
     rungs: list[Rung]
 
 
-def everywhere(search: Search, current: Current, own: int, pool: Sequence[Candidate], cut: Cut) -> Everywhere | None:
-    """On top of the current model, whose first ``own`` parts stay. None where it does not earn its place on held-out data."""
+def everywhere(
+    search: Search, current: Current, own: int, pool: Sequence[Candidate], cuts: Sequence[Cut]
+) -> Everywhere | None:
+    """On top of the current model, whose first ``own`` parts stay. None where it does not earn its place on the data held out
+    in each of ``cuts``."""
     as_it_is = search.on(current.hypothesis).base()
-    without = as_it_is
+    without = [as_it_is for _ in cuts]
     if current.parts:
-        without = cross_fit(search, [(Model(current.parts), current.u)], cut)[0].residual
+        model = Model(current.parts)
+        without = [cross_fit(search, [(model, current.u)], cut)[0].residual for cut in cuts]
     calm = search.among(calm_trials(search.problem, as_it_is))
-    look = _Look(search, calm, own, tuple(pool), current, cut, without)
+    look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
     found = look.kept(current)
     if any(not c.effect.everywhere for c in current.parts[own:]):
         # What was added so far may stand in for what is wrong everywhere: then without it, unless that is worse.
@@ -68,24 +74,26 @@ def everywhere(search: Search, current: Current, own: int, pool: Sequence[Candid
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """A model that is worth its terms. ``held``: its energy on held-out data; ``ties``: what is as good as one of its effects."""
+    """A model that is worth its terms. ``held``: its energy on held-out data, under the cut that is the hardest for it;
+    ``ties``: what is as good as one of its effects."""
 
     model: Current
     held: float
+    cut: Cut
     ties: Mapping[str, list[str]]
 
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """``without`` (n,): held-out residual of the ``current`` model; ``calm``: the search on predictable trials."""
+    """``cuts``: what is held out, each with the held-out residual (n,) of the ``current`` model; ``calm``: the search on
+    predictable trials."""
 
     search: Search
     calm: Search
     own: int
     pool: tuple[Candidate, ...]
     current: Current
-    cut: Cut
-    without: Array
+    cuts: tuple[tuple[Cut, Array], ...]
 
     def luck(self, energy: float) -> float:
         """By how much held-out energy of about this size may differ for no reason."""
@@ -102,8 +110,7 @@ class _Look:
             return None
         model, u = Model((*base.parts, *few)), np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
         everything = self.calm.everything
-        fits = [follow_valley(self.calm, model, u, everything, PRIOR, width=width) for width in WIDTHS]
-        fit = min(fits, key=lambda f: f.energy)
+        (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=WIDTHS)
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
         return self._worth(fit, {}) or self._beside(model, u, fit)
 
@@ -115,11 +122,21 @@ class _Look:
         if not added:
             return None
         model = Model(kept.parts)
-        (held,) = cross_fit(self.search, [(model, kept.u)], self.cut)
         # Many small effects may each be below the resolution, and not all together.
-        noise = float(self.search.problem.floor.mean())
-        judged = judge(self.search.problem, self.without, held, Proposal(added), model, len(self.pool), noise)
-        return _Kept(kept, float(judged.held.sum()), ties) if judged.earned else None
+        problem, noise, worst, energy = (
+            self.search.problem,
+            float(self.search.problem.floor.mean()),
+            self.cuts[0][0],
+            0.0,
+        )
+        for cut, without in self.cuts:
+            (held,) = cross_fit(self.search, [(model, kept.u)], cut)
+            judged = judge(problem, without, held, Proposal(added), model, len(self.pool), noise)
+            if not judged.earned:
+                return None
+            if float(judged.held.sum()) > energy:
+                worst, energy = cut, float(judged.held.sum())
+        return _Kept(kept, energy, worst, ties)
 
     def _beside(self, model: Model, start: Array, alone: Fit) -> _Kept | None:
         """The model with one more effect, of those that promise most on top of its fit ``alone``."""
@@ -127,13 +144,13 @@ class _Look:
         refit = Refit(slopes_at(search, alone.model, alone.u))
         screened = screen(search.on(alone.hypothesis), self._others(model), refit=refit)
         few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
-        fits = []
+        starts = []
         for s in few[: max(FEWEST_TRIED, min(MOST_TRIED, VALUES_TRIED // max(len(start), 1)))]:
             more = s.starts[0] if s.candidate.size > 1 else np.zeros(s.candidate.size)
-            both, u = Model((*model.parts, s.candidate)), np.concatenate([start, more])
-            fits.append(follow_valley(search, both, u, search.everything, PRIOR))
-        if not fits:
+            starts.append((Model((*model.parts, s.candidate)), np.concatenate([start, more])))
+        if not starts:
             return None
+        fits = follow_valley(search, starts, search.everything, PRIOR)
         best = min(fits, key=lambda f: f.energy)
         noise = max(float(search.problem.floor.mean()), best.energy / len(best.residual))
         ties = [f.model.parts[-1].name for f in fits if f is not best and f.energy - best.energy < TIE_ENERGY * noise]
@@ -160,7 +177,7 @@ class _Look:
             )
             model = Model(tuple(kept.parts[k] for k in chosen))
             start = _values(kept.u, places, chosen)
-            (held,) = cross_fit(search, [(model, start)], self.cut)
+            (held,) = cross_fit(search, [(model, start)], found.cut)
             now = float(held.residual @ held.residual)
             if now >= energy and kind != order[-1]:
                 continue
@@ -174,7 +191,7 @@ class _Look:
                     float(np.sqrt(held.seen)),
                     error(held.residual),
                     per_segment(problem, held.residual),
-                    self.cut.name,
+                    found.cut.name,
                     tied_with=[t for k in mine for t in found.ties.get(kept.parts[k].name, [])],
                     dropped=() if rungs else gone,
                 )
@@ -206,7 +223,7 @@ def pruned(search: Search, fit: Fit, own: int, tried: int, newest: int = 0) -> C
         places = _places(fit.model.parts)
         model = Model(tuple(fit.model.parts[k] for k in keep))
         start = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
-        fit = follow_valley(search, model, start, fit.mask, PRIOR, width=0.03)
+        (fit,) = follow_valley(search, [(model, start)], fit.mask, PRIOR, widths=(AGAIN,))
     return Current(fit.model.parts, fit.u)
 
 

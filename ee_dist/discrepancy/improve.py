@@ -32,8 +32,8 @@ from ee_dist.discrepancy.search.valley import LARGE, follow_valley
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
-FEW = 2
-"""Effects that the search may add before it looks whether much is a little wrong everywhere."""
+FEW = 1
+"""Effects that the search adds before it looks whether much is a little wrong everywhere, if the next one does not do."""
 EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
 MOST = 24
@@ -79,7 +79,8 @@ def improve(
             last = _examined(search, current, [c for c in pool if c.name not in names], effort)
             best = last.best
             if len(current.parts) != looked and _many(problem, last, len(current.parts) - own, spread):
-                found = everywhere(search, current, own, pool, _cut(problem))
+                cuts = travelling(problem) or [windows(problem)]
+                found = everywhere(search, current, own, pool, cuts)
                 looked = len(current.parts)
                 if found is not None:
                     current, looked, spread = found.current, len(found.current.parts), True
@@ -203,7 +204,8 @@ def _pruned(
     if not old:
         return current, ()
     if len(current.u) >= LARGE:
-        fit = follow_valley(search, Model(current.parts), current.u, search.everything, PRIOR, 1, WIDTHS[-1])
+        start = [(Model(current.parts), current.u)]
+        (fit,) = follow_valley(search, start, search.everything, PRIOR, 1, WIDTHS[-1:])
         kept = pruned(search, fit, own, tried, added)
         names = {c.name for c in kept.parts}
         return kept, tuple(c.name for c in current.parts if c.name not in names)

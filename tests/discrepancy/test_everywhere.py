@@ -88,8 +88,7 @@ def pool_of(robot) -> list[Candidate]:
 
 
 def look(problem: Problem, pool: list[Candidate]):
-    cut = (travelling(problem) or [windows(problem)])[0]
-    return everywhere(Search(problem), Current(), 0, pool, cut)
+    return everywhere(Search(problem), Current(), 0, pool, travelling(problem) or [windows(problem)])
 
 
 def names(found) -> set[str]:
@@ -124,7 +123,7 @@ def test_the_models_own_terms_stay_and_useless_ones_go(robot):
     problem, search = Curved(robot, {"viscous_friction": 0.2}), None
     search = Search(problem)
     few = [c for c in pool_of(robot) if c.effect.name in PLAIN[:3]]
-    fit = follow_valley(search, Model(tuple(few)), np.zeros(3), search.everything, 1.0)
+    (fit,) = follow_valley(search, [(Model(tuple(few)), np.zeros(3))], search.everything, 1.0)
     kept = pruned(search, fit, 1, 20)
     assert [c.effect.name for c in kept.parts] == ["coulomb_friction", "viscous_friction"]
 
@@ -135,7 +134,7 @@ def test_a_valley_is_followed_within_bounds_and_on_the_trials_asked_for(robot):
     search = Search(problem)
     model = Model(tuple(c for c in pool_of(robot) if c.effect.name in truth))
     mask = problem.trial_of != 2
-    fit = follow_valley(search, model, np.zeros(3), mask)
+    (fit,) = follow_valley(search, [(model, np.zeros(3))], mask)
     assert (fit.u >= model.lower).all() and (fit.u <= model.upper).all()
     assert fit.slopes.shape == (int(mask.sum()), 3)
     assert fit.residual[~mask].any()

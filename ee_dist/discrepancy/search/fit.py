@@ -31,18 +31,16 @@ def fit_all(
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given. ``leading``: known
     slopes of the first values (see slopes.py); where the error is rugged none are of use. Models of many values are
-    fitted one by one (see valley.py)."""
+    fitted by valley.py."""
     chosen = search.everything if mask is None else mask
-    many = [leading is None and len(u) >= LARGE for _, u in starts]
-    if any(many):
-        few = [pair for pair, large in zip(starts, many, strict=True) if not large]
-        rest = iter(fit_all(search, few, mask, widths, prior) if few else ())
-        return [
-            follow_valley(search, m, u, chosen, prior, ITERATIONS if len(widths) > 2 else SHORT, widths[0])
-            if large
-            else next(rest)
-            for (m, u), large in zip(starts, many, strict=True)
-        ]
+    large = [i for i, (_, u) in enumerate(starts) if leading is None and len(u) >= LARGE]
+    if large:
+        small = [i for i in range(len(starts)) if i not in large]
+        found = dict(zip(small, fit_all(search, [starts[i] for i in small], mask, widths, prior), strict=True))
+        count = ITERATIONS if len(widths) > 2 else SHORT
+        fits = follow_valley(search, [starts[i] for i in large], chosen, prior, count, widths[:1])
+        found |= dict(zip(large, fits, strict=True))
+        return [found[i] for i in range(len(starts))]
     if not search.problem.rugged:
         return follow_slopes(search, starts, chosen, widths, prior, leading)
     return _rugged(search, starts, chosen, len(widths), prior)

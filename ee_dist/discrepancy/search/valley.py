@@ -8,6 +8,9 @@ softened (``Problem.smooth``) and weighed as the energy weighs it, which is how 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from ee_dist.discrepancy.problem import Mask
@@ -26,79 +29,129 @@ GAIN = 0.005
 """Share of the energy that an iteration must take off, or else slopes are taken narrower; at the narrowest it ends."""
 
 
+@dataclass(eq=False)
+class _Run:
+    model: Model
+    u: Array
+    width: float
+    residual: Array
+    energy: float = np.inf
+    damping: float = 1e-3
+    slopes: Array | None = None
+    weighed: Array | None = None
+    """The smooth residual where it is fitted, weighed."""
+    done: bool = False
+
+
 def follow_valley(
     search: Search,
-    model: Model,
-    start: Array,
+    starts: Sequence[tuple[Model, Array]],
     mask: Mask,
     prior: float = 0.0,
     iterations: int = ITERATIONS,
-    width: float = WIDEST,
-) -> Fit:
-    """The best values from a start (P,) on the residual values of ``mask`` (n,). ``prior`` as in slopes.py; ``slopes`` of the
-    result are those of the smooth residual, weighed."""
+    widths: Sequence[float] = (WIDEST,),
+) -> list[Fit]:
+    """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given, all in step: the best
+    of a descent from each of ``widths``. ``prior`` as in slopes.py; ``slopes`` of the results are those of the smooth residual,
+    weighed."""
     whole, problem = search, search.problem
     needed = np.unique(problem.trial_of[mask]).tolist()
     search = search.among(needed if search.trials is None else [k for k in search.trials if k in set(needed)])
-    u = np.clip(np.asarray(start, float), model.lower, model.upper)
-    (r,) = search.residuals([model.hypothesis(u)])
-    energy, damping, slopes = _cost(r, u, mask, prior), 1e-3, np.zeros((int(mask.sum()), len(u)))
-    for step in range(iterations if len(u) else 0):
-        if not np.isfinite(energy):
-            u = 0.5 * u
-            (r,) = search.residuals([model.hypothesis(u)])
-            energy = _cost(r, u, mask, prior)
-            continue
-        slopes, weight, smooth = _slopes(search, model, u, r, width, mask)
-        points = [(d, _step(slopes, weight * smooth, u, model, prior, d)) for d in damping * np.array(DAMPINGS)]
-        rows = search.residuals([model.hypothesis(v) for _, v in points])
-        costs = [_cost(row, v, mask, prior) for row, (_, v) in zip(rows, points, strict=True)]
-        best, before = int(np.argmin(costs)), energy
-        if costs[best] < energy:
-            energy, damping, u, r = costs[best], max(float(points[best][0]), 1e-7), points[best][1], rows[best]
-        else:
-            damping = min(100.0 * damping, 1e6)
+    points = [np.clip(np.asarray(u, float), m.lower, m.upper) for m, u in starts]
+    rows = search.residuals([m.hypothesis(u) for (m, _), u in zip(starts, points, strict=True)])
+    runs = [
+        _Run(m, u, width, r, _cost(r, u, mask, prior), done=not len(u))
+        for (m, _), u, r in zip(starts, points, rows, strict=True)
+        for width in widths
+    ]
+    for step in range(iterations):
+        moving = [run for run in runs if not run.done]
+        if not moving:
+            break
+        _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
+        moving = [run for run in moving if np.isfinite(run.energy)]
+        _slopes(moving, search, mask)
+        _steps(moving, search, mask, prior, step)
         search.progress("fitting all together", (step + 1) / iterations)
-        if before - energy < GAIN * before:
-            if width <= NARROWEST:
-                break
-            width = max(0.5 * width, NARROWEST)
-        elif step % 2:
-            width = max(0.7 * width, NARROWEST)
-    residual = r
+    best = [min(runs[k : k + len(widths)], key=lambda r: r.energy) for k in range(0, len(runs), len(widths))]
+    rows = np.array([run.residual for run in best])
     if len(needed) < len(problem.trials):
-        (residual,) = whole.residuals([model.hypothesis(u)])
-    return Fit(model, u, energy - prior * float(u @ u), residual, slopes, mask)
+        rows = whole.residuals([run.model.hypothesis(run.u) for run in best])
+    empty = int(mask.sum())
+    return [
+        Fit(
+            run.model,
+            run.u,
+            run.energy - prior * float(run.u @ run.u),
+            row,
+            np.zeros((empty, len(run.u))) if run.slopes is None else run.slopes,
+            mask,
+        )
+        for run, row in zip(best, rows, strict=True)
+    ]
+
+
+def _from_nowhere(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> None:
+    """No slope where nothing can be simulated: nearer to neutral."""
+    for run in runs:
+        run.u = 0.5 * run.u
+    for run, r in zip(runs, search.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
+        run.residual, run.energy = r, _cost(r, run.u, mask, prior)
+
+
+def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
+    """Weighed derivatives (n, P) of the smooth residual where the mask is."""
+    points = []
+    for run in runs:
+        for k in range(len(run.u)):
+            h = min(run.width, 0.3 * abs(run.u[k]) + 0.2 * run.width)
+            v = run.u.copy()
+            v[k] += h if run.u[k] + h <= run.model.upper[k] else -h
+            points.append((run, v))
+    rows = iter(search.residuals([run.model.hypothesis(v) for run, v in points]))
+    smooth_of, at = search.problem.smooth, 0
+    for run in runs:
+        here = run.residual[mask]
+        smooth = smooth_of(run.residual)[mask]
+        weight = np.minimum(np.abs(here) / np.maximum(np.abs(smooth), 1e-12), 1.0)
+        columns = []
+        for k in range(len(run.u)):
+            row, gap = next(rows), points[at][1][k] - run.u[k]
+            at += 1
+            usable = np.isfinite(row).all()
+            columns.append(weight * (smooth_of(row)[mask] - smooth) / gap if usable else np.zeros(len(smooth)))
+        run.slopes, run.weighed = np.stack(columns, axis=1), weight * smooth
+
+
+def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step: int) -> None:
+    points = [(run, d, _step(run, prior, d)) for run in runs for d in run.damping * np.array(DAMPINGS)]
+    rows = search.residuals([run.model.hypothesis(v) for run, _, v in points])
+    count = len(DAMPINGS)
+    for k, run in enumerate(runs):
+        mine = range(k * count, (k + 1) * count)
+        costs = [_cost(rows[i], points[i][2], mask, prior) for i in mine]
+        best, before = int(np.argmin(costs)), run.energy
+        if costs[best] < run.energy:
+            _, damping, run.u = points[mine[best]]
+            run.energy, run.residual, run.damping = costs[best], rows[mine[best]], max(float(damping), 1e-7)
+        else:
+            run.damping = min(100.0 * run.damping, 1e6)
+        if before - run.energy < GAIN * before:
+            run.done = run.width <= NARROWEST
+            run.width = max(0.5 * run.width, NARROWEST)
+        elif step % 2:
+            run.width = max(0.7 * run.width, NARROWEST)
 
 
 def _cost(r: Array, u: Array, mask: Mask, prior: float) -> float:
     return float(r[mask] @ r[mask]) + prior * float(u @ u) if np.isfinite(r).all() else float("inf")
 
 
-def _slopes(search: Search, model: Model, u: Array, r: Array, width: float, mask: Mask) -> tuple[Array, Array, Array]:
-    """(n, P) weighed derivatives of the smooth residual, the weights (n,), and the smooth residual (n,), where the mask is."""
-    points = []
-    for k in range(len(u)):
-        h = min(width, 0.3 * abs(u[k]) + 0.2 * width)
-        v = u.copy()
-        v[k] += h if u[k] + h <= model.upper[k] else -h
-        points.append(v)
-    rows = search.residuals([model.hypothesis(v) for v in points])
-    problem = search.problem
-    smooth = problem.smooth(r)[mask]
-    weight = np.minimum(np.abs(r[mask]) / np.maximum(np.abs(smooth), 1e-12), 1.0)
-    columns = [
-        weight * (problem.smooth(row)[mask] - smooth) / (v[k] - u[k])
-        if np.isfinite(row).all()
-        else np.zeros(len(smooth))
-        for k, (row, v) in enumerate(zip(rows, points, strict=True))
-    ]
-    return np.stack(columns, axis=1), weight, smooth
-
-
-def _step(slopes: Array, residual: Array, u: Array, model: Model, prior: float, damping: float) -> Array:
+def _step(run: _Run, prior: float, damping: float) -> Array:
     """Where a damped Gauss-Newton step leads, values that it would push out of their bounds held there."""
-    normal, down = slopes.T @ slopes, -(slopes.T @ residual) - prior * u
+    assert run.slopes is not None and run.weighed is not None
+    u, model = run.u, run.model
+    normal, down = run.slopes.T @ run.slopes, -(run.slopes.T @ run.weighed) - prior * u
     scale = np.diag(normal)
     scale = np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-12))
     system = normal + prior * np.eye(len(u)) + damping * np.diag(scale)
