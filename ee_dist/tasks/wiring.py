@@ -13,7 +13,6 @@ from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import JournaledEvaluator
-from ee_dist.evaluation.ray_actors import RayEvaluator
 from ee_dist.evaluation.ray_session import stop_ray
 from ee_dist.evaluation.recent import RecentEvaluator
 from ee_dist.evaluation.serial import SerialEvaluator
@@ -109,6 +108,9 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
         if name == "serial":
             inner = SerialEvaluator(engine_maker(config, True, engine)(), settings.chunk or chunk)
         else:
+            # Ray takes a second to load: a run without it does not wait.
+            from ee_dist.evaluation.ray_actors import RayEvaluator
+
             inner = RayEvaluator(
                 engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address
             )
