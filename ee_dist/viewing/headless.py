@@ -21,6 +21,10 @@ LAY_OUT_S = 4.0
 LOAD_S = 60.0
 BEGINNING = b"RRF"
 """What every recording of rerun begins with; one digit follows, its format."""
+REST_S = 15.0
+"""Time in which a picture must come to rest,"""
+FEWEST = 12
+"""and pictures that it has for that at least: a busy machine takes seconds for each."""
 GREETING_S = 4.0
 """For so long after its start the viewer lays a note over the picture that it runs without a screen."""
 
@@ -140,28 +144,27 @@ class HeadlessViewer:
         """Stop at a time of a timeline."""
         self.client.set_time(timeline, duration=time_s, play_state="paused")
 
-    def settled_picture(self, view: str | None = None, limit_s: float = 15.0) -> bytes:
+    def settled_picture(self, view: str | None = None) -> bytes:
         """A PNG of the window, or of one view, taken until two in a row agree: nothing is still loading or moving."""
         view_id = None if view is None else self._view_id(view)
-        last = b""
-        deadline = time.monotonic() + limit_s
-        laid_out = time.monotonic() + LAY_OUT_S
-        while time.monotonic() < deadline:
+        last, taken = b"", 0
+        began = time.monotonic()
+        while taken < FEWEST or time.monotonic() < began + REST_S:
             try:
                 png = self.client.take_screenshot(view_id)
             except ConnectionError as error:
                 if view is None:
                     raise ViewerError(f"the viewer gave no picture: {error}") from error
-                if time.monotonic() < laid_out:
+                if time.monotonic() < began + LAY_OUT_S:
                     # A view that the blueprint has is drawn a little later on a busy machine.
                     time.sleep(0.1)
                     continue
                 raise ViewerError(f"the view {view!r} is not on the screen: it lies behind another tab") from error
             if png == last and time.monotonic() > self._started + GREETING_S:
                 return png
-            last = png
+            last, taken = png, taken + 1
             time.sleep(0.1)
-        raise ViewerError(f"the picture did not come to rest in {limit_s:g} s")
+        raise ViewerError(f"the picture did not come to rest in {time.monotonic() - began:.0f} s")
 
     def _view_id(self, name: str) -> str:
         views = self.state.views
