@@ -2,7 +2,7 @@
 
 Each robot is measured with something hidden, compared, explained and improved. Runs that are there already in OUT are
 looked at as they are; ``--docs`` puts the best pictures into docs/figures. Ends with status 1 if a page or a view complains,
-a page asks for anything outside or is wider than its window. Some ten minutes on two cores.
+a page asks for anything outside or is wider than its window, or a scene cannot be shown. Some ten minutes on two cores.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 
 from ee_dist.viewing.browser import BrowserError, HeadlessBrowser
@@ -69,20 +70,24 @@ def story(name: str, out: Path) -> list[Path]:
 
 def pages(window: HeadlessBrowser, folder: Path) -> Iterator[Shot]:
     """A report narrow and wide, light and dark."""
-    for width in WIDTHS:
-        for dark in (False, True):
-            seen = window.look(folder / "report.html", width, dark=dark, height=TALL)
-            wider = [f"{seen.overflow} pixels wider than the window"] if seen.overflow else []
-            wrong = [*seen.complaints, *(f"asks for {a}" for a in seen.asked), *wider]
-            yield f"{folder.parent.name}_{folder.name}_{width}_{'dark' if dark else 'light'}.png", seen.png, wrong
+    for width, dark in product(WIDTHS, (False, True)):
+        name = f"{folder.parent.name}_{folder.name}_{width}_{'dark' if dark else 'light'}.png"
+        seen = window.look(folder / "report.html", width, dark=dark, height=TALL)
+        wider = [f"{seen.overflow} pixels wider than the window"] if seen.overflow else []
+        yield name, seen.png, [*seen.complaints, *(f"asks for {a}" for a in seen.asked), *wider]
 
 
 def scene(folder: Path) -> Iterator[Shot]:
     """A rerun recording narrow and wide, as its own viewer shows it: that is dark."""
     (recording,) = folder.glob("*.rrd")
     for width in WIDTHS:
-        (seen,) = take_pictures(recording, [0.0], size=(width, TALL))
-        yield f"{folder.parent.name}_{folder.name}_{width}_scene.png", seen.png, seen.reports
+        name = f"{folder.parent.name}_{folder.name}_{width}_scene.png"
+        try:
+            (seen,) = take_pictures(recording, [0.0], size=(width, TALL))
+        except ViewerError as error:
+            yield name, b"", [str(error)]
+        else:
+            yield name, seen.png, seen.reports
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -101,12 +106,13 @@ def main(arguments: list[str] | None = None) -> int:
                 for folder in story(name, options.out.resolve()):
                     report = pages(window, folder) if (folder / "report.html").is_file() else ()
                     for label, png, wrong in (*report, *scene(folder)):
-                        (options.out / label).write_bytes(png)
+                        if png:
+                            (options.out / label).write_bytes(png)
                         print(label, *wrong, sep="\n  ", flush=True)
                         faults += len(wrong)
                         if options.docs and label in IN_DOCS and len(png) < MOST_BYTES:
                             (ROOT / "docs" / "figures" / IN_DOCS[label]).write_bytes(png)
-    except (BrowserError, ViewerError) as error:
+    except BrowserError as error:
         print(f"no pictures: {error}", file=sys.stderr)
         return 1
     return 1 if faults else 0

@@ -16,6 +16,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from ee_dist.viewing.processes import gone
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 ANSWER_S = 300.0
 SWITCHES = (
@@ -185,10 +187,6 @@ class HeadlessBrowser:
     def _end(self) -> None:
         # Without anybody to listen to, Chromium ends itself and its children.
         os.close(self._to)
-        try:
-            self._process.wait(timeout=5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        gone(self._process, 5.0)
         os.close(self._from)
         self._profile.cleanup()

@@ -9,11 +9,17 @@ import socket
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, Self, TypeVar
 
 from rerun.experimental import ViewerClient, ViewerState
+
+from ee_dist.viewing.processes import gone
+
+Answer = TypeVar("Answer")
 
 START_S = 30.0
 LAY_OUT_S = 4.0
@@ -114,15 +120,17 @@ class HeadlessViewer:
     def open(self, path: str | Path) -> None:
         """Load a recording and wait until all of it is there. Raises ViewerError."""
         file = check_recording(path)
-        self.client.open(str(file))
+        with suppress(TimeoutError):  # It was told: whether it loads is seen below.
+            self.client.open(str(file))
         deadline = time.monotonic() + LOAD_S
         while time.monotonic() < deadline:
-            state = self.client.get_state()
-            if state.recordings and not state.loading:
-                return
-            failed = [entry.message for entry in self.client.get_logs() if entry.level == "ERROR"]
-            if failed:
-                raise ViewerError(f"the viewer cannot read {path}: {failed[0].splitlines()[0]}")
+            with suppress(TimeoutError):
+                state = self.client.get_state()
+                if state.recordings and not state.loading:
+                    return
+                failed = [entry.message for entry in self.client.get_logs() if entry.level == "ERROR"]
+                if failed:
+                    raise ViewerError(f"the viewer cannot read {path}: {failed[0].splitlines()[0]}")
             time.sleep(0.05)
         raise ViewerError(f"the viewer did not finish loading {path} in {LOAD_S:g} s")
 
@@ -134,15 +142,16 @@ class HeadlessViewer:
 
     @property
     def state(self) -> ViewerState:
-        return self.client.get_state()
+        return _patient(self.client.get_state)
 
     def hide_menu(self) -> None:
         """Take the menu and its warnings off the picture."""
-        self.client.run_command("ui.toggle_top_panel")
+        with suppress(TimeoutError):  # It was told; told twice, the menu would be back.
+            self.client.run_command("ui.toggle_top_panel")
 
     def go_to(self, timeline: str, time_s: float) -> None:
         """Stop at a time of a timeline."""
-        self.client.set_time(timeline, duration=time_s, play_state="paused")
+        _patient(lambda: self.client.set_time(timeline, duration=time_s, play_state="paused"))
 
     def settled_picture(self, view: str | None = None) -> bytes:
         """A PNG of the window, or of one view, taken until two in a row agree: nothing is still loading or moving."""
@@ -151,7 +160,7 @@ class HeadlessViewer:
         began = time.monotonic()
         while taken < FEWEST or time.monotonic() < began + REST_S:
             try:
-                png = self.client.take_screenshot(view_id)
+                png = _patient(lambda: self.client.take_screenshot(view_id))
             except ConnectionError as error:
                 if view is None:
                     raise ViewerError(f"the viewer gave no picture: {error}") from error
@@ -200,14 +209,21 @@ class HeadlessViewer:
         process, self._process = self._process, None
         if process is not None and process.poll() is None:
             process.terminate()
-            try:
-                process.wait(timeout=3.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            gone(process, 3.0)
         if self._output is not None:
             self._output.close()
             self._output = None
+
+
+def _patient(ask: Callable[[], Answer]) -> Answer:
+    """What the viewer answers: on a busy machine the client gives up sooner than it. Raises ViewerError."""
+    deadline = time.monotonic() + LOAD_S
+    while True:
+        try:
+            return ask()
+        except TimeoutError as error:
+            if time.monotonic() > deadline:
+                raise ViewerError(f"the viewer did not answer in {LOAD_S:g} s") from error
 
 
 def _free_port() -> int:

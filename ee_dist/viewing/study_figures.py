@@ -63,40 +63,48 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
     room = ROOM * ((high - low) or 1.0)
     said = [(i, tests[metric, c]) for i, c in enumerate(cases) if tests.get((metric, c))]
     for i, told in said:
-        figure.add_annotation(x=i, y=high + room / 2, text=told, showarrow=False)
+        figure.add_annotation(x=i, y=high + room / 5, yanchor="bottom", text=told, showarrow=False)
     styled(figure, 430)
     full = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}") for c in cases]
     # On a narrow page a case has room for its number alone, and what the test says stands upright.
     short = [str(c) for c in cases] if len(cases) > 3 else full
     upright = -90 if len(cases) > 3 else 0
+    least = low - (room if low < 0 else 0.0)
+    wide_range, narrow_range = [least, high + room], [least, high + (2.5 if upright else 1.0) * room]
     figure.update_layout(
         barmode="overlay",
         hovermode="closest",
         meta={
-            "narrow": {"xaxis.ticktext": short, **{f"annotations[{k}].textangle": upright for k in range(len(said))}},
-            "wide": {"xaxis.ticktext": full, **{f"annotations[{k}].textangle": 0 for k in range(len(said))}},
+            "narrow": {"xaxis.ticktext": short, "yaxis.range": narrow_range, **_turned(len(said), upright)},
+            "wide": {"xaxis.ticktext": full, "yaxis.range": wide_range, **_turned(len(said), 0)},
         },
     )
     figure.update_xaxes(
         tickmode="array", tickvals=list(range(len(cases))), ticktext=full, tickangle=0, automargin=True, showgrid=False
     )
-    figure.update_yaxes(title_text="distance (m)", range=[low - (room if low < 0 else 0.0), high + room])
+    figure.update_yaxes(title_text="distance (m)", range=wide_range)
     return figure
+
+
+def _turned(count: int, angle: int) -> dict[str, object]:
+    """Angle of what is written above the bars, in degrees."""
+    return {f"annotations[{k}].textangle": angle for k in range(count)}
 
 
 def dominants(summaries: Sequence[dict[str, Any]]) -> go.Figure:
     """New bests found so far in the diagnosis passes, mean over passes and runs, for each metric."""
-    figure = go.Figure()
+    figure, longest = go.Figure(), 0
     for k, metric in enumerate(sorted({s["metric"] for s in summaries})):
         curves = [c for s in summaries if s["metric"] == metric for c in s["dominants"]["diagnosis"]]
         shortest = min(map(len, curves))
         mean = np.mean([c[:shortest] for c in curves], axis=0)
+        longest = max(longest, shortest)
         name = METRICS.get(metric, metric)
         line = {"color": LINES[k % len(LINES)], "width": 2}
         figure.add_scatter(x=list(range(shortest)), y=[float(v) for v in mean], name=name, mode="lines", line=line)
     styled(figure, 330)
     figure.update_layout(showlegend=True)
-    figure.update_xaxes(title_text="generation", rangemode="tozero", tickformat="d")
+    figure.update_xaxes(title_text="generation", rangemode="tozero", dtick=1 if longest < 10 else None)
     figure.update_yaxes(title_text="new bests so far", rangemode="tozero")
     return figure
 

@@ -137,9 +137,11 @@ def _sure(lines: Rows) -> str:
     tested = [x for x in lines if math.isfinite(x["p_corrected"])]
     if not tested:
         return "How sure: one run for each case, which is no test; more seeds are (seed=0,1,2,...)."
+    what = "case" if len({x["metric"] for x in tested}) == 1 else "pair"
+    of = "" if what == "case" else " of case and metric"
     clear = sum(x["p_corrected"] < SURE and x["last_m"] > x["after_m"] for x in tested)
     told = (
-        f"How sure: in {clear} of {_count(len(tested), 'case')} the last trial goes farther than the one after the change by "
+        f"How sure: in {clear} of {_count(len(tested), what)}{of} the last trial goes farther than the one after the change by "
         f"more than luck (p < {SURE:g}, Mann-Whitney U test, corrected)"
     )
     fewest = min(x["runs"] for x in tested)
