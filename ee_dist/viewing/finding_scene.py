@@ -70,10 +70,10 @@ def write_explain_rrd(found: Finding, path: str | Path) -> None:
     stage = _stage(found, [(GIVEN, found.model, palette.PREDICTED), *accounts])
     text = [*finding_text.colours(found), *finding_text.candidate_table(found.candidates)]
     tabs: list[rrb.View | rrb.Container] = []
-    for k, c in enumerate(tried):
+    for k in range(len(tried)):
         models = [m for m in stage.models if m.key in (GIVEN, _key(k))]
         plots = _worst_plots(stage, models, around=True)
-        tabs.append(_grid(plots, f"{k + 1}. {c.label.split(' (')[0]}"))
+        tabs.append(_grid(plots, f"{k + 1}. {models[-1].label}"))
     given = _grid(_worst_plots(stage, stage.models[:1], around=True), "The model")
     parts = rrb.Tabs(*tabs, given, active_tab=0)
     _write(stage, path, "explain", text, parts)

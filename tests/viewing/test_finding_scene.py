@@ -56,7 +56,9 @@ def test_compare_has_its_channels_worst_first_and_plays_where_the_error_is_large
     (selected,) = selection(tmp_path / "scene.rrd")
     assert selected[0] <= middle <= selected[1]
     seconds = f.cases[k].measured.times_s
-    assert start <= selected[0] and selected[1] <= start + float(seconds[-1] + seconds[1]) + 1e-6, "not beyond the trial"
+    assert start <= selected[0] and selected[1] <= start + float(seconds[-1] + seconds[1]) + 1e-6, (
+        "not beyond the trial"
+    )
     assert 1.0 <= selected[1] - selected[0] <= 2.01
 
 
