@@ -25,6 +25,8 @@ TWINS = 2
 """Others that a headline names beside the one that was found,"""
 FEW = 4
 """and the line below it, where there are more."""
+MOSTLY = 0.97
+"""Share of what is above the noise from which nobody asks for the rest."""
 CLOSE = 1.1
 """Times the noise floor up to which a model is nearly right."""
 GRANTED = "What is above the floor is no more than chance, and what contacts and reversals leave that come a row early or late."
@@ -195,7 +197,8 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         head = f"Missing{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best)}."
         head += f" {NOTHING_ELSE}" if not found.left else " More than noise is left with it."
         error = _errors(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
-        sure = f"How sure: it takes off {confidence(best)}; {_rivals(found.tried, best.tied_with)}."
+        sure = f"How sure: it takes off {confidence(best)}{_rest(best.explained, not found.left)}"
+        sure += f"; {_rivals(found.tried, best.tied_with)}."
         lines.append(entry.physics)
         lines.append(f"Its mark in a residual: {entry.signature}")
         if best.tied_with:
@@ -243,6 +246,11 @@ def _errors(problem: Problem, before: float, after: float, floor: float, held_ou
         f"{_error(problem)}: model {problem.told(before)}, improved model {problem.told(after)} held out "
         f"({held_out}), noise floor {problem.told(floor)}."
     )
+
+
+def _rest(explained: float, settled: bool) -> str:
+    """A word on what is above the noise still, where nothing is said to be left."""
+    return "; what it leaves of that stands out nowhere" if settled and explained < MOSTLY else ""
 
 
 def _rivals(tried: int, tied: Sequence[str]) -> str:
@@ -317,7 +325,8 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {last.held_out}"
         head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
-        sure = f"How sure: {share}, judged on {last.held_out}{_ranges(found, new, robot)}{_told_from(steps)}."
+        sure = f"How sure: {share}, judged on {last.held_out}{_rest(found.explained, settled)}"
+        sure += f"{_ranges(found, new, robot)}{_told_from(steps)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     return Account(head, error, sure, tuple(lines), settled, advice)
 

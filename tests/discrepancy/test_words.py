@@ -18,10 +18,10 @@ from ee_dist.tasks.improve import effects_of
 from ee_dist.tasks.results.tables import typed
 
 
-def account(tied: list[str]) -> Account:
+def account(tied: list[str], explained: float = 1.0) -> Account:
     best = SimpleNamespace(
         terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
-        explained=1.0, held_out="windows", error_heldout=1.1,
+        explained=explained, held_out="windows", error_heldout=1.1,
     )  # fmt: skip
     found = SimpleNamespace(
         best=best,
@@ -48,6 +48,11 @@ def account(tied: list[str]) -> Account:
 )
 def test_what_looks_the_same_is_named(tied: list[str], said: str) -> None:
     assert said in account(tied).headline
+
+
+def test_a_rest_above_the_noise_is_no_contradiction_where_nothing_is_left() -> None:
+    assert "; what it leaves of that stands out nowhere; of 9" in account([], 0.66).sure
+    assert "leaves" not in account([], 0.99).sure
 
 
 def test_more_twins_than_a_headline_holds_are_named_below_it() -> None:
