@@ -27,6 +27,9 @@ SWITCHES = (
     "--hide-scrollbars",
     "--no-first-run",
     "--disable-background-networking",
+    "--disable-background-timer-throttling",
+    "--disable-backgrounding-occluded-windows",
+    "--disable-renderer-backgrounding",
     "--disable-component-update",
     "--disable-sync",
     "--disable-dev-shm-usage",
@@ -111,7 +114,8 @@ class HeadlessBrowser:
         # Every part is opened and comes into sight once, so that whatever can go wrong in drawing it does.
         self.evaluate(
             "(async () => { const open = [...document.querySelectorAll('details:not([open])')];"
-            "const frame = () => new Promise((done) => requestAnimationFrame(done));"
+            # On a busy machine a frame may never come.
+            "const frame = () => new Promise((done) => { requestAnimationFrame(done); setTimeout(done, 1000); });"
             "const rest = async () => { await frame(); await frame(); await new Promise((done) => setTimeout(done, 20)); };"
             "open.forEach((part) => { part.open = true; });"
             "for (let y = 0; y < document.body.scrollHeight; y += 500) { scrollTo(0, y); await rest(); }"

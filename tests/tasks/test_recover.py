@@ -58,6 +58,7 @@ def test_terminal_tells_the_result_and_where_the_files_are(finished):
         assert name in out
         assert (folder / name).stat().st_size > 0
     assert "after the change" in out
+    assert "shares of intact, and so this verdict, say little" in " ".join(out.split()), "of a quick budget"
     assert "truth" in out
     assert summary["result_digest"][:16] in out
 
