@@ -27,12 +27,12 @@ LAY_OUT_S = 4.0
 LOAD_S = 60.0
 BEGINNING = b"RRF"
 """What every recording of rerun begins with; one digit follows, its format."""
-REST_S = 15.0
+REST_S = 40.0
 """Time in which a picture must come to rest,"""
 FEWEST = 12
 """and pictures that it has for that at least: a busy machine takes seconds for each."""
 GREETING_S = 4.0
-"""For so long after its start the viewer lays a note over the picture that it runs without a screen."""
+"""For so long after it begins to draw the viewer lays a note over the picture that it runs without a screen."""
 
 
 class ViewerError(RuntimeError):
@@ -103,10 +103,10 @@ class HeadlessViewer:
         command = [str(viewer_binary()), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
         command += ["--hide-welcome-screen", "--window-size", f"{self.size[0]}x{self.size[1]}"]
         self._output = tempfile.TemporaryFile()
-        self._started = time.monotonic()
         self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=self._output, stderr=self._output)
         try:
             self._client = self._connected(f"rerun+http://127.0.0.1:{port}/proxy")
+            self._started = time.monotonic()  # It greets once it draws.
         except BaseException:
             self._end()
             raise
