@@ -110,6 +110,8 @@ def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
     assert [text for _, text in rows] == [told(h) for h in believed]
     assert [float(error) for error, _ in rows] == pytest.approx(summary["diagnosis_error"], rel=1e-2)
 
+    assert f"**Believed in the end: {told(believed[-1])}.**" in scene
+
     progress = [line.split("believes: ")[1] for line in out.splitlines() if "believes: " in line]
     assert progress == [told(h) for h in believed]
 
