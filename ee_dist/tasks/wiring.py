@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ee_dist import leaving
 from ee_dist.effects.catalogue import load_plugin
@@ -82,6 +82,12 @@ def evaluator_name(config: Config) -> str:
     if settings.name != "auto":
         return settings.name
     return "serial" if config.budget.small and not settings.workers and not config.ray.address else "ray"
+
+
+def for_few(config: Config) -> Config:
+    """Settings for a handful of rollouts: Ray takes longer to start than they do, unless it is asked for."""
+    asked = config.evaluator.name != "auto" or config.evaluator.workers or config.ray.address
+    return config if asked else replace(config, evaluator=replace(config.evaluator, name="serial"))
 
 
 def evaluator_of(config: Config, engine: str = "") -> Evaluator:
