@@ -45,33 +45,32 @@ IN_DOCS = {
 MOST_BYTES = 250_000
 
 
-def told(*words: str) -> None:
-    """Run a command of ours. Raises SystemExit where it fails."""
+def told(folder: Path, *words: str) -> None:
+    """Run a command of ours in a folder, whose paths so are short in what is shown. Raises SystemExit where it fails."""
     settings = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "ee_dist", *words, "engine=mujoco", "evaluator=serial"]
-    done = subprocess.run(command, env=settings, capture_output=True, text=True, check=False)
+    folder.mkdir(parents=True, exist_ok=True)
+    done = subprocess.run(command, cwd=folder, env=settings, capture_output=True, text=True, check=False)
     if done.returncode:
         sys.exit(f"{' '.join(words)}: {done.stderr.strip()}")
 
 
 def story(name: str, out: Path) -> list[Path]:
     """The folders of one robot's runs, the trial first; those that are there already stay."""
-    trial = out / name / "trial"
-    if not (trial / "trial.mcap").is_file():
-        told("task=trial", *STORIES[name], f"hydra.run.dir={trial}")
-    folders = [trial]
+    own = out / name
+    folders = {verb: own / "logs" / verb for verb in ("trial", *VERBS)}
+    if not (folders["trial"] / "trial.mcap").is_file():
+        told(own, "task=trial", *STORIES[name], "hydra.run.dir=logs/trial")
     for verb, more in VERBS.items():
-        folder = out / name / verb
-        if not (folder / "report.html").is_file():
-            told(f"task={verb}", f"measured={trial}", *more, f"hydra.run.dir={folder}")
-        folders.append(folder)
-    return folders
+        if not (folders[verb] / "report.html").is_file():
+            told(own, f"task={verb}", "measured=logs/trial", *more, f"hydra.run.dir=logs/{verb}")
+    return list(folders.values())
 
 
 def pages(window: HeadlessBrowser, folder: Path) -> Iterator[Shot]:
     """A report narrow and wide, light and dark."""
     for width, dark in product(WIDTHS, (False, True)):
-        name = f"{folder.parent.name}_{folder.name}_{width}_{'dark' if dark else 'light'}.png"
+        name = f"{folder.parents[1].name}_{folder.name}_{width}_{'dark' if dark else 'light'}.png"
         seen = window.look(folder / "report.html", width, dark=dark, height=TALL)
         wider = [f"{seen.overflow} pixels wider than the window"] if seen.overflow else []
         yield name, seen.png, [*seen.complaints, *(f"asks for {a}" for a in seen.asked), *wider]
@@ -81,7 +80,7 @@ def scene(folder: Path) -> Iterator[Shot]:
     """A rerun recording narrow and wide, as its own viewer shows it: that is dark."""
     (recording,) = folder.glob("*.rrd")
     for width in WIDTHS:
-        name = f"{folder.parent.name}_{folder.name}_{width}_scene.png"
+        name = f"{folder.parents[1].name}_{folder.name}_{width}_scene.png"
         try:
             (seen,) = take_pictures(recording, [0.0], size=(width, TALL))
         except ViewerError as error:

@@ -106,6 +106,9 @@ def test_the_first_lines_of_a_study_tell_what_how_sure_and_what_next():
     assert page.first[-1] == "Not restored: 1; the worst is case 2, seed 1 at 42% of intact."
     assert "task=view" in page.following and "logs/a sweep/5" in page.following
     assert "no test" in page_of(study_of([1, 2], [0])).first[1]
+    assert page_of(study_of([1, 2], [0])).first[-1].startswith("Next: more seeds")
+    quick = page_of([{**s, "budget": "quick"} for s in study_of([1], range(4))])
+    assert quick.tone == "open" and "without budget=quick" in quick.first[-1]
     assert "cannot be below 0.1" in page_of(study_of([1, 2], range(3))).first[1]
 
 
