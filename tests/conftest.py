@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from ee_dist.effects import catalogue, laws
+from ee_dist.viewing.browser import BrowserError, HeadlessBrowser, chromium
 
 
 @pytest.fixture(autouse=True)
@@ -19,3 +20,14 @@ def own_catalogue() -> Iterator[None]:
         if registry != before:
             registry.clear()
             registry.update(before)
+
+
+@pytest.fixture(scope="session")
+def window() -> Iterator[HeadlessBrowser]:
+    """One browser for all tests that look at pages."""
+    try:
+        chromium()
+    except BrowserError as missing:
+        pytest.skip(str(missing))
+    with HeadlessBrowser() as found:
+        yield found

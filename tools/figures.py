@@ -2,7 +2,7 @@
 
 Each robot is measured with something hidden, compared, explained and improved. Runs that are there already in OUT are
 looked at as they are; ``--docs`` puts the best pictures into docs/figures. Ends with status 1 if a page or a view complains,
-a page asks for anything outside or is wider than its window. Some ten minutes on two cores.
+a page asks for anything outside or is wider than its window, or a scene cannot be shown. Some ten minutes on two cores.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 
 from ee_dist.viewing.browser import BrowserError, HeadlessBrowser
@@ -44,45 +45,48 @@ IN_DOCS = {
 MOST_BYTES = 250_000
 
 
-def told(*words: str) -> None:
-    """Run a command of ours. Raises SystemExit where it fails."""
+def told(folder: Path, *words: str) -> None:
+    """Run a command of ours in a folder, whose paths so are short in what is shown. Raises SystemExit where it fails."""
     settings = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "ee_dist", *words, "engine=mujoco", "evaluator=serial"]
-    done = subprocess.run(command, env=settings, capture_output=True, text=True, check=False)
+    folder.mkdir(parents=True, exist_ok=True)
+    done = subprocess.run(command, cwd=folder, env=settings, capture_output=True, text=True, check=False)
     if done.returncode:
         sys.exit(f"{' '.join(words)}: {done.stderr.strip()}")
 
 
 def story(name: str, out: Path) -> list[Path]:
     """The folders of one robot's runs, the trial first; those that are there already stay."""
-    trial = out / name / "trial"
-    if not (trial / "trial.mcap").is_file():
-        told("task=trial", *STORIES[name], f"hydra.run.dir={trial}")
-    folders = [trial]
+    own = out / name
+    folders = {verb: own / "logs" / verb for verb in ("trial", *VERBS)}
+    if not (folders["trial"] / "trial.mcap").is_file():
+        told(own, "task=trial", *STORIES[name], "hydra.run.dir=logs/trial")
     for verb, more in VERBS.items():
-        folder = out / name / verb
-        if not (folder / "report.html").is_file():
-            told(f"task={verb}", f"measured={trial}", *more, f"hydra.run.dir={folder}")
-        folders.append(folder)
-    return folders
+        if not (folders[verb] / "report.html").is_file():
+            told(own, f"task={verb}", "measured=logs/trial", *more, f"hydra.run.dir=logs/{verb}")
+    return list(folders.values())
 
 
 def pages(window: HeadlessBrowser, folder: Path) -> Iterator[Shot]:
     """A report narrow and wide, light and dark."""
-    for width in WIDTHS:
-        for dark in (False, True):
-            seen = window.look(folder / "report.html", width, dark=dark, height=TALL)
-            wider = [f"{seen.overflow} pixels wider than the window"] if seen.overflow else []
-            wrong = [*seen.complaints, *(f"asks for {a}" for a in seen.asked), *wider]
-            yield f"{folder.parent.name}_{folder.name}_{width}_{'dark' if dark else 'light'}.png", seen.png, wrong
+    for width, dark in product(WIDTHS, (False, True)):
+        name = f"{folder.parents[1].name}_{folder.name}_{width}_{'dark' if dark else 'light'}.png"
+        seen = window.look(folder / "report.html", width, dark=dark, height=TALL)
+        wider = [f"{seen.overflow} pixels wider than the window"] if seen.overflow else []
+        yield name, seen.png, [*seen.complaints, *(f"asks for {a}" for a in seen.asked), *wider]
 
 
 def scene(folder: Path) -> Iterator[Shot]:
     """A rerun recording narrow and wide, as its own viewer shows it: that is dark."""
     (recording,) = folder.glob("*.rrd")
     for width in WIDTHS:
-        (seen,) = take_pictures(recording, [0.0], size=(width, TALL))
-        yield f"{folder.parent.name}_{folder.name}_{width}_scene.png", seen.png, seen.reports
+        name = f"{folder.parents[1].name}_{folder.name}_{width}_scene.png"
+        try:
+            (seen,) = take_pictures(recording, [0.0], size=(width, TALL))
+        except ViewerError as error:
+            yield name, b"", [str(error)]
+        else:
+            yield name, seen.png, seen.reports
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -101,12 +105,13 @@ def main(arguments: list[str] | None = None) -> int:
                 for folder in story(name, options.out.resolve()):
                     report = pages(window, folder) if (folder / "report.html").is_file() else ()
                     for label, png, wrong in (*report, *scene(folder)):
-                        (options.out / label).write_bytes(png)
+                        if png:
+                            (options.out / label).write_bytes(png)
                         print(label, *wrong, sep="\n  ", flush=True)
                         faults += len(wrong)
                         if options.docs and label in IN_DOCS and len(png) < MOST_BYTES:
                             (ROOT / "docs" / "figures" / IN_DOCS[label]).write_bytes(png)
-    except (BrowserError, ViewerError) as error:
+    except BrowserError as error:
         print(f"no pictures: {error}", file=sys.stderr)
         return 1
     return 1 if faults else 0

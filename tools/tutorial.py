@@ -3,12 +3,14 @@
     python tools/tutorial.py            # some two minutes
 
 A ``bash`` block that is followed by a ``text`` block is run and the text replaced; a ``yaml`` block shows the improved model.
+The reports go to logs/tutorial, from where the site takes them.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -17,6 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "tutorial.md"
 STEP = re.compile(r"```bash\n(?P<command>[^`]+)```\n\n```text\n(?P<output>[^`]*)```")
+REPORTS = ROOT / "logs" / "tutorial"
 MODEL = re.compile(r"```yaml\n[^`]*```")
 COLUMNS = "80"
 
@@ -48,6 +51,9 @@ def main() -> int:
             page = page.replace(step.group(0), shown)
         model = (folder / "logs" / "improve" / "model.yaml").read_text(encoding="utf-8").strip()
         page = MODEL.sub(lambda _: f"```yaml\n{model}\n```", page)
+        REPORTS.mkdir(parents=True, exist_ok=True)
+        for report in folder.glob("logs/*/report.html"):
+            shutil.copy(report, REPORTS / f"{report.parent.name}.html")
     PAGE.write_text(page, encoding="utf-8")
     return 0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy  # which loads its parts when they are used: signals take a second
 
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands, Driver, Network
@@ -71,5 +71,7 @@ def speeds_of(log: SensorLog, robot: Robot) -> Array:
         for c, sensor in enumerate(robot.sensors):
             if sensor.kind == "velocity" and sensor.target == motor:
                 seen = log.sensors[:, c]
-                out[:, k] = savgol_filter(seen, SMOOTHED, 2) if sensor.noise and len(seen) > SMOOTHED else seen
+                out[:, k] = (
+                    scipy.signal.savgol_filter(seen, SMOOTHED, 2) if sensor.noise and len(seen) > SMOOTHED else seen
+                )
     return out

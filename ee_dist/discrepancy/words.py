@@ -22,6 +22,12 @@ from ee_dist.robots.model import Robot
 
 NAMED = 3
 """Effects that a headline names."""
+TWINS = 2
+"""Others that a headline names beside the one that was found,"""
+FEW = 4
+"""and the line below it, where there are more."""
+MOSTLY = 0.97
+"""Share of what is above the noise from which nobody asks for the rest."""
 CLOSE = 1.1
 """Times the noise floor up to which a model is nearly right."""
 GRANTED = "What is above the floor is no more than chance, and what contacts and reversals leave that come a row early or late."
@@ -76,12 +82,18 @@ def without_unit(key: str, unit: str) -> str:
 
 def told(term: Term, robot: Robot | None = None) -> str:
     """``coulomb friction at knee front left (torque 0.3 N.m)``."""
-    shown = [f"{_quantity(term, key, robot)} {value:.3g}{_unit(term, key, robot)}" for key, value in term.values]
+    shown = [f"{_quantity(term, key, robot)} {_value(term, key, value, robot)}".strip() for key, value in term.values]
     return named(term) + (f" ({', '.join(shown)})" if shown else "")
 
 
+def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
+    return f"{value:.3g}{_unit(term, key, robot)}"
+
+
 def _quantity(term: Term, key: str, robot: Robot | None) -> str:
-    """A parameter's name without its unit, which is told behind the value."""
+    """A parameter's name without its unit, which is told behind the value; nothing where it is called by its unit alone."""
+    if key.startswith("per_"):
+        return ""
     entry = CATALOGUE[term.effect]
     own = entry.parameter(key).unit  # that of a hinge, which names carry on slides too
     other = entry.unit(key, robot, term.target) if robot is not None else own
@@ -106,13 +118,11 @@ def named(term: Term) -> str:
 
 def told_all(terms: Hypothesis, robot: Robot | None = None) -> str:
     """Terms in one phrase; one effect at several places with its values side by side."""
-    effects = {t.effect for t in terms}
-    if len(terms) > 1 and len(effects) == 1 and any(len(t.values) > 1 for t in terms):
-        return f"{plain(terms[0].effect)}, each joint by itself ({', '.join(plain(t.target) for t in terms)})"
-    if len(terms) > 1 and len(effects) == 1 and all(t.values for t in terms):
-        key = terms[0].values[0][0]
-        each = ", ".join(f"{plain(t.target)} {t.values[0][1]:.3g}" for t in terms)
-        return f"{plain(terms[0].effect)}, each joint by itself ({each}{_unit(terms[0], key, robot)})"
+    if len(terms) > 1 and len({t.effect for t in terms}) == 1 and all(t.values for t in terms):
+        keys = [_quantity(terms[0], key, robot) for key, _ in terms[0].values]
+        of = f"{', '.join(keys)}: " if len(keys) > 1 else ""
+        each = "; ".join(f"{plain(t.target)} {', '.join(_value(t, k, v, robot) for k, v in t.values)}" for t in terms)
+        return f"{plain(terms[0].effect)}, each joint by itself ({of}{each})"
     return "; ".join(told(t, robot) for t in terms)
 
 
@@ -188,7 +198,8 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         head = f"Missing{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best)}."
         head += f" {NOTHING_ELSE}" if not found.left else " More than noise is left with it."
         error = _errors(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
-        sure = f"How sure: it takes off {confidence(best)}; {_rivals(found.tried, best.tied_with)}."
+        sure = f"How sure: it takes off {confidence(best)}{_rest(best.explained, not found.left)}"
+        sure += f"; {_rivals(found.tried, best.tied_with)}."
         lines.append(entry.physics)
         lines.append(f"Its mark in a residual: {entry.signature}")
         if best.tied_with:
@@ -211,8 +222,9 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         advice = "No trial of the library would tell them apart either: on all of them they do the same."
     elif ahead is not None:
         e = ahead.excitation
+        where = f", on the {e.fixture}" if robot.free_base else ""
         advice = (
-            f"To tell them apart: {e.kind} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}, on the {e.fixture} "
+            f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
             f"(predicted distance {ahead.separation:.0f} standard deviations)."
         )
     good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
@@ -237,10 +249,22 @@ def _errors(problem: Problem, before: float, after: float, floor: float, held_ou
     )
 
 
+def _rest(explained: float, settled: bool) -> str:
+    """A word on what is above the noise still, where nothing is said to be left."""
+    return "; what it leaves of that stands out nowhere" if settled and explained < MOSTLY else ""
+
+
 def _rivals(tried: int, tied: Sequence[str]) -> str:
     if not tied:
         return f"of {_count(tried, 'explanation')} no other does as well"
-    return f"of {_count(tried, 'explanation')} {len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well"
+    told_of = f" ({_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
+    return f"of {_count(tried, 'explanation')} {len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+
+
+def _few(names: Sequence[str]) -> str:
+    """Candidates by name, as many as a line holds."""
+    more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
+    return "; ".join(map(placed, names[:FEW])) + more
 
 
 def _doubt(found: Explanation) -> str:
@@ -252,7 +276,7 @@ def _twins(best: Judged) -> str:
     others = best.tied_with
     if not others:
         return ""
-    if len(others) > 2:
+    if len(others) > TWINS:
         return f", or one of {len(others)} others that look the same here"
     return f", or {' or '.join(map(placed, others))}, which look{'s' if len(others) == 1 else ''} the same here"
 
@@ -302,7 +326,8 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {last.held_out}"
         head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
-        sure = f"How sure: {share}, judged on {last.held_out}{_ranges(found, new, robot)}{_told_from(steps)}."
+        sure = f"How sure: {share}, judged on {last.held_out}{_rest(found.explained, settled)}"
+        sure += f"{_ranges(found, new, robot)}{_told_from(steps)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     return Account(head, error, sure, tuple(lines), settled, advice)
 
@@ -326,7 +351,9 @@ def _ranges(found: Improvement, new: Sequence[Term], robot: Robot) -> str:
         if term.name in told_of:
             range_ = f"{p.low:.3g} to {p.high:.3g}{_unit(term, p.name, robot)}"
             sure = not p.flag and np.isfinite(p.high - p.low)
-            told_of[term.name].append(f"{_quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}")
+            told_of[term.name].append(
+                f"{_quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip()
+            )
     out = [
         (f"{placed(name)}: " if len(told_of) > 1 else "") + ", ".join(values)
         for name, values in told_of.items()
@@ -340,7 +367,8 @@ def _told_from(steps: Sequence[Rung]) -> str:
     others = sorted({t for r in steps for t in r.tied_with})
     if not others:
         return ""
-    return f"; not told from {' or '.join(map(placed, others)) if len(others) < 3 else f'{len(others)} others'}"
+    several = f"{len(others)} others ({_few(others)})"
+    return f"; not told from {' or '.join(map(placed, others)) if len(others) <= TWINS else several}"
 
 
 def _capital(text: str) -> str:

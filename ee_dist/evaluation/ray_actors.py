@@ -8,8 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
-from platform import node, python_version
+from platform import node
 from signal import SIGKILL
 from typing import Any
 
@@ -17,6 +16,7 @@ import ray
 from ray.exceptions import ActorDiedError, RayError, RayTaskError
 
 from ee_dist.engines.contract import Engine
+from ee_dist.evaluation.installed import installed
 from ee_dist.evaluation.jobs import Counts, Job
 from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, lost, start_ray
 from ee_dist.evaluation.serial import run_jobs
@@ -44,21 +44,6 @@ class _Worker:
     def who(self) -> tuple[str, int, dict[str, str]]:
         """Host, process, and what is installed there."""
         return node(), os.getpid(), installed()
-
-
-PACKAGES = ("ee_dist", "pybullet", "mujoco", "numpy", "numba", "ray")
-"""What decides the bits of a result, and so must be the same in every process."""
-
-
-def installed() -> dict[str, str]:
-    """Versions by name; ``-`` for what is not there."""
-    found = {"python": python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "-"
-    return found
 
 
 WORTH_A_CALL = 24

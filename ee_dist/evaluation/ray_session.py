@@ -1,4 +1,7 @@
-"""Ray as a run has it: started here with a guard beside it, or a cluster that is there already."""
+"""Ray as a run has it: started here with a guard beside it, or a cluster that is there already.
+
+Ray itself is loaded by whoever starts it: its errors are known, and its end is asked for, in runs without it too.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
-
-import ray
 
 
 class EvaluatorError(RuntimeError):
@@ -75,6 +76,8 @@ _address: str | None = None
 
 def start_ray(address: str | None, workers: int) -> None:
     """Connect to the cluster at ``address``, or start Ray on this machine. Raises EvaluatorError."""
+    import ray
+
     global _guard, _address
     if ray.is_initialized():
         return
@@ -128,6 +131,8 @@ class _Starter(threading.Thread):
         self.error: BaseException | None = None
 
     def run(self) -> None:
+        import ray
+
         try:
             ray.init(**self.options)
         except BaseException as error:
@@ -138,7 +143,8 @@ class _Starter(threading.Thread):
 
 def stop_ray() -> None:
     """Stop what ``start_ray`` started, or leave the cluster. Ray's own way at the end of a process begins with a nap."""
-    if ray.is_initialized():
+    ray = sys.modules.get("ray")
+    if ray is not None and ray.is_initialized():
         ray.shutdown()
     abandon_ray()
 
@@ -154,6 +160,8 @@ def abandon_ray() -> None:
 def lost() -> str | None:
     """What of Ray is gone, if anything: a process that we started, or the cluster."""
     if _guard is not None:
+        import ray
+
         node = getattr(ray._private.worker, "_global_node", None)
         dead = node.dead_processes() if node is not None else []
         return f"its process {dead[0][0]} has ended" if dead else None

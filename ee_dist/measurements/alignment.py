@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from ee_dist.trials.log import Array
 
@@ -57,8 +57,8 @@ def match(a_s: Array, a: Array, b_s: Array, b: Array, held: bool) -> Match:
         return Match(0.0, 0.0, 1.0)
     x = (x[:, moving] - x[:, moving].mean(axis=0)) / spread[0][moving]
     y = (y[:, moving] - y[:, moving].mean(axis=0)) / spread[1][moving]
-    lags = signal.correlation_lags(len(x), len(y))
-    top = sum(signal.correlate(x[:, k], y[:, k], method="fft") for k in range(x.shape[1]))
+    lags = scipy.signal.correlation_lags(len(x), len(y))
+    top = sum(scipy.signal.correlate(x[:, k], y[:, k], method="fft") for k in range(x.shape[1]))
     # Energy of each record in what overlaps at every lag.
     ex, ey = np.r_[0, np.cumsum((x**2).sum(axis=1))], np.r_[0, np.cumsum((y**2).sum(axis=1))]
     first = np.maximum(lags, 0)

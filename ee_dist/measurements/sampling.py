@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
@@ -107,10 +107,10 @@ class LowPass:
             raise MeasurementError(
                 f"low-pass: cut-off {self.cutoff_hz:g} Hz must lie below half the rate, {0.5 / step_s:g} Hz"
             )
-        b, a = signal.butter(self.order, share)
+        b, a = scipy.signal.butter(self.order, share)
         if len(values) <= 3 * max(len(a), len(b)):
             raise MeasurementError(f"low-pass: {len(values)} rows are too few for a filter of order {self.order}")
-        return np.asarray(signal.filtfilt(b, a, values))
+        return np.asarray(scipy.signal.filtfilt(b, a, values))
 
     def speed(self, positions: Array, step_s: float) -> Array:
         """Speed (T,) by central differences of the filtered positions."""
@@ -119,7 +119,7 @@ class LowPass:
 
 @lru_cache(maxsize=16)
 def _anti_alias(keep_every: int) -> tuple[Array, Array]:
-    b, a = signal.cheby1(8, 0.05, 0.8 / keep_every)
+    b, a = scipy.signal.cheby1(8, 0.05, 0.8 / keep_every)
     return b, a
 
 
@@ -132,6 +132,6 @@ def decimated(values: Array, keep_every: int) -> Array:
     if keep_every <= 1:
         return values
     b, a = _anti_alias(keep_every)
-    smooth = signal.filtfilt(b, a, values, axis=0, padlen=min(len(values) - 1, 3 * 8))
+    smooth = scipy.signal.filtfilt(b, a, values, axis=0, padlen=min(len(values) - 1, 3 * 8))
     first = keep_every - (keep_every * int(np.ceil(len(values) / keep_every)) - len(values)) - 1
     return np.asarray(smooth[first::keep_every])

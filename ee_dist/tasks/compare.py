@@ -22,6 +22,7 @@ from ee_dist.tasks.results.summaries import of_comparison
 from ee_dist.tasks.results.tables import setting, show_account, show_comparison
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.ways import AUTO, way_of
+from ee_dist.tasks.wiring import for_few
 from ee_dist.viewing.report import write_page
 
 
@@ -38,7 +39,7 @@ def run(config: Config, options: Options, out: Path) -> tuple[Problem, Compariso
     way = way_of(measured, options.by)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
-    problem = way.make(measured, config)
+    problem = way.make(measured, for_few(config))
     residual = problem.residuals([measured.model])[0]
     found = compare(problem, residual)
     left = leftovers(problem, residual)

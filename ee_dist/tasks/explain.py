@@ -22,7 +22,7 @@ from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
 from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_explanation
-from ee_dist.tasks.results.tables import setting, show_account, show_explanation
+from ee_dist.tasks.results.tables import setting, show_account, show_explanation, typed
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.ways import AUTO, way_of
 from ee_dist.tasks.wiring import evaluator_of
@@ -69,7 +69,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     following = []
     if found.verdict == EFFECT:
         model = [setting("model", config.model)] if config.model else []
-        effect = setting("effect", found.best.terms[0].name if found.best else "auto")
+        effect = setting("effect", typed(found.best.terms) if found.best else "auto")
         following = ["task=improve", setting("measured", measured.files[0]), *model, effect]
     story = links(out, measured.files, config.model)
     write_page(explain_page(problem, measured, found, account, following, story), out / "report.html")

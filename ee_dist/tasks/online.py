@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import plotly.graph_objects as go
 from rich.console import Console
 
-from ee_dist.basics.files import write_whole
 from ee_dist.effects.catalogue import apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import weight_count
@@ -17,10 +16,11 @@ from ee_dist.evaluation.jobs import Evaluator, Job, Travel
 from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recovery.repair import network
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.wiring import build_robot, evaluator_of
-from ee_dist.viewing.templates import FIGURE
+from ee_dist.viewing.report import Page, Section, write_page
+from ee_dist.viewing.study_figures import Curve, on_the_body
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Options:
 
 
 def run(config: Config, options: Options, out: Path) -> None:
-    """Write online.html and summary.json. Every evaluation counts as a trial on the body."""
+    """Write report.html and summary.json. Every evaluation counts as a trial on the body."""
     console, watch = Console(), Stopwatch()
     if config.scenario is None:
         raise ConfigError("which scenario? add one, such as +scenario=3")
@@ -52,7 +52,6 @@ def run(config: Config, options: Options, out: Path) -> None:
     lost = intact - at_change
     regained = (end - at_change) / lost if lost > 0 else float("nan")
     trials = after[0][-1][0]
-    offset = before[0][-1][0]
     write_summary(out, "online", config, options, watch, digest_of((before[0], after[0])), {
         "scenario": config.scenario.number,
         "distance_m": {"intact": intact, "after": at_change, "end": end},
@@ -60,13 +59,15 @@ def run(config: Config, options: Options, out: Path) -> None:
         "regained_of_lost": regained,
         "best_by_trials": {"before": before[0], "after": after[0]},
     })  # fmt: skip
-    _figure(before[0], [(n + offset, d) for n, d in after[0]], config.scenario.title, out / "online.html")
-    console.print(
-        f"Evolution on the body alone, scenario {config.scenario.number} ({config.scenario.title}), seed {config.seed}:\n"
-        f"  intact {intact:.2f} m, after the change {at_change:.2f} m, after {trials:,} further trials on the body "
-        f"{end:.2f} m ({regained:.0%} of what was lost).\n  {out / 'online.html'}",
-        highlight=False,
+    back = f" ({regained:.0%} of what was lost)" if lost > 0 else "; the change cost nothing"
+    head = (
+        f"On the body alone: intact {intact:.2f} m, after the change {at_change:.2f} m, after {trials:,} further trials on the "
+        f"body {end:.2f} m{back}."
     )
+    write_page(_page(config, config.scenario, before[0], after[0], head, robot), out / "report.html")
+    console.print(f"Scenario {config.scenario.number}: {config.scenario.title}. Seed {config.seed}.", highlight=False)
+    console.print(f"  {os.path.relpath(out / 'report.html')}", highlight=False, soft_wrap=True)
+    console.print(head, highlight=False)
 
 
 def _evolve(
@@ -92,12 +93,15 @@ def _evolve(
     return curve, ga.genomes
 
 
-def _figure(before: list[tuple[int, float]], after: list[tuple[int, float]], title: str, path: Path) -> None:
-    figure = go.Figure()
-    for name, curve in (("before the change", before), ("after the change", after)):
-        figure.add_scatter(x=[n for n, _ in curve], y=[d for _, d in curve], name=name, mode="lines+markers")
-    figure.add_vline(x=before[-1][0], line_dash="dot", annotation_text=title)
-    figure.update_layout(title="Evolution on the body alone")
-    figure.update_xaxes(title="trials on the body")
-    figure.update_yaxes(title="best forward distance (m)")
-    write_whole(path, figure.to_html(include_plotlyjs=True, config=FIGURE))
+def _page(config: Config, scenario: ScenarioConfig, before: Curve, after: Curve, head: str, robot: Robot) -> Page:
+    figure = on_the_body(before, [(n + before[-1][0], d) for n, d in after])
+    shown = "Each point is the best of a generation so far; the dotted line is the change."
+    return Page(
+        f"Evolution on the body: {robot.name.replace('_', ' ')}",
+        f"scenario {scenario.number} ({scenario.title}); seed {config.seed}, budget {config.budget.name}, {config.engine.name}",
+        head,
+        first=["Every evaluation is a trial on the body: that is what the loop with a model saves."],
+        following=f"python -m ee_dist +scenario={scenario.number} seed={config.seed}",
+        proof=Section("Best distance over the trials on the body", shown, figure),
+        foot="ee_dist. Evolution on the body alone, without a model: the paper's Fig. 1.",
+    )

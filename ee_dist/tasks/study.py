@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +21,9 @@ from ee_dist.basics.files import write_whole
 from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.outcome import RESTORED
+from ee_dist.tasks.results.study_page import CAPTION, HEAD, cells, study_page
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
-from ee_dist.viewing.study_figures import write_figures
+from ee_dist.viewing.report import write_page
 
 
 @dataclass
@@ -38,7 +40,7 @@ COLUMNS = (
 
 
 def run(config: Config, options: Options, out: Path) -> None:
-    """Write study.csv, study.md, figures and summary.json from the runs below ``config.log``. Raises ConfigError."""
+    """Write study.csv, study.md, report.html and summary.json from the runs below ``config.log``. Raises ConfigError."""
     console, watch = Console(), Stopwatch()
     if not config.log:
         raise ConfigError("log=: which runs? name the folder of a sweep, such as log=logs/recover/..._sweep")
@@ -54,13 +56,19 @@ def run(config: Config, options: Options, out: Path) -> None:
     _print(console, rows)
     totals = total(rows)
     write_summary(out, "study", config, options, watch, digest_of(rows), {"runs": len(rows), "totals": totals})
-    write_figures(runs, {(x["metric"], x["scenario"]): p_text(x) for x in lines}, CAPTION, out / "figures.html")
-    for name in ("study.csv", "study.md", "figures.html"):
-        console.print(f"  {out / name}", highlight=False, soft_wrap=True)
+    page = study_page(runs, rows, lines, totals, str(config.log))
+    write_page(page, out / "report.html")
+    for name in ("study.csv", "study.md", "report.html"):
+        console.print(f"  {os.path.relpath(out / name)}", highlight=False, soft_wrap=True)
+    for line in (page.headline, *page.first):
+        console.print(line, highlight=False)
+    if page.following:
+        console.print(f"Next: {page.following}", highlight=False, markup=False, soft_wrap=True)
 
 
 def load(folder: Path) -> list[dict[str, Any]]:
-    """Summaries of all finished recover runs below a folder, in order. Raises ConfigError where there is none."""
+    """Summaries of all finished recover runs below a folder, in order, each with its own ``folder``. Raises ConfigError
+    where there is none."""
     found = []
     for path in sorted(folder.rglob("summary.json")):
         try:
@@ -75,7 +83,7 @@ def load(folder: Path) -> list[dict[str, Any]]:
             row(content)
         except (KeyError, TypeError, ValueError) as error:
             raise ConfigError(f"{path}: a summary without {error}; take it out of the folder") from None
-        found.append(content)
+        found.append({**content, "folder": str(path.parent)})
     if not found:
         raise ConfigError(f"log={folder}: no finished run below it; a run is finished when it has a summary.json")
     return sorted(found, key=lambda s: (s["metric"], s["engine"], s["scenario"], s["seed"]))
@@ -151,36 +159,8 @@ def by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return lines
 
 
-CAPTION = (
-    "Bars are means over runs, whiskers standard deviations, dots the runs. p: last trial against the trial after the change, "
-    "Mann-Whitney U test, two-sided, corrected for the number of cases by Benjamini and Hochberg."
-)
-
-
-def p_text(line: dict[str, Any]) -> str:
-    """What the test says of a case, for a figure."""
-    if not math.isfinite(line["p_corrected"]):
-        return "one run: no test"
-    return "p < 0.001" if line["p_corrected"] < 0.001 else f"p = {line['p_corrected']:.2g}"
-
-
-HEAD = (
-    "case", "runs", "intact (m)", "after (m)", "best trial (m)", "last trial (m)", "restored", "diagnosis right",
-    "truth named", "p (corrected)",
-)  # fmt: skip
-
-
 SHORT = ("case", "runs", "intact", "after", "best", "last", "restored", "right", "named", "p")
-"""The same for a terminal of 80 columns."""
-
-
-def cells(line: dict[str, Any]) -> list[str]:
-    n, p = line["runs"], "-" if math.isnan(line["p_corrected"]) else f"{line['p_corrected']:.2g}"
-    return [
-        str(line["scenario"]), str(n), *(f"{line[k]:.2f}" for k in ("intact_m", "after_m", "best_m", "last_m")),
-        f"{line['restored']}/{n}",
-        *(f"{line[k]}/{line['scored']}" if line["scored"] else "-" for k in ("right", "named")), p,
-    ]  # fmt: skip
+"""Heads of the table for a terminal of 80 columns."""
 
 
 def markdown(rows: list[dict[str, Any]]) -> str:

@@ -142,7 +142,7 @@ def one_trial(
         # What reached the drives behind faulty wiring is not known to who sent the commands.
         log = replace(log, commands=np.array(driver.values[: len(log)]))
     log = replace(log, torques=None)
-    return log, TrialRecord(index, f"{excitation.kind} {excitation.fixture}", HARDWARE, driver, log)
+    return log, TrialRecord(index, excitation.told(robot), HARDWARE, driver, log)
 
 
 def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypothesis:

@@ -15,9 +15,9 @@ from typing import Any
 import yaml
 
 from ee_dist.basics.files import write_whole
+from ee_dist.evaluation.installed import installed
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import Journal, JournaledEvaluator
-from ee_dist.evaluation.ray_actors import installed
 from ee_dist.recording.reader import read_logs
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.writer import RunWriter

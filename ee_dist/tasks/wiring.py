@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ee_dist import leaving
 from ee_dist.effects.catalogue import load_plugin
@@ -13,7 +13,6 @@ from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import JournaledEvaluator
-from ee_dist.evaluation.ray_actors import RayEvaluator
 from ee_dist.evaluation.ray_session import stop_ray
 from ee_dist.evaluation.recent import RecentEvaluator
 from ee_dist.evaluation.serial import SerialEvaluator
@@ -85,6 +84,12 @@ def evaluator_name(config: Config) -> str:
     return "serial" if config.budget.small and not settings.workers and not config.ray.address else "ray"
 
 
+def for_few(config: Config) -> Config:
+    """Settings for a handful of rollouts: Ray takes longer to start than they do, unless it is asked for."""
+    asked = config.evaluator.name != "auto" or config.evaluator.workers or config.ray.address
+    return config if asked else replace(config, evaluator=replace(config.evaluator, name="serial"))
+
+
 def evaluator_of(config: Config, engine: str = "") -> Evaluator:
     """The evaluator of these settings, its counts at zero. Raises EvaluatorError where Ray cannot be reached.
 
@@ -109,6 +114,9 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
         if name == "serial":
             inner = SerialEvaluator(engine_maker(config, True, engine)(), settings.chunk or chunk)
         else:
+            # Ray takes a second to load: a run without it does not wait.
+            from ee_dist.evaluation.ray_actors import RayEvaluator
+
             inner = RayEvaluator(
                 engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address
             )

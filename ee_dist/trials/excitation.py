@@ -72,6 +72,10 @@ class Excitation:
     def __str__(self) -> str:
         return f"{self.kind} ({self.seconds:g} s, amplitude {self.amplitude:g}, seed {self.seed}, {self.fixture})"
 
+    def told(self, robot: Robot) -> str:
+        """What is done and on what; a robot that is bolted down has neither floor nor stand."""
+        return f"{self.kind} {self.fixture}" if robot.free_base else self.kind
+
     def steps(self, robot: Robot) -> int:
         """Raises ExcitationError for more rows than a trial may have."""
         steps = max(2, round(self.seconds / robot.time_step_s))

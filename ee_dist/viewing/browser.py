@@ -16,6 +16,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from ee_dist.viewing.processes import gone
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 ANSWER_S = 300.0
 SWITCHES = (
@@ -25,6 +27,9 @@ SWITCHES = (
     "--hide-scrollbars",
     "--no-first-run",
     "--disable-background-networking",
+    "--disable-background-timer-throttling",
+    "--disable-backgrounding-occluded-windows",
+    "--disable-renderer-backgrounding",
     "--disable-component-update",
     "--disable-sync",
     "--disable-dev-shm-usage",
@@ -109,7 +114,8 @@ class HeadlessBrowser:
         # Every part is opened and comes into sight once, so that whatever can go wrong in drawing it does.
         self.evaluate(
             "(async () => { const open = [...document.querySelectorAll('details:not([open])')];"
-            "const frame = () => new Promise((done) => requestAnimationFrame(done));"
+            # On a busy machine a frame may never come.
+            "const frame = () => new Promise((done) => { requestAnimationFrame(done); setTimeout(done, 1000); });"
             "const rest = async () => { await frame(); await frame(); await new Promise((done) => setTimeout(done, 20)); };"
             "open.forEach((part) => { part.open = true; });"
             "for (let y = 0; y < document.body.scrollHeight; y += 500) { scrollTo(0, y); await rest(); }"
@@ -185,10 +191,6 @@ class HeadlessBrowser:
     def _end(self) -> None:
         # Without anybody to listen to, Chromium ends itself and its children.
         os.close(self._to)
-        try:
-            self._process.wait(timeout=5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        gone(self._process, 5.0)
         os.close(self._from)
         self._profile.cleanup()

@@ -45,12 +45,14 @@ class _Stage:
         return [c for c in self.found.worst_first if c.name in measured][:SHOWN]
 
     def window(self, channel: ChannelError) -> tuple[float, float]:
-        """Where a channel is worst, on the timeline."""
+        """Where a channel is worst, on the timeline, within its trial."""
         for shot in self.shots:
             if shot.name == channel.worst_case:
                 middle = (channel.worst_from_s + channel.worst_to_s) / 2
                 half = max(channel.worst_to_s - channel.worst_from_s, LEAST_WINDOW_S)
-                return max(shot.start_s + middle - half, 0.0), shot.start_s + middle + half
+                end_s = interval_s(shot.measured)
+                start, end = max(middle - half, 0.0), min(middle + half, end_s)
+                return shot.start_s + min(start, max(end - half, 0.0)), shot.start_s + end
         return 0.0, self.end_s
 
 
@@ -68,10 +70,10 @@ def write_explain_rrd(found: Finding, path: str | Path) -> None:
     stage = _stage(found, [(GIVEN, found.model, palette.PREDICTED), *accounts])
     text = [*finding_text.colours(found), *finding_text.candidate_table(found.candidates)]
     tabs: list[rrb.View | rrb.Container] = []
-    for k, c in enumerate(tried):
+    for k in range(len(tried)):
         models = [m for m in stage.models if m.key in (GIVEN, _key(k))]
         plots = _worst_plots(stage, models, around=True)
-        tabs.append(_grid(plots, f"{k + 1}. {c.label.split(' (')[0]}"))
+        tabs.append(_grid(plots, f"{k + 1}. {models[-1].label}"))
     given = _grid(_worst_plots(stage, stage.models[:1], around=True), "The model")
     parts = rrb.Tabs(*tabs, given, active_tab=0)
     _write(stage, path, "explain", text, parts)

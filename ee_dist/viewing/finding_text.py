@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ee_dist.viewing.finding import BEST, TIED, Candidate, Finding
 
-BAR = 8
+BAR = 5
 """Characters of the longest bar."""
 
 
@@ -55,7 +55,7 @@ def channel_table(found: Finding) -> list[str]:
     lines = [f"| channel | error{_unit(found)} | | RMS | worst |", "|---|---|---|---|---|"]
     for c in ranked:
         unit = "" if c.unit in ("", "1") else f" {c.unit}"
-        where = f"{plain(c.worst_case)}, {c.worst_from_s:.2f} to {c.worst_to_s:.2f} s" if c.worst_case else ""
+        where = f"{plain(c.worst_case)}, {c.worst_from_s:.1f} s" if c.worst_case else ""
         lines.append(f"| {plain(c.name)} | {c.error:.3g} | {bar(c.error, largest)} | {c.rmse:.3g}{unit} | {where} |")
     return lines
 

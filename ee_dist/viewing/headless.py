@@ -9,11 +9,17 @@ import socket
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, Self, TypeVar
 
 from rerun.experimental import ViewerClient, ViewerState
+
+from ee_dist.viewing.processes import gone
+
+Answer = TypeVar("Answer")
 
 START_S = 30.0
 LAY_OUT_S = 4.0
@@ -21,8 +27,12 @@ LAY_OUT_S = 4.0
 LOAD_S = 60.0
 BEGINNING = b"RRF"
 """What every recording of rerun begins with; one digit follows, its format."""
+REST_S = 40.0
+"""Time in which a picture must come to rest,"""
+FEWEST = 12
+"""and pictures that it has for that at least: a busy machine takes seconds for each."""
 GREETING_S = 4.0
-"""For so long after its start the viewer lays a note over the picture that it runs without a screen."""
+"""For so long after it begins to draw the viewer lays a note over the picture that it runs without a screen."""
 
 
 class ViewerError(RuntimeError):
@@ -93,10 +103,10 @@ class HeadlessViewer:
         command = [str(viewer_binary()), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
         command += ["--hide-welcome-screen", "--window-size", f"{self.size[0]}x{self.size[1]}"]
         self._output = tempfile.TemporaryFile()
-        self._started = time.monotonic()
         self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=self._output, stderr=self._output)
         try:
             self._client = self._connected(f"rerun+http://127.0.0.1:{port}/proxy")
+            self._started = time.monotonic()  # It greets once it draws.
         except BaseException:
             self._end()
             raise
@@ -110,15 +120,17 @@ class HeadlessViewer:
     def open(self, path: str | Path) -> None:
         """Load a recording and wait until all of it is there. Raises ViewerError."""
         file = check_recording(path)
-        self.client.open(str(file))
+        with suppress(TimeoutError):  # It was told: whether it loads is seen below.
+            self.client.open(str(file))
         deadline = time.monotonic() + LOAD_S
         while time.monotonic() < deadline:
-            state = self.client.get_state()
-            if state.recordings and not state.loading:
-                return
-            failed = [entry.message for entry in self.client.get_logs() if entry.level == "ERROR"]
-            if failed:
-                raise ViewerError(f"the viewer cannot read {path}: {failed[0].splitlines()[0]}")
+            with suppress(TimeoutError):
+                state = self.client.get_state()
+                if state.recordings and not state.loading:
+                    return
+                failed = [entry.message for entry in self.client.get_logs() if entry.level == "ERROR"]
+                if failed:
+                    raise ViewerError(f"the viewer cannot read {path}: {failed[0].splitlines()[0]}")
             time.sleep(0.05)
         raise ViewerError(f"the viewer did not finish loading {path} in {LOAD_S:g} s")
 
@@ -130,38 +142,38 @@ class HeadlessViewer:
 
     @property
     def state(self) -> ViewerState:
-        return self.client.get_state()
+        return _patient(self.client.get_state)
 
     def hide_menu(self) -> None:
         """Take the menu and its warnings off the picture."""
-        self.client.run_command("ui.toggle_top_panel")
+        with suppress(TimeoutError):  # It was told; told twice, the menu would be back.
+            self.client.run_command("ui.toggle_top_panel")
 
     def go_to(self, timeline: str, time_s: float) -> None:
         """Stop at a time of a timeline."""
-        self.client.set_time(timeline, duration=time_s, play_state="paused")
+        _patient(lambda: self.client.set_time(timeline, duration=time_s, play_state="paused"))
 
-    def settled_picture(self, view: str | None = None, limit_s: float = 15.0) -> bytes:
+    def settled_picture(self, view: str | None = None) -> bytes:
         """A PNG of the window, or of one view, taken until two in a row agree: nothing is still loading or moving."""
         view_id = None if view is None else self._view_id(view)
-        last = b""
-        deadline = time.monotonic() + limit_s
-        laid_out = time.monotonic() + LAY_OUT_S
-        while time.monotonic() < deadline:
+        last, taken = b"", 0
+        began = time.monotonic()
+        while taken < FEWEST or time.monotonic() < began + REST_S:
             try:
-                png = self.client.take_screenshot(view_id)
+                png = _patient(lambda: self.client.take_screenshot(view_id))
             except ConnectionError as error:
                 if view is None:
                     raise ViewerError(f"the viewer gave no picture: {error}") from error
-                if time.monotonic() < laid_out:
+                if time.monotonic() < began + LAY_OUT_S:
                     # A view that the blueprint has is drawn a little later on a busy machine.
                     time.sleep(0.1)
                     continue
                 raise ViewerError(f"the view {view!r} is not on the screen: it lies behind another tab") from error
             if png == last and time.monotonic() > self._started + GREETING_S:
                 return png
-            last = png
+            last, taken = png, taken + 1
             time.sleep(0.1)
-        raise ViewerError(f"the picture did not come to rest in {limit_s:g} s")
+        raise ViewerError(f"the picture did not come to rest in {time.monotonic() - began:.0f} s")
 
     def _view_id(self, name: str) -> str:
         views = self.state.views
@@ -197,14 +209,21 @@ class HeadlessViewer:
         process, self._process = self._process, None
         if process is not None and process.poll() is None:
             process.terminate()
-            try:
-                process.wait(timeout=3.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            gone(process, 3.0)
         if self._output is not None:
             self._output.close()
             self._output = None
+
+
+def _patient(ask: Callable[[], Answer]) -> Answer:
+    """What the viewer answers: on a busy machine the client gives up sooner than it. Raises ViewerError."""
+    deadline = time.monotonic() + LOAD_S
+    while True:
+        try:
+            return ask()
+        except TimeoutError as error:
+            if time.monotonic() > deadline:
+                raise ViewerError(f"the viewer did not answer in {LOAD_S:g} s") from error
 
 
 def _free_port() -> int:

@@ -33,7 +33,7 @@ class Cloud:
     after: Array | None = None
 
 
-def _styled(figure: go.Figure, height: int) -> go.Figure:
+def styled(figure: go.Figure, height: int) -> go.Figure:
     """On the colour of the page, which draws texts and lines in what suits it."""
     figure.update_layout(
         template="none",
@@ -71,7 +71,7 @@ def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> 
                                col=1, mode="lines", name=f"measured - {name}", legendgroup=name, showlegend=False)  # fmt: skip
     figure.add_vrect(x0=around[0], x1=around[1], fillcolor="#8899aa", opacity=0.14, line_width=0, layer="below")
     figure.add_hline(y=0, line={"color": "#8899aa", "width": 1}, row=2, col=1)
-    _styled(figure, 400)
+    styled(figure, 400)
     figure.update_yaxes(title_text=curve.unit, row=1, col=1)
     figure.update_yaxes(title_text="residual", row=2, col=1)
     figure.update_xaxes(title_text="s", row=2, col=1)
@@ -106,7 +106,7 @@ def heat_map(
             row=row,
             col=1,
         )
-    _styled(figure, 176 + (30 + tall) * len(tables))
+    styled(figure, 176 + (30 + tall) * len(tables))
     pale = min(1.3 * floor / top, 0.9)
     light = [[0, "#f7fbff"], [pale, "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]]
     dark = [[0, "#1d252e"], [pale, "#2a3542"], [0.95, "#e0564c"], [1, "#ff8a7a"]]
@@ -167,7 +167,7 @@ def ranking(
             hovertemplate="%{y}: %{x:.1f} %<extra></extra>",
         )
     )
-    _styled(figure, 80 + 38 * len(names))
+    styled(figure, 80 + 38 * len(names))
     least = min([100 * i[0] for i in intervals] + [0.0])
     figure.update_xaxes(title_text="gain above the noise, held out (%)", range=[max(least - 3, -25), 104])
     figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
@@ -200,7 +200,7 @@ def ladder(
     )
     figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
                      annotation_position="bottom left")  # fmt: skip
-    _styled(figure, 340)
+    styled(figure, 340)
     figure.update_xaxes(range=[-0.4, len(names) - 0.6], automargin=True)
     figure.update_layout(yaxis_range=[0, 1.25 * max(max(heldout), floor)])
     figure.update_yaxes(title_text=label, rangemode="tozero")
@@ -223,7 +223,7 @@ def cloud(title: str, part: Cloud) -> go.Figure:
         at, mean = _trend(part.x, y)
         figure.add_scatter(x=_short(at), y=_short(mean), mode="lines", line=line, hoverinfo="skip")
     figure.add_hline(y=0, line={"color": "#8899aa", "width": 1})
-    _styled(figure, 250)
+    styled(figure, 250)
     left, right = _most(part.x)
     figure.update_xaxes(title_text=part.label, title_standoff=4, range=[left, right])
     figure.update_yaxes(range=_most(np.concatenate([y for y, _ in series])), automargin=True)
@@ -274,7 +274,7 @@ def bars(
     if floor is not None:
         figure.add_vline(x=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
                          annotation_position="top")  # fmt: skip
-    _styled(figure, 110 + (24 if after is None else 34) * len(names))
+    styled(figure, 110 + (24 if after is None else 34) * len(names))
     figure.update_xaxes(title_text=label, rangemode="tozero")
     figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
     figure.update_layout(

@@ -127,7 +127,8 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
     units = sorted({u for u in command_units(run.robot).values() if u is not None})
     tabs.append(blueprint.plot("/commands", f"Commands ({', '.join(units)})", axis))
     beside = [blueprint.sensor_plots(others, "Other channels", axis)] if others else []
-    below = rrb.Horizontal(rrb.Tabs(*tabs, active_tab=0), *beside)
+    # The names of the channels need the room.
+    below = rrb.Horizontal(rrb.Tabs(*tabs, active_tab=0), *beside, column_shares=[3, 4][: 1 + len(beside)])
     left = rrb.Vertical(scene, below, row_shares=[13, 10])
     right = rrb.Vertical(text, *search, row_shares=[18, 5, 5][: 1 + len(search)])
     end_s = starts[-1] + interval_s(trials[-1].log)

@@ -89,13 +89,45 @@ def title_of(run: RunRecord) -> str:
     return ", ".join(told_of).replace("_", " ") or run.robot.name
 
 
+def finding(run: RunRecord) -> list[str]:
+    """What came out, before anything else: the last belief, how far the robot goes with it, how sure, what next."""
+    trials, believed = hardware_trials(run), beliefs(run)
+    if not believed or len(trials) < 3:
+        return []
+    last, intact, compensating = believed[max(believed)], intact_distance(trials), trials[2:]
+    best = max(compensating, key=lambda t: t.log.travel_m)
+    of = f", {share_text(best, intact)} of the intact robot's {intact:.2f} m" if share_text(best, intact) else ""
+    lines = [
+        f"**Believed in the end: {told(last.terms)}.**",
+        f"Best trial: {best.name}, {best.log.travel_m:.2f} m{of}.",
+        f"How sure: with it the model differs from the trials by {last.error:.3g} (0 is exact)",
+    ]
+    foreseen = {t.index: t for t in run.trials if t.source == PREDICTION}.get(trials[-1].index)
+    if foreseen is not None:
+        went = f"{trials[-1].log.travel_m:.2f} m"
+        lines[-1] += f"; it foresaw {foreseen.log.travel_m:.2f} m for the last trial, which went {went}"
+    lines[-1] += "."
+    scenario = run.metadata.get("scenario", "")
+    if scenario.isdigit() and int(scenario):
+        lines.append(f"Next, how much of it is luck: `python -m ee_dist -m +scenario={scenario} seed=0,1,2`")
+    return [text for line in lines for text in (line, "")]
+
+
 def result_text(run: RunRecord) -> str:
     """The first thing to read: what is to be seen, what happened, what was believed, how far the robot went."""
     trials = hardware_trials(run)
     intact = intact_distance(trials)
     said = {(t.source, t.index): t for t in run.trials}
     after = any(source == HINDSIGHT for source, _ in said)
-    lines = [f"### {title_of(run)}", "", guide(run.robot, after), "", "**How far it went forward (m)**", ""]
+    lines = [
+        f"### {title_of(run)}",
+        "",
+        *finding(run),
+        guide(run.robot, after),
+        "",
+        "**How far it went forward (m)**",
+        "",
+    ]
     lines += ["| trial | measured | of intact | expected before | explained after |", "|---|---|---|---|---|"]
     for t in trials:
         models = [said.get((source, t.index)) for source in (PREDICTION, HINDSIGHT)]

@@ -1,17 +1,16 @@
-"""Figures of a study as one page that opens offline: distances by case (the paper's Fig. 7), dominants (Fig. 8)."""
+"""Figures of a study: distances by case (the paper's Fig. 7), dominants (Fig. 8), and evolution on the body (Fig. 1)."""
 
 from __future__ import annotations
 
 import textwrap
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
-from ee_dist.viewing.templates import plot, rendered
+from ee_dist.viewing.report_figures import styled
 
 STAGES = {"intact": "#8a94a6", "after the change": "#e08a1e", "last trial": "#3b7dd8"}
 """What the bars of a case are, and their colours."""
@@ -24,18 +23,8 @@ ROOM = 0.12
 
 Tests = Mapping[tuple[str, int], str]
 """By metric and scenario what a test said, in a few words."""
-
-
-def write_figures(summaries: Sequence[dict[str, Any]], tests: Tests, caption: str, path: Path) -> None:
-    """``summaries`` are those of recover runs; ``caption`` names the test, its correction and what bars and lines are."""
-    metrics = sorted({s["metric"] for s in summaries})
-    figures = [distances([s for s in summaries if s["metric"] == m], m, tests) for m in metrics]
-    figures.append(dominants(summaries))
-    title = f"A study of {len(summaries)} runs"
-    page = rendered(
-        "study.html", title=title, caption=caption, figures=[plot(f, f"plot{k}") for k, f in enumerate(figures)]
-    )
-    path.write_text(page, encoding="utf-8")
+Curve = Sequence[tuple[int, float]]
+"""(trials on the body so far, best distance in m) of each generation."""
 
 
 def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) -> go.Figure:
@@ -58,7 +47,8 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
             name=name,
             marker_color=colour,
             opacity=0.75,
-            error_y={"array": spread, "width": 3},
+            error_y={"array": spread, "width": 3, "color": "#7d8b9a"},
+            hovertemplate=f"{name}: %{{y:.2f}} m<extra></extra>",
         )
         figure.add_scatter(
             x=[a for a, v in zip(at, values, strict=True) for _ in v],
@@ -71,48 +61,65 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
         for v, mean, wide in zip(values, means, spread, strict=True):
             low, high = min(low, mean - wide, float(v.min())), max(high, mean + wide, float(v.max()))
     room = ROOM * ((high - low) or 1.0)
-    for i, c in enumerate(cases):
-        told = tests.get((metric, c))
-        if told:
-            figure.add_annotation(x=i, y=high + room / 2, text=told, showarrow=False, font_size=11)
-    _styled(figure, f"How far the robot went forward, {METRICS.get(metric, metric)}", "distance (m)")
-    figure.update_layout(barmode="overlay")
-    labels = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}") for c in cases]
-    figure.update_xaxes(
-        tickmode="array", tickvals=list(range(len(cases))), ticktext=labels, tickangle=0, tickfont_size=10
+    said = [(i, tests[metric, c]) for i, c in enumerate(cases) if tests.get((metric, c))]
+    for i, told in said:
+        figure.add_annotation(x=i, y=high + room / 5, yanchor="bottom", text=told, showarrow=False)
+    styled(figure, 430)
+    full = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}") for c in cases]
+    # On a narrow page a case has room for its number alone, and what the test says stands upright.
+    short = [str(c) for c in cases] if len(cases) > 3 else full
+    upright = -90 if len(cases) > 3 else 0
+    least = low - (room if low < 0 else 0.0)
+    wide_range, narrow_range = [least, high + room], [least, high + (2.5 if upright else 1.0) * room]
+    figure.update_layout(
+        barmode="overlay",
+        hovermode="closest",
+        meta={
+            "narrow": {"xaxis.ticktext": short, "yaxis.range": narrow_range, **_turned(len(said), upright)},
+            "wide": {"xaxis.ticktext": full, "yaxis.range": wide_range, **_turned(len(said), 0)},
+        },
     )
-    figure.update_yaxes(range=[low - (room if low < 0 else 0.0), high + room])
+    figure.update_xaxes(
+        tickmode="array", tickvals=list(range(len(cases))), ticktext=full, tickangle=0, automargin=True, showgrid=False
+    )
+    figure.update_yaxes(title_text="distance (m)", range=wide_range)
     return figure
+
+
+def _turned(count: int, angle: int) -> dict[str, object]:
+    """Angle of what is written above the bars, in degrees."""
+    return {f"annotations[{k}].textangle": angle for k in range(count)}
 
 
 def dominants(summaries: Sequence[dict[str, Any]]) -> go.Figure:
     """New bests found so far in the diagnosis passes, mean over passes and runs, for each metric."""
-    figure = go.Figure()
+    figure, longest = go.Figure(), 0
     for k, metric in enumerate(sorted({s["metric"] for s in summaries})):
         curves = [c for s in summaries if s["metric"] == metric for c in s["dominants"]["diagnosis"]]
         shortest = min(map(len, curves))
         mean = np.mean([c[:shortest] for c in curves], axis=0)
+        longest = max(longest, shortest)
         name = METRICS.get(metric, metric)
-        line = {"color": LINES[k % len(LINES)]}
+        line = {"color": LINES[k % len(LINES)], "width": 2}
         figure.add_scatter(x=list(range(shortest)), y=[float(v) for v in mean], name=name, mode="lines", line=line)
-    _styled(figure, "Dominants: new best hypotheses found so far in a diagnosis pass", "new bests so far")
-    figure.update_xaxes(title="generation", rangemode="tozero", tickformat="d")
-    figure.update_yaxes(rangemode="tozero")
+    styled(figure, 330)
+    figure.update_layout(showlegend=True)
+    figure.update_xaxes(title_text="generation", rangemode="tozero", dtick=1 if longest < 10 else None)
+    figure.update_yaxes(title_text="new bests so far", rangemode="tozero")
     return figure
 
 
-def _styled(figure: go.Figure, title: str, y_title: str) -> None:
-    """One style for all figures."""
-    figure.update_layout(
-        template="plotly_white",
-        title={"text": title, "x": 0.0, "xref": "paper", "font": {"size": 17}},
-        font={"family": "system-ui, sans-serif", "size": 13},
-        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0},
-        margin={"l": 60, "r": 20, "t": 90, "b": 110},
-        height=470,
-        showlegend=True,
-    )
-    figure.update_yaxes(title=y_title)
+def on_the_body(before: Curve, after: Curve) -> go.Figure:
+    """Best distance over the trials on the body, before the change and after it."""
+    figure = go.Figure()
+    for name, curve in (("intact", before), ("after the change", after)):
+        line = {"color": STAGES[name], "width": 2}
+        figure.add_scatter(x=[n for n, _ in curve], y=[d for _, d in curve], name=name, mode="lines+markers", line=line)
+    figure.add_vline(x=before[-1][0], line={"color": "#8899aa", "dash": "dot"})
+    styled(figure, 400)
+    figure.update_xaxes(title_text="trials on the body", rangemode="tozero")
+    figure.update_yaxes(title_text="best forward distance (m)")
+    return figure
 
 
 def _wrapped(text: str) -> str:

@@ -10,16 +10,18 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.words import Account, compare_account, explain_account, improve_account, told
+from ee_dist.discrepancy.words import Account, compare_account, explain_account, improve_account, told, told_all
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.tasks.improve import effects_of
+from ee_dist.tasks.results.tables import typed
 
 
-def headline(tied: list[str]) -> str:
+def account(tied: list[str], explained: float = 1.0) -> Account:
     best = SimpleNamespace(
         terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
-        explained=1.0, held_out="windows", error_heldout=1.1,
+        explained=explained, held_out="windows", error_heldout=1.1,
     )  # fmt: skip
     found = SimpleNamespace(
         best=best,
@@ -32,7 +34,7 @@ def headline(tied: list[str]) -> str:
         tried=9,
     )
     problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="")
-    return explain_account(problem, found, None).headline  # type: ignore[arg-type]
+    return explain_account(problem, found, None)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -45,7 +47,37 @@ def headline(tied: list[str]) -> str:
     ],
 )
 def test_what_looks_the_same_is_named(tied: list[str], said: str) -> None:
-    assert said in headline(tied)
+    assert said in account(tied).headline
+
+
+def test_a_rest_above_the_noise_is_no_contradiction_where_nothing_is_left() -> None:
+    assert "; what it leaves of that stands out nowhere; of 9" in account([], 0.66).sure
+    assert "leaves" not in account([], 0.99).sure
+
+
+def test_more_twins_than_a_headline_holds_are_named_below_it() -> None:
+    assert "of 9 explanations no other does as well" in account([]).sure
+    assert "2 others do as well." in account(["a@c", "b@c"]).sure, "the headline names them"
+    assert "3 others do as well (a at c; b at c; d at c)." in account(["a@c", "b@c", "d@c"]).sure
+    assert "(a at c; b at c; d at c; e at c and 2 more)." in account([f"{x}@c" for x in "abdefg"]).sure
+
+
+def test_one_effect_at_several_joints_is_told_with_each_of_its_values() -> None:
+    dry = [term("coulomb_friction", j, torque_nm=v) for j, v in (("a", 0.1), ("b", 0.25))]
+    assert told_all(tuple(dry)) == "coulomb friction, each joint by itself (a 0.1 N.m; b 0.25 N.m)"
+    both = [term("stribeck_friction", j, torque_nm=v, speed_rad_s=0.5) for j, v in (("a", 0.1), ("b", 0.2))]
+    said = "stribeck friction, each joint by itself (torque, speed: a 0.1 N.m, 0.5 rad/s; b 0.2 N.m, 0.5 rad/s)"
+    assert told_all(tuple(both)) == said
+
+
+def test_a_value_that_is_called_by_its_unit_has_no_other_name() -> None:
+    on_a_slide = term("quadratic_friction", "carriage", per_nm=1.06e-4)
+    assert told(on_a_slide, linear_stage()) == "quadratic friction at carriage (0.000106 1/N)"
+
+
+def test_what_a_candidate_has_is_what_the_next_command_asks_for() -> None:
+    terms = (term("load_friction", "servo", share=0.1), term("quadratic_friction", "servo", per_nm=0.2))
+    assert [c.name for c in effects_of(typed(terms), servo_pendulum()) or ()] == [t.name for t in terms]
 
 
 def compared(error: float, left: list[Leftover]) -> Account:

@@ -172,12 +172,20 @@ def test_the_layout_for_foxglove_asks_for_what_a_recording_has(make_file: Callab
         summary = reader.get_summary()
         assert summary is not None
         topics = {c.topic for c in summary.channels.values()}
+        shown = [d.decoded_message for d in reader.iter_decoded_messages() if d.schema.name.startswith("foxglove.")]
+    moved = [t for m in shown for t in getattr(m, "transforms", ())]
+    frames = {f for t in moved for f in (t.parent_frame_id, t.child_frame_id)}
+    bodies = {e.frame_id for m in shown for e in getattr(m, "entities", ())}
+    assert bodies and bodies <= frames, "what is drawn is drawn in frames that move"
     # Of a run with a diagnosis after its trials; the sample has none.
     topics |= {f"/hindsight/{what}" for what in ("rows", "scene", "transforms")}
     fields = {f.name for f in schemas.Row.DESCRIPTOR.fields} | {f.name for f in schemas.Generation.DESCRIPTOR.fields}
     panels = layout["configById"]
     asked = [t for p in panels.values() for t in p.get("topics", {})]
     asked += [p["topicPath"] for p in panels.values() if "topicPath" in p]
+    views = [p for p in panels.values() if "followTf" in p]
+    assert views
+    assert {v["followTf"] for v in views} | {g["frameId"] for v in views for g in v["layers"].values()} <= frames
     paths = [line["value"] for p in panels.values() for line in p.get("paths", [])]
     assert asked
     assert paths

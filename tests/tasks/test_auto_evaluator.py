@@ -29,10 +29,20 @@ def test_serial_for_a_small_budget_and_ray_where_it_pays_or_is_asked_for(
             asked.append((workers, address))
             super().__init__(make_engine())
 
-    monkeypatch.setattr(wiring, "RayEvaluator", Ray)
+    monkeypatch.setattr("ee_dist.evaluation.ray_actors.RayEvaluator", Ray)
     wiring.close_evaluators()
     wiring.evaluator_of(
         Config(engine=EngineConfig("mujoco"), budget=budget, evaluator=evaluator, ray=RayConfig(address))
     )
     wiring.close_evaluators()
     assert asked == ([(evaluator.workers, address)] if expected == "ray" else [])
+
+
+def test_a_comparison_does_without_ray_unless_it_is_asked_for():
+    for config, expected in (
+        (Config(), "serial"),
+        (Config(evaluator=EvaluatorConfig(workers=2)), "ray"),
+        (Config(evaluator=EvaluatorConfig("ray")), "ray"),
+        (Config(ray=RayConfig("127.0.0.1:6379")), "ray"),
+    ):
+        assert wiring.evaluator_name(wiring.for_few(config)) == expected

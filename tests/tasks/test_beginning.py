@@ -42,3 +42,11 @@ def test_it_is_the_first_thing_that_a_terminal_shows() -> None:
         run.kill()
     os.close(ours)
     assert first.startswith("ee_dist view: loading")
+
+
+def test_the_main_job_does_not_wait_for_what_it_may_not_need() -> None:
+    """Ray and the filters take seconds to load: whoever uses them does."""
+    script = "import sys, ee_dist.__main__, ee_dist.tasks.recover, ee_dist.tasks.trial; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert "ee_dist.tasks.recover" in loaded
+    assert not {"ray", "scipy.signal", "scipy.stats", "rerun", "plotly", "mujoco", "pybullet"} & set(loaded)

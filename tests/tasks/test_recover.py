@@ -58,6 +58,7 @@ def test_terminal_tells_the_result_and_where_the_files_are(finished):
         assert name in out
         assert (folder / name).stat().st_size > 0
     assert "after the change" in out
+    assert "shares of intact, and so this verdict, say little" in " ".join(out.split()), "of a quick budget"
     assert "truth" in out
     assert summary["result_digest"][:16] in out
 
@@ -108,6 +109,8 @@ def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
     rows = re.findall(r"^- Diagnosis \d \(error (\S+), as evolved \S+\): (.*)$", scene, re.MULTILINE)
     assert [text for _, text in rows] == [told(h) for h in believed]
     assert [float(error) for error, _ in rows] == pytest.approx(summary["diagnosis_error"], rel=1e-2)
+
+    assert f"**Believed in the end: {told(believed[-1])}.**" in scene
 
     progress = [line.split("believes: ")[1] for line in out.splitlines() if "believes: " in line]
     assert progress == [told(h) for h in believed]

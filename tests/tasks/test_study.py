@@ -8,10 +8,13 @@ import json
 import math
 
 import numpy as np
+import pytest
 from rich.console import Console
 
 from ee_dist.tasks import study
-from ee_dist.tasks.study import by_case, p_text, row
+from ee_dist.tasks.results.study_page import p_text, study_page
+from ee_dist.tasks.study import by_case, row, total
+from ee_dist.viewing.report import write_page
 from ee_dist.viewing.study_figures import distances
 
 
@@ -25,13 +28,17 @@ def test_a_sweep_becomes_a_table_and_figures(cli, tiny):
     with (run / "study.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert {(r["scenario"], r["metric"]) for r in rows} == {(s, m) for s in "39" for m in ("distance", "rolling_mean")}
-    page = (run / "figures.html").read_text()
+    summary = json.loads((run / "summary.json").read_text())
+    assert summary["runs"] == 4
+    page = (run / "report.html").read_text().split("<body>")[1]
     assert "How far the robot went forward, diagnosed by rolling means" in page
-    assert "Dominants: new best hypotheses" in page
     assert "Mann-Whitney U test, two-sided, corrected for the number of cases by Benjamini and Hochberg" in page
-    assert "sendDataToCloud" not in page.split("config")[-1]
-    assert "https://cdn" not in page.split("<body>")[1][:200], "the page must open offline"
-    assert json.loads((run / "summary.json").read_text())["runs"] == 4
+    restored, right = (sum(t[k] for t in summary["totals"].values()) for k in ("restored", "right"))
+    head = f"Function restored in {restored} of 4 runs; the diagnosis right in {right} of 4."
+    assert f"<h1>{head}</h1>" in page
+    assert outcome.out.splitlines()[-1].startswith("Next: ") and head in outcome.out, (
+        "the finding last, and what to do next"
+    )
 
 
 def test_table_counts_what_the_summaries_say():
@@ -83,6 +90,41 @@ def test_no_bar_whisker_or_dot_of_a_figure_is_cut():
     assert figure.layout.xaxis.ticktext[0] == "1. what<br>happens in<br>case 1, told<br>at some<br>length"
 
 
+def page_of(summaries):
+    rows = [row(s) for s in summaries]
+    return study_page(summaries, rows, by_case(rows), total(rows), "logs/sweep")
+
+
+def test_the_first_lines_of_a_study_tell_what_how_sure_and_what_next():
+    summaries = study_of([1, 2], range(4))
+    page = page_of(summaries)
+    assert page.tone == "good" and page.first[-1] == "Next: nothing has to be done."
+    assert "2 of 2 cases" in page.first[1]
+    summaries[5] |= {"restored": False, "recovered_fraction": 0.42, "folder": "logs/a sweep/5"}
+    page = page_of(summaries)
+    assert page.headline == "Function restored in 7 of 8 runs; the diagnosis right in 8 of 8." and page.tone == "open"
+    assert page.first[-1] == "Not restored: 1; the worst is case 2, seed 1 at 42% of intact."
+    assert "task=view" in page.following and "logs/a sweep/5" in page.following
+    assert "no test" in page_of(study_of([1, 2], [0])).first[1]
+    assert page_of(study_of([1, 2], [0])).first[-1].startswith("Next: more seeds")
+    quick = page_of([{**s, "budget": "quick"} for s in study_of([1], range(4))])
+    assert quick.tone == "open" and "without budget=quick" in quick.first[-1]
+    assert "cannot be below 0.1" in page_of(study_of([1, 2], range(3))).first[1]
+
+
+@pytest.mark.parametrize(("width", "dark"), [(1280, True), (400, False)], ids=["wide-dark", "narrow-light"])
+def test_the_page_of_a_study_is_quiet_and_fits(window, tmp_path, width, dark):
+    page = write_page(page_of(study_of(range(1, 11), range(3))), tmp_path / "report.html")
+    seen = window.look(page, width, dark=dark)
+    assert seen.complaints == () and seen.asked == () and seen.overflow == 0
+    overlapping = (
+        "(() => { const boxes = [...document.querySelectorAll('.xtick text, .annotation-text')].map((t) =>"
+        "t.getBoundingClientRect()).filter((b) => b.width); return boxes.some((a, i) => boxes.slice(i + 1).some((b) =>"
+        "a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 1 && b.top < a.bottom - 1)); })()"
+    )
+    assert window.evaluate(overlapping) is False, "no label lies on another"
+
+
 def test_the_table_of_all_cases_survives_80_columns():
     out = io.StringIO()
     study._print(Console(file=out, width=80), [row(s) for s in study_of(range(1, 14), range(10))])
@@ -108,4 +150,4 @@ def test_evolution_on_the_body_alone(cli, tiny):
     assert summary["body_trials_after_the_change"] == 8 + 3 * 4
     best = [d for _, d in summary["best_by_trials"]["after"]]
     assert best == sorted(best)
-    assert (outcome.runs()[0] / "online.html").stat().st_size > 100_000
+    assert "On the body alone: intact" in (outcome.runs()[0] / "report.html").read_text().split("<body>")[1]

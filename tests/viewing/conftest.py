@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from viewing_samples import sample_run
 
 from ee_dist.recording.records import RunRecord
-from ee_dist.viewing.browser import BrowserError, HeadlessBrowser, chromium
 from ee_dist.viewing.rerun_scene import write_rrd
 
 
@@ -28,14 +26,3 @@ def rrd(run: RunRecord, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("scene") / "run.rrd"
     write_rrd(run, path)
     return path
-
-
-@pytest.fixture(scope="session")
-def window() -> Iterator[HeadlessBrowser]:
-    """One browser for all tests that look at pages."""
-    try:
-        chromium()
-    except BrowserError as missing:
-        pytest.skip(str(missing))
-    with HeadlessBrowser() as found:
-        yield found

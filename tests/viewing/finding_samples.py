@@ -71,6 +71,7 @@ def finding(name: str) -> Finding:
     # The second prediction is shorter than what was measured.
     start = Account("the model", (given[0], given[1].head(len(given[1]) // 2)), model)
     better = Account(f"with coulomb friction at {joint}", best, bodies[2])
+    named = replace(better, label=f"coulomb friction at {joint}")
     channels = errors_of(cases, start)
     largest = max(c.error for c in channels)
     return Finding(
@@ -83,9 +84,14 @@ def finding(name: str) -> Finding:
         floor=0.1 * largest,
         channels=channels,
         candidates=(
-            Candidate(f"coulomb friction at {joint} (torque 0.31 N.m)", 0.93, 0.9, 0.95, BEST, better),
+            Candidate(f"coulomb friction at {joint} (torque 0.31 N.m)", 0.93, 0.9, 0.95, BEST, named),
             Candidate(
-                f"load friction at {joint} (share 0.08)", 0.91, 0.85, 0.94, TIED, Account("poor", poor, bodies[3])
+                f"load friction at {joint} (share 0.08)",
+                0.91,
+                0.85,
+                0.94,
+                TIED,
+                Account(f"load friction at {joint}", poor, bodies[3]),
             ),
             Candidate(f"viscous friction at {joint} (0.02 N.m.s/rad)", 0.2, 0.05, 0.3, REFUSED),
         ),

@@ -18,6 +18,7 @@ from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import HARDWARE, HINDSIGHT, PREDICTION, RunRecord, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.kinematics import part_poses
+from ee_dist.viewing import story
 from ee_dist.viewing.palette import FOOT, TOUCHING
 from ee_dist.viewing.rerun_scene import APPLICATION, write_rrd
 from ee_dist.viewing.world import BESIDE_M, LOOK_AHEAD_M
@@ -210,6 +211,17 @@ def test_search_curves(run: RunRecord, rrd: Path) -> None:
             assert np.diff(axis["buffer"]).tolist() == [1.0] * (len(best) - 1)
             assert axis["buffer"][0] > last
             last = axis["buffer"][-1]
+
+
+def test_the_first_lines_tell_what_was_found_how_sure_and_what_next(run: RunRecord, rrd: Path) -> None:
+    text = rows_of(rrd, "texts/result", "TextDocument:text")[1][0][0]
+    first = [line for line in text.splitlines() if line][1:5]
+    last = max((h for h in run.hypotheses if h.final), key=lambda h: h.pass_index)
+    assert first[0] == f"**Believed in the end: {story.told(last.terms)}.**"
+    best = max((t for t in run.trials if t.source == HARDWARE and t.index >= 2), key=lambda t: t.log.travel_m)
+    assert first[1].startswith(f"Best trial: {best.name}, {best.log.travel_m:.2f} m")
+    foreseen = trial(run, max(t.index for t in run.trials), PREDICTION).log.travel_m
+    assert f"by {last.error:.3g} (0 is exact); it foresaw {foreseen:.2f} m" in first[2]
 
 
 def test_the_text_tells_distances_beliefs_and_truth(run: RunRecord, rrd: Path) -> None:

@@ -16,6 +16,7 @@ from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account, named, percent, plain, told_all
+from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.results.labels import step_name, worst_trials
 
 TIED_STANDING = "tied with the best"
@@ -107,6 +108,11 @@ def setting(key: str, value: str | os.PathLike[str]) -> str:
     text = os.path.relpath(value) if os.path.exists(value) else str(value)
     safe = all(ch.isalnum() or ch in "/._-@:" for ch in text)
     return f"{key}={text}" if safe else f"{key}='{text}'"
+
+
+def typed(terms: Hypothesis) -> str:
+    """Effects as ``effect=`` of improve takes them, all that a candidate has."""
+    return ";".join(t.name for t in terms)
 
 
 def show_explanation(console: Console, problem: Problem, found: Explanation) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
@@ -42,10 +41,3 @@ def script(name: str) -> Markup:
     assert environment.loader is not None
     source, _, _ = environment.loader.get_source(environment, name)
     return Markup(source)
-
-
-def plot(figure: go.Figure | None, name: str) -> Markup:
-    """A figure as a part of a page; nothing without one."""
-    if figure is None:
-        return Markup()
-    return Markup(figure.to_html(full_html=False, include_plotlyjs=False, div_id=name, config=FIGURE))

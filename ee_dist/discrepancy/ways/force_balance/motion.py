@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.ndimage import binary_opening
-from scipy.signal import savgol_filter
+import scipy
 
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
@@ -119,11 +118,11 @@ def at_rest(joints: Array, dt: float, processing: Processing) -> Mask:
     """(T, M): where readings (T, M) tell no motion: a line laid through them over half a period of the filter's cut-off does
     not rise by more than their noise allows. A filter smears the moment in which a joint sticks; the readings do not."""
     rows = max(int(0.5 / processing.filter_for(dt).cutoff_hz / dt) // 2 * 2 + 1, 5)
-    slope = savgol_filter(joints, rows, 1, deriv=1, delta=dt, axis=0)
+    slope = scipy.signal.savgol_filter(joints, rows, 1, deriv=1, delta=dt, axis=0)
     noise = np.maximum(np.sqrt(np.median(roughness(joints), axis=0) / 0.455), FINEST * np.ptp(joints, axis=0))
     still = np.abs(slope) <= REST_NOISE * noise * math.sqrt(12.0 / rows**3) / dt
     # A reversal is slow for a moment too: rest lasts.
-    return np.asarray(binary_opening(still, np.ones((REST_WINDOWS * rows, 1), dtype=bool)))
+    return np.asarray(scipy.ndimage.binary_opening(still, np.ones((REST_WINDOWS * rows, 1), dtype=bool)))
 
 
 def motor_torques(log: SensorLog, robot: Robot) -> Array | None:
