@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -67,7 +68,7 @@ def placed(name: str) -> str:
 
 def without_unit(key: str, unit: str) -> str:
     """``torque_nm`` in N.m is ``torque``: the unit is told behind the value."""
-    tail, parts = unit.lower().replace(".", "").replace("/", "").replace("^", ""), key.split("_")
+    tail, parts = re.sub(r"[./^()]", "", unit.lower()), key.split("_")
     for k in range(1, len(parts)):
         if tail and "".join(parts[k:]) == tail:
             return "_".join(parts[:k])
@@ -76,16 +77,17 @@ def without_unit(key: str, unit: str) -> str:
 
 def told(term: Term, robot: Robot | None = None) -> str:
     """``coulomb friction at knee front left (torque 0.3 N.m)``."""
-    shown = [f"{_quantity(term, key, robot)} {value:.3g}{_unit(term, key, robot)}" for key, value in term.values]
+    shown = [f"{quantity(term, key, robot)} {value:.3g}{_unit(term, key, robot)}" for key, value in term.values]
     return named(term) + (f" ({', '.join(shown)})" if shown else "")
 
 
-def _quantity(term: Term, key: str, robot: Robot | None) -> str:
-    """A parameter's name without its unit, which is told behind the value."""
+def quantity(term: Term, key: str, robot: Robot | None = None) -> str:
+    """A parameter's name without its unit, which is told behind the value; along a slide a torque is a force."""
     entry = CATALOGUE[term.effect]
     own = entry.parameter(key).unit  # that of a hinge, which names carry on slides too
     other = entry.unit(key, robot, term.target) if robot is not None else own
-    return plain(without_unit(without_unit(key, other), own))
+    name = plain(without_unit(without_unit(key, other), own))
+    return name.replace("torque", "force") if other == "N" else name
 
 
 def _unit(term: Term, key: str, robot: Robot | None) -> str:
@@ -326,7 +328,7 @@ def _ranges(found: Improvement, new: Sequence[Term], robot: Robot) -> str:
         if term.name in told_of:
             range_ = f"{p.low:.3g} to {p.high:.3g}{_unit(term, p.name, robot)}"
             sure = not p.flag and np.isfinite(p.high - p.low)
-            told_of[term.name].append(f"{_quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}")
+            told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}")
     out = [
         (f"{placed(name)}: " if len(told_of) > 1 else "") + ", ".join(values)
         for name, values in told_of.items()
@@ -348,7 +350,7 @@ def _capital(text: str) -> str:
 
 
 def flag_text(terms: Hypothesis, p: ParameterReport) -> str:
-    return f"{named(terms[p.term])}, {plain(p.name)}: {p.flag}."
+    return f"{named(terms[p.term])}, {quantity(terms[p.term], p.name)}: {p.flag}."
 
 
 def tie_text(what: str, others: Sequence[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import secrets
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import uvicorn
 from fastapi import FastAPI, HTTPException, Response
+from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.responses import FileResponse
 from nicegui import app as toolkit
 from nicegui import ui
@@ -70,10 +72,19 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     toolkit.on_exception(lambda error: session.say(defect(error, out)))
     for name in ("nicegui", "uvicorn", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    ui.run_with(app, title=TITLE, show_welcome_message=False, reconnect_timeout=20.0)
-    server = uvicorn.Server(
-        uvicorn.Config(Guard(app, token), log_config=None, access_log=False, timeout_graceful_shutdown=1)
+    # To squeeze what is sent takes longer than to hand it over, unless a network lies between.
+    squeeze = GZipMiddleware if token else None
+    ui.run_with(app, title=TITLE, show_welcome_message=False, reconnect_timeout=20.0, gzip_middleware_factory=squeeze)
+    # What is loaded by now stays: neither the collector nor the toolkit, which looks for its server, goes through it again.
+    gc.freeze()
+    settings = uvicorn.Config(
+        Guard(app, token),
+        log_config=None,
+        access_log=False,
+        timeout_graceful_shutdown=1,
+        ws_per_message_deflate=bool(token),
     )
+    server = uvicorn.Server(settings)
     address = f"http://{host if ':' not in host else f'[{host}]'}:{sock.getsockname()[1]}/"
     address += f"?token={token}" if token else ""
     Console().print(f"The workbench: {address} (Ctrl-C ends it)", highlight=False, soft_wrap=True)

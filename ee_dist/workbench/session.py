@@ -155,7 +155,6 @@ class Session:
         off = self.seen.found.error
         self.bench = self.bench.stepped(Step("the model as it was", off, off, "nothing was fitted"))
         self._note("compare", self.bench.terms)
-        self.worker.warm()
         self.tell("seen")
 
     def place(self) -> Place:

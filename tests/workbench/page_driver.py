@@ -22,12 +22,15 @@ READY_S, PATIENCE_S = 120.0, 120.0
 class Bench:
     """``python -m ee_dist task=workbench ...`` in a folder, ended at the end of the block."""
 
+    program: tuple[str, ...] = ("-m", "ee_dist")
+
     def __init__(self, folder: Path, *arguments: str) -> None:
         self.folder, self.arguments = folder, arguments
-        self.address = ""
+        self.address, self.lines = "", list[str]()
 
     def __enter__(self) -> Self:
-        command = [sys.executable, "-m", "ee_dist", "task=workbench", "task.port=0", "task.show=false", *self.arguments]
+        words = ["task=workbench", "task.port=0", "task.show=false", *self.arguments]
+        command = [sys.executable, *self.program, *words]
         environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
         self.errors = (self.folder / "errors.txt").open("w+")
         self.process = subprocess.Popen(
@@ -35,6 +38,7 @@ class Bench:
         )
         assert self.process.stdout is not None
         for line in self.process.stdout:
+            self.lines.append(line)
             found = re.search(r"http://\S+", line)
             if found:
                 self.address = found[0]
@@ -120,6 +124,17 @@ class Person(HeadlessBrowser):
     def press(self, x: float, y: float) -> None:
         for kind in ("mousePressed", "mouseReleased"):
             self.mouse(kind, x, y)
+
+    def received(self) -> int:
+        """Bytes that came over the network and the websocket since the page was asked for."""
+        self.evaluate("1")
+        files = [e["params"]["encodedDataLength"] for e in self._events if e["method"] == "Network.loadingFinished"]
+        frames = [
+            e["params"]["response"]["payloadData"]
+            for e in self._events
+            if e["method"] == "Network.webSocketFrameReceived"
+        ]
+        return int(sum(files)) + sum(map(len, frames))
 
     def mouse(self, kind: str, x: float, y: float) -> None:
         event = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1}

@@ -21,14 +21,12 @@ from ee_dist.workbench.bench import FIT, HAND, Step
 from ee_dist.workbench.results import Improved
 from ee_dist.workbench.session import Session
 from ee_dist.workbench.verbs import Ended, Request
-from ee_dist.workbench.worker import Worker
 
 FRICTION = "coulomb_friction@servo"
 
 
 @pytest.fixture
-def session(recording, tmp_path, monkeypatch):
-    monkeypatch.setattr(Worker, "warm", lambda _: None)
+def session(recording, tmp_path):
     found = Session(Config(engine=EngineConfig("mujoco")), "auto", tmp_path / "bench")
     found.load(str(recording), None)
     found.begin()

@@ -29,6 +29,8 @@ CALM = (
     "{ if (String(e.reason).includes('displayed plot div')) e.preventDefault(); });</script>"
 )
 MOVES = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
+IDLE_S = 4.0
+"""After which the process of the long verbs is started: not while a page needs the processor to come up."""
 STYLE = Path(__file__).with_name("style.css")
 KEYS = "Keys: 1 to 5 choose a view, arrows another trial or channel in Compare, e explains, u takes back, Esc cancels a search."
 
@@ -85,6 +87,7 @@ class Page:
                             view.build()
                 ui.label(KEYS).classes("quiet")
         ui.keyboard(on_key=self._key, ignore=["input", "select", "textarea"])
+        ui.timer(IDLE_S, self.session.worker.warm, once=True)
         self.changed("opened")
 
     def _head(self) -> None:
