@@ -18,7 +18,7 @@ from ee_dist.workbench.bench import Step
 from ee_dist.workbench.sight import Cloud
 
 Chart = dict[str, Any]
-MEASURED, PREDICTED, RESIDUAL, MARK, FLOOR, MARKED = "#0072b2", "#e69f00", "#c04a00", "#009e73", "#8a5fbf", "#000000"
+MEASURED, PREDICTED, RESIDUAL, MARK, FLOOR, MARKED = "#0072b2", "#e69f00", "#c04a00", "#009e73", "#8a5fbf", "#cc79a7"
 DOTS = 1500
 """Points of a cloud that are drawn."""
 NUMBERED = 150

@@ -68,13 +68,15 @@ class Improved:
 
 @dataclass(frozen=True)
 class Compared:
-    """What task=compare says of a saved model."""
+    """What task=compare says of a saved model. ``starts_s``: of each trial, on the ``timeline`` of its recording in 3-D."""
 
     error: float
     noise_floor: float
     told: str
     headline: str
     folder: Path
+    starts_s: tuple[float, ...]
+    timeline: str
 
 
 def of_explanation(problem: Problem, found: Explanation, account: Account, folder: Path) -> Explained:

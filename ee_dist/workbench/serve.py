@@ -9,6 +9,7 @@ import secrets
 import socket
 import sys
 import webbrowser
+from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
@@ -22,7 +23,9 @@ from rich.console import Console
 from ee_dist.effects.model_file import read_model
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.errors import defect
+from ee_dist.tasks.results.tables import command, setting
 from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
+from ee_dist.workbench import saved
 from ee_dist.workbench.guard import Guard, is_loopback
 from ee_dist.workbench.pages.page import show_session
 from ee_dist.workbench.pages.recovery import show_recovery
@@ -53,9 +56,16 @@ def bound(host: str, port: int) -> socket.socket:
 
 def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) -> None:
     """Answer until ended. What cannot be opened is said before anything is served."""
+    log = Path(config.log) if config.log else None
+    kept = None
+    if log is not None and saved.is_session(log):
+        kept, log = saved.read(log), None
+        config, by = replace(config, engine=replace(config.engine, name=kept.engine)), kept.by
     session = Session(config, by, out)
-    if config.log:
-        show_recovery(Path(config.log), out)
+    if kept is not None:
+        session.reopen(kept)
+    elif log is not None:
+        show_recovery(log, out)
     elif config.measured:
         session.load(config.measured, config.model)
     elif config.model:
@@ -64,7 +74,7 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     token = "" if is_loopback(host) else secrets.token_urlsafe(24)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     _files(app, out)
-    if not config.log:
+    if log is None:
         show_session(session)
     if session.measured is not None:
         session.attempt(session.begin)
@@ -74,7 +84,9 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
         logging.getLogger(name).setLevel(logging.CRITICAL)
     # To squeeze what is sent takes longer than to hand it over, unless a network lies between.
     squeeze = GZipMiddleware if token else None
-    ui.run_with(app, title=TITLE, show_welcome_message=False, reconnect_timeout=20.0, gzip_middleware_factory=squeeze)
+    ui.run_with(
+        app, title=TITLE, dark=None, show_welcome_message=False, reconnect_timeout=20.0, gzip_middleware_factory=squeeze
+    )
     # What is loaded by now stays: neither the collector nor the toolkit, which looks for its server, goes through it again.
     gc.freeze()
     settings = uvicorn.Config(
@@ -87,7 +99,8 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     server = uvicorn.Server(settings)
     address = f"http://{host if ':' not in host else f'[{host}]'}:{sock.getsockname()[1]}/"
     address += f"?token={token}" if token else ""
-    Console().print(f"The workbench: {address} (Ctrl-C ends it)", highlight=False, soft_wrap=True)
+    console = Console()
+    console.print(f"The workbench: {address} (Ctrl-C ends it)", highlight=False, soft_wrap=True)
     sys.stdout.flush()
     if show and (os.environ.get("DISPLAY") or sys.platform in ("darwin", "win32")):
         webbrowser.open(address)
@@ -96,6 +109,10 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     finally:
         session.close()
         sock.close()
+        if session.measured is not None:
+            console.print(
+                f"To go on: {command(['task=workbench', setting('log', out)])}", highlight=False, soft_wrap=True
+            )
 
 
 def _files(app: FastAPI, folder: Path) -> None:

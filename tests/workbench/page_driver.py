@@ -71,9 +71,11 @@ class Bench:
 class Person(HeadlessBrowser):
     """A browser with hands. Elements are found by the marks that the page gives them, through its own accessibility."""
 
-    def go(self, address: str, width: int = 1280, height: int = 900) -> None:
+    def go(self, address: str, width: int = 1280, height: int = 900, *, dark: bool = False) -> None:
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self._ask("Emulation.setDeviceMetricsOverride", metrics, page=True)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self._ask("Emulation.setEmulatedMedia", {"features": [scheme]}, page=True)
         self._events.clear()
         self._ask("Page.navigate", {"url": address}, page=True)
         self._until("Page.loadEventFired")
@@ -150,8 +152,14 @@ class Person(HeadlessBrowser):
                 event["text"] = text
             self._ask("Input.dispatchKeyEvent", event, page=True)
 
-    def picture(self, path: Path) -> None:
-        shot = self._ask("Page.captureScreenshot", {"format": "png"}, page=True)["data"]
+    def picture(self, path: Path, *, whole: bool = False) -> None:
+        """Of what is in sight, or of the ``whole`` page."""
+        clip: dict[str, Any] = {}
+        if whole:
+            width, height = self.evaluate("[innerWidth, document.documentElement.scrollHeight]")
+            part = {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}
+            clip = {"clip": part, "captureBeyondViewport": True}
+        shot = self._ask("Page.captureScreenshot", {"format": "png", **clip}, page=True)["data"]
         path.write_bytes(base64.b64decode(shot))
 
     def complaints(self) -> tuple[str, ...]:

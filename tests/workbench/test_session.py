@@ -15,8 +15,8 @@ import pytest
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.effects.catalogue import EffectError, term
 from ee_dist.tasks import compare
-from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
-from ee_dist.workbench import verbs
+from ee_dist.tasks.config import Config, ConfigError, EngineConfig, EvaluatorConfig
+from ee_dist.workbench import saved, verbs
 from ee_dist.workbench.bench import FIT, HAND, Step
 from ee_dist.workbench.results import Improved
 from ee_dist.workbench.session import Session
@@ -133,3 +133,20 @@ def test_a_search_that_is_killed_or_cancelled_loses_nothing(session):
     session.cancel()
     until(lambda: "cancelled" in session.notice)
     assert session.bench is before and session.explained is None and session.progress is None
+
+
+def test_a_session_goes_on_where_it_ended(session, tmp_path):
+    session.add(FRICTION, {"torque_nm": 0.09})
+    session.add("viscous_friction@servo", {"damping_nm_s_rad": 0.001})
+    session.switch(1, False)
+    session.close()
+    kept = saved.read(session.folder)
+    again = Session(session.config, kept.by, tmp_path / "again")
+    again.reopen(kept)
+    again.begin()
+    assert again.bench == session.bench and again.commands == session.commands
+    assert again.seen.found.error == session.seen.found.error
+    again.close()
+    (session.folder / saved.FILE).write_text('{"format": 1, "measured": ["x"]}')
+    with pytest.raises(ConfigError, match="no session of the workbench can be read"):
+        saved.read(session.folder)

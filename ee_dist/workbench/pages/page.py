@@ -32,6 +32,7 @@ MOVES = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowD
 IDLE_S = 4.0
 """After which the process of the long verbs is started: not while a page needs the processor to come up."""
 STYLE = Path(__file__).with_name("style.css")
+FOLLOW = Path(__file__).with_name("follow.js")
 KEYS = "Keys: 1 to 5 choose a view, arrows another trial or channel in Compare, e explains, u takes back, Esc cancels a search."
 
 
@@ -67,6 +68,7 @@ class Page:
         client.on_delete(self.session.listen(hear))
         ui.add_css(STYLE)
         ui.add_head_html(CALM)
+        ui.add_head_html(f"<script>{FOLLOW.read_text()}</script>")
         ui.colors(primary="#0072b2", positive="#009e73", negative="#c04a00")
         with ui.element("main").classes("bench"):
             self._head()

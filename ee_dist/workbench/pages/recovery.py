@@ -160,5 +160,5 @@ class RecoveryPage:
         path = await asyncio.to_thread(self.followed.scene)
         with self.client, self.place:
             self.place.clear()
-            frame = ui.element("iframe").props('title="robot in 3-D"').style("width:100%; height:520px; border:0")
+            frame = ui.element("iframe").props('title="robot in 3-D"').classes("robot")
             ui.run_javascript(shown(frame.html_id, quote(path.name)))
