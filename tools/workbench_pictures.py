@@ -71,6 +71,7 @@ def _all(bench: Bench, person: Person, out: Path) -> None:
                 person.open(view)
                 time.sleep(SETTLED_S)
                 over = person.evaluate("document.documentElement.scrollWidth - innerWidth")
+                person.evaluate("scrollTo(0, 0)")
                 name = f"{view.lower()}_{width}{'_dark' if dark else ''}.png"
                 person.picture(out / name, whole=True)
                 print(name, f"wider than the window by {over} px" if over > 0 else "")

@@ -205,7 +205,7 @@ def _floor_line(floor: float, axis: str) -> Chart:
             "line": {"color": FLOOR, "width": 2, "dash": "dot"}}  # fmt: skip
 
 
-def ladder(steps: Sequence[Step], floor: float) -> Chart:
+def ladder(steps: Sequence[Step], floor: float, axis: str = "error") -> Chart:
     """Fitted and held-out error of each step apart; what was refused is crossed out."""
     places = list(range(len(steps)))
     held = [k for k in places if steps[k].error_heldout is not None and not steps[k].refused]
@@ -216,30 +216,36 @@ def ladder(steps: Sequence[Step], floor: float) -> Chart:
     def at(rows: Sequence[int], values: Sequence[float | None], name: str, **more: Any) -> Chart:
         return {"type": "scatter", "x": list(rows), "y": _short(np.array(values, dtype=float)), "name": name, **more}
 
+    tops = [v for s in steps for v in (s.error_fit, s.error_heldout) if v is not None and np.isfinite(v)]
+    top = 1.2 * max([floor, *tops])
     numbers = [f"{steps[k].error_heldout:.3g}" for k in held]
+    written = [_beside(steps[k].error_heldout or 0.0, floor, top) for k in held]
     data = [
         at(fitted, [steps[k].error_fit for k in fitted], "where it was fitted", mode="lines+markers",
-           line={"color": PREDICTED, "dash": "dot", "width": 2}, marker={"symbol": "circle-open", "size": 9}),
+           line={"color": PREDICTED, "dash": "dot", "width": 2}, marker={"symbol": "circle-open", "size": 16, "line": {"width": 2}}),
         at(held, [steps[k].error_heldout for k in held], "held out", mode="lines+markers+text", text=numbers,
-           textposition="top center", line={"color": MEASURED, "width": 3}, marker={"symbol": "square", "size": 10}),
+           textposition=written, line={"color": MEASURED, "width": 3}, marker={"symbol": "square", "size": 10}),
         at(hand, [steps[k].error_fit for k in hand], "set by hand, all data seen", mode="markers",
            marker={"symbol": "diamond-open", "size": 11, "color": "#5a6672", "line": {"width": 2}}),
         at(refused, [steps[k].error_heldout for k in refused], "refused", mode="markers",
            marker={"symbol": "x", "size": 13, "color": RESIDUAL}),
     ]  # fmt: skip
-    tops = [v for s in steps for v in (s.error_fit, s.error_heldout) if v is not None and np.isfinite(v)]
-    top = 1.2 * max([floor, *tops])
     labels = [wrapped(s.name, 16) + ("<br><b>refused</b>" if s.refused else "") for s in steps]
     return _chart(
         [d for d in data if d["x"]],
         360,
         dragmode=False,
         shapes=[_floor_line(floor, "y")],
-        annotations=[{"x": 1, "xref": "paper", "xanchor": "right", "y": floor, "yanchor": "top", "showarrow": False,
+        annotations=[{"x": 0, "xref": "paper", "xanchor": "left", "y": floor, "yanchor": "bottom", "showarrow": False,
                       "text": f"noise floor {floor:.3g}", "font": {"color": FLOOR}}],
         xaxis={"tickvals": places, "ticktext": labels, "range": [-0.5, len(steps) - 0.5], "automargin": True, "fixedrange": True},
-        yaxis={"title": {"text": "error"}, "range": [0, top], "gridcolor": "#e8edf2", "fixedrange": True},
+        yaxis={"title": {"text": axis}, "range": [0, top], "gridcolor": "#e8edf2", "fixedrange": True},
     )  # fmt: skip
+
+
+def _beside(value: float, floor: float, top: float) -> str:
+    """Where a number is written, so that the line of the floor does not go through it."""
+    return "bottom center" if 0 <= floor - value < 0.1 * top and value > 0.08 * top else "top center"
 
 
 def ranking(
@@ -259,11 +265,11 @@ def ranking(
     least = min([100 * i[0] for i in intervals if np.isfinite(i[0])] + [0.0])
     return _rows(
         trace,
-        90 + 36 * len(names),
+        104 + 36 * len(names),
         {"title": {"text": "gain above the noise, held out (%)"}, "range": [max(least - 3, -25), 106]},
         {"ticksuffix": "  "},
         showlegend=False,
-        margin={"l": 10, "r": 20, "t": 8, "b": 42},
+        margin={"l": 10, "r": 20, "t": 8, "b": 56},
     )
 
 

@@ -32,6 +32,7 @@ from ee_dist.workbench.pages.recovery import show_recovery
 from ee_dist.workbench.session import Session
 
 TITLE = "ee_dist workbench"
+EVERYWHERE = ("0.0.0.0", "::")
 
 
 def bound(host: str, port: int) -> socket.socket:
@@ -97,7 +98,9 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
         ws_per_message_deflate=bool(token),
     )
     server = uvicorn.Server(settings)
-    address = f"http://{host if ':' not in host else f'[{host}]'}:{sock.getsockname()[1]}/"
+    # Who comes from elsewhere asks for this machine by its name.
+    named = host if host not in EVERYWHERE else socket.gethostname()
+    address = f"http://{named if ':' not in named else f'[{named}]'}:{sock.getsockname()[1]}/"
     address += f"?token={token}" if token else ""
     console = Console()
     console.print(f"The workbench: {address} (Ctrl-C ends it)", highlight=False, soft_wrap=True)

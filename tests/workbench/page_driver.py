@@ -31,10 +31,10 @@ class Bench:
     def __enter__(self) -> Self:
         words = ["task=workbench", "task.port=0", "task.show=false", *self.arguments]
         command = [sys.executable, *self.program, *words]
-        environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+        self.environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
         self.errors = (self.folder / "errors.txt").open("w+")
         self.process = subprocess.Popen(
-            command, cwd=self.folder, env=environment, stdout=subprocess.PIPE, stderr=self.errors, text=True
+            command, cwd=self.folder, env=self.environment, stdout=subprocess.PIPE, stderr=self.errors, text=True
         )
         assert self.process.stdout is not None
         for line in self.process.stdout:
@@ -46,8 +46,16 @@ class Bench:
         self.process.wait()
         raise AssertionError(f"the workbench ended: {self.said()}")
 
+    @property
+    def searcher(self) -> int:
+        """The process in which long verbs run."""
+        lists = Path(f"/proc/{self.process.pid}/task").glob("*/children")
+        children = [int(child) for found in lists for child in found.read_text().split()]
+        return next(c for c in children if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes())
+
     def said(self) -> str:
-        self.errors.flush()
+        if not self.errors.closed:
+            self.errors.flush()
         return Path(self.errors.name).read_text()
 
     def end(self) -> int:
@@ -141,6 +149,12 @@ class Person(HeadlessBrowser):
     def mouse(self, kind: str, x: float, y: float) -> None:
         event = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1}
         self._ask("Input.dispatchMouseEvent", event, page=True)
+
+    def drop(self, path: Path) -> None:
+        """A file into the page's place for files."""
+        asked = {"expression": "document.querySelector('input[type=file]')"}
+        place = self._ask("Runtime.evaluate", asked, page=True)["result"]["objectId"]
+        self._ask("DOM.setFileInputFiles", {"files": [str(path)], "objectId": place}, page=True)
 
     def type(self, text: str) -> None:
         self._ask("Input.insertText", {"text": text}, page=True)

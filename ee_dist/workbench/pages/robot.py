@@ -36,7 +36,7 @@ class RobotPanel:
 
     def __init__(self, page: Desk) -> None:
         self.page = page
-        self._shown = ""
+        self._shown, self._wanted = "", False
         with ui.element("section").classes("card"):
             heading("The robot, and the model's ghost")
             self.note = quiet(
@@ -47,11 +47,12 @@ class RobotPanel:
             self.place = ui.element("div").classes("w-full")
 
     async def _ask(self) -> None:
+        self._wanted = True
         await self.page.begin(verbs.COMPARE)
 
     def draw(self, topics: set[str]) -> None:
         kept = self.page.session.kept
-        if kept is None or str(kept.folder) == self._shown:
+        if kept is None or not self._wanted or str(kept.folder) == self._shown:
             self._follow(topics)
             return
         recording = kept.folder / f"{verbs.COMPARE}.rrd"
