@@ -79,6 +79,7 @@ def _all(bench: Bench, person: Person, out: Path) -> None:
 
 def _tour(person: Person, folder: Path) -> None:
     """What a person does in the first minute."""
+    folder.mkdir(parents=True, exist_ok=True)
     _shot(person, folder, "1_compare")
     _explained(person)
     _shot(person, folder, "2_explain")

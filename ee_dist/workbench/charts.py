@@ -222,7 +222,8 @@ def ladder(steps: Sequence[Step], floor: float, axis: str = "error") -> Chart:
     written = [_beside(steps[k].error_heldout or 0.0, floor, top) for k in held]
     data = [
         at(fitted, [steps[k].error_fit for k in fitted], "where it was fitted", mode="lines+markers",
-           line={"color": PREDICTED, "dash": "dot", "width": 2}, marker={"symbol": "circle-open", "size": 16, "line": {"width": 2}}),
+           line={"color": PREDICTED, "dash": "dot", "width": 2},
+           marker={"symbol": "circle-open", "size": 16, "line": {"width": 2}}),
         at(held, [steps[k].error_heldout for k in held], "held out", mode="lines+markers+text", text=numbers,
            textposition=written, line={"color": MEASURED, "width": 3}, marker={"symbol": "square", "size": 10}),
         at(hand, [steps[k].error_fit for k in hand], "set by hand, all data seen", mode="markers",

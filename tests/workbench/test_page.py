@@ -3,11 +3,10 @@ by the command line, has the error that the page said."""
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -21,8 +20,6 @@ pytest.importorskip("nicegui", reason="needs the extra 'workbench'")
 
 from page_driver import Bench, Person
 
-from ee_dist.tasks import compare
-from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.viewing.browser import BrowserError, chromium
 from ee_dist.workbench.guard import Guard
 
@@ -101,6 +98,7 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
             person.open("Keep")
             person.click("Keep the model")
             person.waits_for("task=compare says")
+            line = re.findall(r"python -m ee_dist (task=compare .*model\.yaml.*)", person.text())[-1]
             said = float(re.search(r"\(error ([\d.]+)\)", person.text())[1])
             overflow = person.evaluate("document.documentElement.scrollWidth - innerWidth")
             assert overflow <= 0
@@ -117,10 +115,9 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
         assert refused(f"{bench.address}files/..%2f..%2ferrors.txt") == 404
         assert bench.end() == 130
         assert "kept in bench" in bench.said() and len(bench.said().strip().splitlines()) == 1
-    config = Config(engine=EngineConfig("mujoco"), evaluator=EvaluatorConfig("serial"), measured=str(recording))
-    config.model = str(tmp_path / "bench" / "model.yaml")
-    with contextlib.redirect_stdout(io.StringIO()):
-        compare.run(config, compare.Options(rerun=False), tmp_path / "again")
+    # The last of the command lines that the page gives, as it stands there.
+    command = [sys.executable, "-m", "ee_dist", *shlex.split(line), "hydra.run.dir=again"]
+    subprocess.run(command, cwd=tmp_path, env=bench.environment, capture_output=True, check=True)
     again = json.loads((tmp_path / "again" / "summary.json").read_text())
     assert f"{again['error']:.6g}" == f"{said:.6g}"
 

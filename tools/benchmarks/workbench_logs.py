@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.discrepancy.measured_trial import driver_of
+from ee_dist.effects.catalogue import apply
+from ee_dist.engines.contract import Rollout
+from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.robots.servo_pendulum import servo_pendulum
-from ee_dist.tasks.trial import hypothesis, one_trial
+from ee_dist.tasks.trial import hypothesis
 from ee_dist.tasks.wiring import EngineMaker
 from ee_dist.trials.excitation import parse
 from ee_dist.trials.noise import with_noise
@@ -49,10 +52,18 @@ LONG = Log(
 
 
 def written(log: Log, path: Path) -> None:
-    """The recording at ``path``, as task=trial writes it."""
+    """The recording at ``path``, as task=trial writes it; all trials simulated at once."""
     robot = with_noise(log.robot, NOISE)
     hidden = hypothesis(log.effect, robot, np.random.SeedSequence(0))
-    hardware = PhysicalRobot(EngineMaker("mujoco", 1)(), robot, hidden, np.random.SeedSequence(0))
+    changed = apply(robot, hidden)
+    plan = [parse(text) for text in log.plan]
+    drivers = [driver_of(e, robot) for e in plan]
+    asked = [
+        Rollout(changed, d, e.steps(robot), seed=k, pose=True)
+        for k, (e, d) in enumerate(zip(plan, drivers, strict=True))
+    ]
+    logs = EngineMaker("mujoco", 1)().rollout(asked)
     with RunWriter(path, robot, {"task": "trial", "engine": "mujoco", "noise": str(NOISE)}) as writer:
-        for k, text in enumerate(log.plan):
-            writer.trial(one_trial(hardware, parse(text), robot, k)[1])
+        for k, (excitation, driver, found) in enumerate(zip(plan, drivers, logs, strict=True)):
+            sent = replace(found, commands=np.array(driver.values[: len(found)]), torques=None)
+            writer.trial(TrialRecord(k, f"{excitation.kind} {excitation.fixture}", HARDWARE, driver, sent))
