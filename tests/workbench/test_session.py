@@ -14,8 +14,8 @@ import pytest
 
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.effects.catalogue import EffectError, term
-from ee_dist.tasks import compare
-from ee_dist.tasks.config import Config, ConfigError, EngineConfig, EvaluatorConfig
+from ee_dist.tasks import compare, trial
+from ee_dist.tasks.config import Config, ConfigError, EngineConfig, EvaluatorConfig, RobotConfig
 from ee_dist.workbench import saved, verbs
 from ee_dist.workbench.bench import FIT, HAND, Step
 from ee_dist.workbench.results import Improved
@@ -23,6 +23,7 @@ from ee_dist.workbench.session import Session
 from ee_dist.workbench.verbs import Ended, Request
 
 FRICTION = "coulomb_friction@servo"
+PLAN = ["multisine:seconds=2,amplitude=0.5,seed=1"]
 
 
 @pytest.fixture
@@ -150,3 +151,26 @@ def test_a_session_goes_on_where_it_ended(session, tmp_path):
     (session.folder / saved.FILE).write_text('{"format": 1, "measured": ["x"]}')
     with pytest.raises(ConfigError, match="no session of the workbench can be read"):
         saved.read(session.folder)
+
+
+def test_what_explain_refuses_is_refused_when_it_is_added(tmp_path):
+    """By measured torques, which nothing need be simulated for: the friction is known, and the motor is as strong as it says."""
+    config = Config(
+        robot=RobotConfig(name="servo_pendulum"), engine=EngineConfig("mujoco"), evaluator=EvaluatorConfig("serial")
+    )
+    options = trial.Options(excitations=PLAN, repeats=1, noise=0.002, motor_torque=True)
+    with contextlib.redirect_stdout(io.StringIO()):
+        trial.run(replace(config, hidden=FRICTION), options, tmp_path / "tried")
+    bench = Session(config, "force_balance", tmp_path / "bench")
+    bench.load(str(tmp_path / "tried" / "trial.mcap"), None)
+    bench.begin()
+    bench.add(FRICTION, {"torque_nm": 0.135})
+    useless = "parallel_spring@servo"
+    request = Request(verbs.ADD, bench._asked(bench.bench.terms), "force_balance", tmp_path / "add", useless, True)
+    with contextlib.redirect_stdout(io.StringIO()):
+        found = verbs.done(request, lambda *_: None)
+    assert found.steps[-1].refused and found.steps[-1].error_heldout is not None
+    bench._after(request, Ended(found))
+    assert [e.on for e in bench.bench.entries] == [True, False] and bench.notice.startswith("Refused: parallel spring")
+    assert bench.bench.ladder[-1].refused == found.steps[-1].refused
+    bench.close()
