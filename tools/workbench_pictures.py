@@ -24,6 +24,11 @@ VIEWS = ("Compare", "Explain", "Add", "Watch", "Keep")
 PATIENCE_S = 600.0
 SETTLED_S = 3.0
 NUMBER = "parseFloat(document.querySelector('.number').innerText)"
+JUDGED = (
+    "[...document.querySelectorAll('.entry')].some((e) => "
+    "/fitted .*held out [^(]*[(](?!nothing)/.test(e.textContent) && !e.textContent.startsWith('by hand'))"
+)
+"""Whether the ladder has a step that was judged."""
 COLOURS = 96
 BY_HAND = 5
 """Strokes of a key by which the slider is moved for the picture of it."""
@@ -50,7 +55,7 @@ def _explained(person: Person) -> None:
 
 
 def _fitted(person: Person) -> None:
-    _searched(person, "Add and fit", "document.body.innerText.includes('held out')")
+    _searched(person, "Add and fit", JUDGED)
 
 
 def _searched(person: Person, button: str, done: str) -> None:
