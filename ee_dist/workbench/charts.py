@@ -156,7 +156,8 @@ def heat(table: Array, channels: Sequence[str], trials: Sequence[str], chosen: t
         "type": "heatmap", "z": [_short(row) for row in z], "x": list(range(len(trials))), "y": list(range(len(shown))),
         "customdata": [[[t, k] for t in range(len(trials))] for k in shown], "zmin": 0.0, "zmax": top, "colorscale": "Cividis",
         "text": [[f"{names[r]}<br>{trials[t]}<br>{z[r, t]:.2f}" for t in range(len(trials))] for r in range(len(shown))],
-        "hoverinfo": "text", "xgap": 2, "ygap": 2, "colorbar": {"thickness": 10, "nticks": 4, "title": {"text": "error", "side": "right"}},
+        "hoverinfo": "text", "xgap": 2, "ygap": 2,
+        "colorbar": {"thickness": 10, "nticks": 4, "title": {"text": "error", "side": "right"}},
     }  # fmt: skip
     if z.size <= NUMBERED:
         trace |= {"texttemplate": "%{z:.1f}", "textfont": {"size": 11}}
