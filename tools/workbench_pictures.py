@@ -1,8 +1,10 @@
-"""Pictures of the workbench at three widths, for looking at and for docs:
+"""Pictures of the workbench, for looking at and for docs:
 
     python tools/workbench_pictures.py OUT measured=LOG [engine=mujoco ...]
+    python tools/workbench_pictures.py OUT measured=LOG tour=docs/figures
 
-Explains, adds the best, and takes each view at 1280, 900 and 400 pixels. Needs Chromium.
+Explains, adds the best and fits it, and takes each view at 1280, 900 and 400 pixels, in light and in dark; with ``tour`` the six
+pictures of the README instead, in few colours so that they stay small. Needs Chromium.
 """
 
 from __future__ import annotations
@@ -11,35 +13,116 @@ import sys
 import time
 from pathlib import Path
 
+from PIL import Image
+
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "workbench"))
 
 from page_driver import Bench, Person
 
 WIDTHS = (1280, 900, 400)
 VIEWS = ("Compare", "Explain", "Add", "Watch", "Keep")
+PATIENCE_S = 600.0
+SETTLED_S = 3.0
+NUMBER = "parseFloat(document.querySelector('.number').innerText)"
+JUDGED = (
+    "[...document.querySelectorAll('.entry')].some((e) => "
+    "/fitted .*held out [^(]*[(](?!nothing)/.test(e.textContent) && !e.textContent.startsWith('by hand'))"
+)
+"""Whether the ladder has a step that was judged."""
+COLOURS = 96
+BY_HAND = 5
+"""Strokes of a key by which the slider is moved for the picture of it."""
 
 
 def main() -> None:
     out = Path(sys.argv[1]).absolute()
     out.mkdir(parents=True, exist_ok=True)
-    arguments = [a if "=" not in a else _absolute(a) for a in sys.argv[2:]]
+    words = [a for a in sys.argv[2:] if not a.startswith("tour=")]
+    tour = next((Path(a.removeprefix("tour=")).absolute() for a in sys.argv[2:] if a.startswith("tour=")), None)
+    arguments = [a if "=" not in a else _absolute(a) for a in words]
     with Bench(out, *arguments, "hydra.run.dir=bench", "overwrite=true") as bench, Person() as person:
         person.go(bench.address)
         person.waits_for("The model is off")
+        if tour is not None:
+            _tour(person, tour)
+        else:
+            _all(bench, person, out)
+        print("complaints of the console:", person.complaints() or "none")
+
+
+def _explained(person: Person) -> None:
+    _searched(person, "What is missing?", "document.body.innerText.includes('Ranked, with 95 % intervals')")
+
+
+def _fitted(person: Person) -> None:
+    _searched(person, "Add and fit", JUDGED)
+
+
+def _searched(person: Person, button: str, done: str) -> None:
+    """A button of Explain, until what it began is done. On a busy machine a page may come up anew, and forget a click."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not person.evaluate(done) and time.monotonic() < deadline:
         person.open("Explain")
-        person.click("What is missing?")
-        person.wait("document.body.innerText.includes('Ranked, with 95 % intervals')", 600.0)
-        person.click("Add and fit", "button")
-        person.waits_for("s so far")
-        person.wait("!document.body.innerText.includes('s so far')", 600.0)
+        person.click(button, "button")
+        time.sleep(SETTLED_S)
+        person.wait("!document.body.innerText.includes('s so far')", PATIENCE_S)
+        time.sleep(1.0)
+
+
+def _all(bench: Bench, person: Person, out: Path) -> None:
+    _explained(person)
+    _fitted(person)
+    person.open("Keep")
+    person.click("Keep the model")
+    person.wait("document.body.innerText.includes('task=compare says')", PATIENCE_S)
+    for dark in (False, True):
         for width in WIDTHS:
-            person.go(bench.address, width=width)
+            person.go(bench.address, width=width, dark=dark)
             for view in VIEWS:
                 person.open(view)
-                time.sleep(3.0)
-                person.picture(out / f"workbench_{view.lower()}_{width}.png")
-        print(*(sorted(p.name for p in out.glob("*.png"))), sep="\n")
-        print("complaints of the console:", person.complaints() or "none")
+                time.sleep(SETTLED_S)
+                over = person.evaluate("document.documentElement.scrollWidth - innerWidth")
+                person.evaluate("scrollTo(0, 0)")
+                name = f"{view.lower()}_{width}{'_dark' if dark else ''}.png"
+                person.picture(out / name, whole=True)
+                print(name, f"wider than the window by {over} px" if over > 0 else "")
+
+
+def _tour(person: Person, folder: Path) -> None:
+    """What a person does in the first minute."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _shot(person, folder, "1_compare")
+    _explained(person)
+    _shot(person, folder, "2_explain")
+    person.click("Add", "main button")
+    person.waits_for("Effects in the model")
+    error = person.wait(NUMBER)
+    person.evaluate("document.querySelector('.q-slider [tabindex]').focus()")
+    for _ in range(BY_HAND):
+        person.key("PageDown", 34)
+    person.wait(f"{NUMBER} > 1.05 * {error}")
+    _shot(person, folder, "3_slide")
+    person.click("Undo", "button")
+    person.wait(f"{NUMBER} < 1.01 * {error}")
+    _fitted(person)
+    person.open("Add")
+    _shot(person, folder, "4_fitted")
+    person.open("Watch")
+    _shot(person, folder, "5_watch")
+    person.open("Keep")
+    person.click("Keep the model")
+    person.wait("document.body.innerText.includes('task=compare says')", PATIENCE_S)
+    _shot(person, folder, "6_keep")
+
+
+def _shot(person: Person, folder: Path, name: str) -> None:
+    time.sleep(SETTLED_S)
+    path = folder / f"workbench_{name}.png"
+    person.picture(path)
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+    print(path.name, f"{path.stat().st_size / 1e3:.0f} kB")
 
 
 def _absolute(argument: str) -> str:

@@ -87,6 +87,15 @@ def heat(problem: Problem, residual: Array) -> Array:
     return np.sqrt(np.divide(energy, count, out=np.zeros_like(energy), where=count > 0)).reshape(shape)
 
 
+def by_trial(problem: Problem, residual: Array) -> Array:
+    """(trials, channels) root mean square of a residual (n,); zero where there is no value."""
+    shape = (len(problem.trials), len(problem.channels))
+    cell = problem.trial_of * shape[1] + problem.channel_of
+    energy = np.bincount(cell, weights=residual**2, minlength=shape[0] * shape[1])
+    count = np.bincount(cell, minlength=shape[0] * shape[1])
+    return np.sqrt(energy / np.maximum(count, 1)).reshape(shape)
+
+
 def span_of(problem: Problem, segment: int) -> tuple[float, float]:
     """When a segment began and ended, s."""
     times = problem.layout.time_s[problem.segment_of == segment]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -73,7 +74,7 @@ def placed(name: str) -> str:
 
 def without_unit(key: str, unit: str) -> str:
     """``torque_nm`` in N.m is ``torque``: the unit is told behind the value."""
-    tail, parts = unit.lower().replace(".", "").replace("/", "").replace("^", ""), key.split("_")
+    tail, parts = re.sub(r"[./^()]", "", unit.lower()), key.split("_")
     for k in range(1, len(parts)):
         if tail and "".join(parts[k:]) == tail:
             return "_".join(parts[:k])
@@ -82,7 +83,7 @@ def without_unit(key: str, unit: str) -> str:
 
 def told(term: Term, robot: Robot | None = None) -> str:
     """``coulomb friction at knee front left (torque 0.3 N.m)``."""
-    shown = [f"{_quantity(term, key, robot)} {_value(term, key, value, robot)}".strip() for key, value in term.values]
+    shown = [f"{quantity(term, key, robot)} {_value(term, key, value, robot)}".strip() for key, value in term.values]
     return named(term) + (f" ({', '.join(shown)})" if shown else "")
 
 
@@ -90,14 +91,15 @@ def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
     return f"{value:.3g}{_unit(term, key, robot)}"
 
 
-def _quantity(term: Term, key: str, robot: Robot | None) -> str:
+def quantity(term: Term, key: str, robot: Robot | None = None) -> str:
     """A parameter's name without its unit, which is told behind the value; nothing where it is called by its unit alone."""
     if key.startswith("per_"):
         return ""
     entry = CATALOGUE[term.effect]
     own = entry.parameter(key).unit  # that of a hinge, which names carry on slides too
     other = entry.unit(key, robot, term.target) if robot is not None else own
-    return plain(without_unit(without_unit(key, other), own))
+    name = plain(without_unit(without_unit(key, other), own))
+    return name.replace("torque", "force") if other == "N" else name
 
 
 def _unit(term: Term, key: str, robot: Robot | None) -> str:
@@ -119,7 +121,7 @@ def named(term: Term) -> str:
 def told_all(terms: Hypothesis, robot: Robot | None = None) -> str:
     """Terms in one phrase; one effect at several places with its values side by side."""
     if len(terms) > 1 and len({t.effect for t in terms}) == 1 and all(t.values for t in terms):
-        keys = [_quantity(terms[0], key, robot) for key, _ in terms[0].values]
+        keys = [quantity(terms[0], key, robot) for key, _ in terms[0].values]
         of = f"{', '.join(keys)}: " if len(keys) > 1 else ""
         each = "; ".join(f"{plain(t.target)} {', '.join(_value(t, k, v, robot) for k, v in t.values)}" for t in terms)
         return f"{plain(terms[0].effect)}, each joint by itself ({of}{each})"
@@ -352,7 +354,7 @@ def _ranges(found: Improvement, new: Sequence[Term], robot: Robot) -> str:
             range_ = f"{p.low:.3g} to {p.high:.3g}{_unit(term, p.name, robot)}"
             sure = not p.flag and np.isfinite(p.high - p.low)
             told_of[term.name].append(
-                f"{_quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip()
+                f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip()
             )
     out = [
         (f"{placed(name)}: " if len(told_of) > 1 else "") + ", ".join(values)
@@ -376,7 +378,7 @@ def _capital(text: str) -> str:
 
 
 def flag_text(terms: Hypothesis, p: ParameterReport) -> str:
-    return f"{named(terms[p.term])}, {plain(p.name)}: {p.flag}."
+    return f"{named(terms[p.term])}, {quantity(terms[p.term], p.name)}: {p.flag}."
 
 
 def tie_text(what: str, others: Sequence[str]) -> str:

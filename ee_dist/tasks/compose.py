@@ -32,7 +32,10 @@ TASKS = (
 )
 _USED_BY = {
     "scenario": (("recover", "online"), "what task=trial hides is hidden=..."),
-    "robot": (("recover", "online", "trial", "import"), "the others take the robot from the log or the model file"),
+    "robot": (
+        ("recover", "online", "trial", "import", "workbench"),
+        "the others take the robot from the log or the model file",
+    ),
 }
 """Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
 _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}

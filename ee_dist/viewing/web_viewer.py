@@ -14,8 +14,6 @@ from functools import cache
 from urllib.error import URLError
 from urllib.request import urlopen
 
-import rerun as rr
-
 PARTS = {
     "index.html": "text/html; charset=utf-8",
     "re_viewer.js": "text/javascript",
@@ -51,6 +49,8 @@ class Part:
 @cache
 def web_viewer() -> dict[str, Part]:
     """The files by name; the page of the viewer is index.html. About 43 MB. Raises WebViewerError."""
+    import rerun as rr  # slow to load, and needed only when somebody looks at the robot
+
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]

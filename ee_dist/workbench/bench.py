@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.search.candidates import Candidate, known
+from ee_dist.discrepancy.words import quantity
 from ee_dist.effects.catalogue import Hypothesis, Term
 from ee_dist.robots.model import Robot
 
@@ -101,9 +102,9 @@ class Bench:
             if not entry.on:
                 mine.append(entry)
             elif entry.name in found:
-                mine.append(_reported(entry, *found.pop(entry.name), reports))
+                mine.append(_reported(robot, entry, *found.pop(entry.name), reports))
         for k, t in found.values():
-            mine.append(_reported(Entry(known(robot, t), t), k, t, reports))
+            mine.append(_reported(robot, Entry(known(robot, t), t), k, t, reports))
         return replace(self, entries=tuple(mine))
 
     def stepped(self, *steps: Step) -> Bench:
@@ -118,13 +119,12 @@ def bench_of(robot: Robot, terms: Hypothesis) -> Bench:
     return Bench(tuple(Entry(known(robot, t), t, origin=MODEL) for t in terms))
 
 
-def _reported(entry: Entry, index: int, term: Term, reports: Sequence[ParameterReport]) -> Entry:
+def _reported(robot: Robot, entry: Entry, index: int, term: Term, reports: Sequence[ParameterReport]) -> Entry:
     own = [r for r in reports if r.term == index]
     return replace(
         entry,
-        candidate=entry.candidate,
         term=term,
         origin=FIT,
         intervals=tuple((r.name, r.low, r.high) for r in own),
-        flags=tuple(f"{r.name}: {r.flag}" for r in own if r.flag),
+        flags=tuple(f"{quantity(term, r.name, robot)}: {r.flag}" for r in own if r.flag),
     )

@@ -18,11 +18,14 @@ from ee_dist.workbench.bench import Step
 from ee_dist.workbench.sight import Cloud
 
 Chart = dict[str, Any]
-MEASURED, PREDICTED, RESIDUAL, MARK, FLOOR, MARKED = "#0072b2", "#e69f00", "#c04a00", "#009e73", "#8a5fbf", "#000000"
+MEASURED, PREDICTED, RESIDUAL, MARK, FLOOR, MARKED = "#0072b2", "#e69f00", "#c04a00", "#009e73", "#8a5fbf", "#cc79a7"
 DOTS = 1500
 """Points of a cloud that are drawn."""
 NUMBERED = 150
 """Cells of a map up to which each has its number in it."""
+DIGITS = 6
+TIME_DIGITS = 6
+"""Of a second, so that every row of a fast log has its own place."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
 _CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["toImage", "lasso2d", "autoScale2d"]}
 _STILL = {"displayModeBar": False, "responsive": True}
@@ -49,9 +52,21 @@ def _chart(data: list[Chart], height: int, **layout: Any) -> Chart:
     }
 
 
-def _short(values: Array) -> list[float | None]:
-    """As many digits as can be seen; gaps where there is no number."""
-    return [float(f"{v:.5g}") if np.isfinite(v) else None for v in values]
+Row = tuple[float | None, ...]
+"""Numbers as they are sent. No list: the toolkit watches each item of a list for changes, which takes longer than to draw."""
+
+
+def _short(values: Array) -> Row:
+    """As many digits of the largest as can be seen; gaps where there is no number."""
+    finite = np.isfinite(values)
+    top = np.abs(values[finite]).max(initial=0.0)
+    out = np.round(values, DIGITS - int(np.ceil(np.log10(top))) if top > 0 else 0).tolist()
+    return tuple(out if finite.all() else (v if ok else None for v, ok in zip(out, finite, strict=True)))
+
+
+def _times(values: Array) -> Row:
+    """(n,) s."""
+    return tuple(np.round(values, TIME_DIGITS).tolist())
 
 
 def overlay(
@@ -59,7 +74,7 @@ def overlay(
 ) -> Chart:
     """Measured over predicted, and below it what is left. ``key``: as long as it stays, so does the zoom; ``brushed_s`` (k,):
     times to point out; ``mark``: a name, and what that would make of the residual."""
-    times = _short(curve.times_s)
+    times = _times(curve.times_s)
     left = curve.measured - curve.predicted
     data: list[Chart] = [
         _line(times, curve.measured, "measured", MEASURED, 4.0, opacity=0.55),
@@ -100,7 +115,7 @@ def overlay(
     )
 
 
-def _line(x: list[float | None], y: Array, name: str, colour: str, width: float, **more: Any) -> Chart:
+def _line(x: Row, y: Array, name: str, colour: str, width: float, **more: Any) -> Chart:
     line = {"color": colour, "width": width}
     if "dash" in more:
         line["dash"] = more.pop("dash")
@@ -114,8 +129,8 @@ def cloud(part: Cloud, channel_unit: str, span_s: tuple[float, float] | None = N
     inside = np.ones(len(t), dtype=bool) if span_s is None else (t >= span_s[0]) & (t <= span_s[1])
     data = []
     for mask, colour, size, name in ((~inside, "#b8c2cc", 4, "elsewhere"), (inside, RESIDUAL, 5, "in sight")):
-        data.append({"type": "scattergl" if len(x) > 4000 else "scatter", "mode": "markers", "x": _short(x[mask]),
-                     "y": _short(y[mask]), "customdata": _short(t[mask]), "name": name,
+        data.append({"type": "scatter", "mode": "markers", "x": _short(x[mask]),
+                     "y": _short(y[mask]), "customdata": _times(t[mask]), "name": name,
                      "marker": {"color": colour, "size": size, "opacity": 0.5}, "hoverinfo": "x+y"})  # fmt: skip
     return _chart(
         data,
@@ -141,7 +156,8 @@ def heat(table: Array, channels: Sequence[str], trials: Sequence[str], chosen: t
         "type": "heatmap", "z": [_short(row) for row in z], "x": list(range(len(trials))), "y": list(range(len(shown))),
         "customdata": [[[t, k] for t in range(len(trials))] for k in shown], "zmin": 0.0, "zmax": top, "colorscale": "Cividis",
         "text": [[f"{names[r]}<br>{trials[t]}<br>{z[r, t]:.2f}" for t in range(len(trials))] for r in range(len(shown))],
-        "hoverinfo": "text", "xgap": 2, "ygap": 2, "colorbar": {"thickness": 10, "title": {"text": "error", "side": "right"}},
+        "hoverinfo": "text", "xgap": 2, "ygap": 2,
+        "colorbar": {"thickness": 10, "nticks": 4, "title": {"text": "error", "side": "right"}},
     }  # fmt: skip
     if z.size <= NUMBERED:
         trace |= {"texttemplate": "%{z:.1f}", "textfont": {"size": 11}}
@@ -150,17 +166,14 @@ def heat(table: Array, channels: Sequence[str], trials: Sequence[str], chosen: t
         row = shown.index(chosen[1])
         shapes.append({"type": "rect", "x0": chosen[0] - 0.5, "x1": chosen[0] + 0.5, "y0": row - 0.5, "y1": row + 0.5,
                        "line": {"color": "#d55e00", "width": 3}})  # fmt: skip
-    return _chart(
-        [trace],
+    return _rows(
+        trace,
         90 + 24 * len(shown),
+        {"tickvals": list(range(len(trials))), "ticktext": labels, "automargin": True, "showgrid": False},
+        {"tickvals": list(range(len(shown))), "ticktext": names, "showgrid": False},
         shapes=shapes,
-        dragmode=False,
         margin={"l": 10, "r": 10, "t": 8, "b": 30},
-        xaxis={"tickvals": list(range(len(trials))), "ticktext": labels, "fixedrange": True, "automargin": True,
-               "showgrid": False},
-        yaxis={"tickvals": list(range(len(shown))), "ticktext": names, "autorange": "reversed", "fixedrange": True,
-               "automargin": True, "showgrid": False},
-    )  # fmt: skip
+    )
 
 
 def bars(names: Sequence[str], values: Sequence[float], floor: float) -> Chart:
@@ -168,17 +181,23 @@ def bars(names: Sequence[str], values: Sequence[float], floor: float) -> Chart:
     order = sorted(range(len(names)), key=lambda k: -values[k])
     trace = {"type": "bar", "orientation": "h", "x": _short(np.array([values[k] for k in order])),
              "y": [names[k] for k in order], "marker": {"color": RESIDUAL}, "hoverinfo": "x+y"}  # fmt: skip
-    return _chart(
-        [trace],
+    return _rows(
+        trace,
         70 + 22 * len(names),
+        {"title": {"text": "error"}, "rangemode": "tozero"},
+        {"ticksuffix": "  "},
         margin={"l": 10, "r": 14, "t": 24, "b": 36},
-        dragmode=False,
         shapes=[_floor_line(floor, "x")],
         annotations=[{"x": floor, "y": 1, "yref": "paper", "yanchor": "bottom", "showarrow": False, "text": "noise floor",
                       "font": {"color": FLOOR, "size": 11}}],
-        xaxis={"title": {"text": "error"}, "rangemode": "tozero", "fixedrange": True},
-        yaxis={"autorange": "reversed", "automargin": True, "ticksuffix": "  ", "fixedrange": True},
     )  # fmt: skip
+
+
+def _rows(trace: Chart, height: int, xaxis: Chart, yaxis: Chart, **layout: Any) -> Chart:
+    """A chart that lists things, the first on top; nothing in it to zoom into."""
+    across = {"fixedrange": True, **xaxis}
+    down = {"autorange": "reversed", "automargin": True, "fixedrange": True, **yaxis}
+    return _chart([trace], height, dragmode=False, xaxis=across, yaxis=down, **layout)
 
 
 def _floor_line(floor: float, axis: str) -> Chart:
@@ -187,7 +206,7 @@ def _floor_line(floor: float, axis: str) -> Chart:
             "line": {"color": FLOOR, "width": 2, "dash": "dot"}}  # fmt: skip
 
 
-def ladder(steps: Sequence[Step], floor: float) -> Chart:
+def ladder(steps: Sequence[Step], floor: float, axis: str = "error") -> Chart:
     """Fitted and held-out error of each step apart; what was refused is crossed out."""
     places = list(range(len(steps)))
     held = [k for k in places if steps[k].error_heldout is not None and not steps[k].refused]
@@ -198,30 +217,37 @@ def ladder(steps: Sequence[Step], floor: float) -> Chart:
     def at(rows: Sequence[int], values: Sequence[float | None], name: str, **more: Any) -> Chart:
         return {"type": "scatter", "x": list(rows), "y": _short(np.array(values, dtype=float)), "name": name, **more}
 
+    tops = [v for s in steps for v in (s.error_fit, s.error_heldout) if v is not None and np.isfinite(v)]
+    top = 1.2 * max([floor, *tops])
     numbers = [f"{steps[k].error_heldout:.3g}" for k in held]
+    written = [_beside(steps[k].error_heldout or 0.0, floor, top) for k in held]
     data = [
         at(fitted, [steps[k].error_fit for k in fitted], "where it was fitted", mode="lines+markers",
-           line={"color": PREDICTED, "dash": "dot", "width": 2}, marker={"symbol": "circle-open", "size": 9}),
+           line={"color": PREDICTED, "dash": "dot", "width": 2},
+           marker={"symbol": "circle-open", "size": 16, "line": {"width": 2}}),
         at(held, [steps[k].error_heldout for k in held], "held out", mode="lines+markers+text", text=numbers,
-           textposition="top center", line={"color": MEASURED, "width": 3}, marker={"symbol": "square", "size": 10}),
+           textposition=written, line={"color": MEASURED, "width": 3}, marker={"symbol": "square", "size": 10}),
         at(hand, [steps[k].error_fit for k in hand], "set by hand, all data seen", mode="markers",
            marker={"symbol": "diamond-open", "size": 11, "color": "#5a6672", "line": {"width": 2}}),
         at(refused, [steps[k].error_heldout for k in refused], "refused", mode="markers",
            marker={"symbol": "x", "size": 13, "color": RESIDUAL}),
     ]  # fmt: skip
-    tops = [v for s in steps for v in (s.error_fit, s.error_heldout) if v is not None and np.isfinite(v)]
-    top = 1.2 * max([floor, *tops])
     labels = [wrapped(s.name, 16) + ("<br><b>refused</b>" if s.refused else "") for s in steps]
     return _chart(
         [d for d in data if d["x"]],
         360,
         dragmode=False,
         shapes=[_floor_line(floor, "y")],
-        annotations=[{"x": 1, "xref": "paper", "xanchor": "right", "y": floor, "yanchor": "top", "showarrow": False,
+        annotations=[{"x": 0, "xref": "paper", "xanchor": "left", "y": floor, "yanchor": "bottom", "showarrow": False,
                       "text": f"noise floor {floor:.3g}", "font": {"color": FLOOR}}],
         xaxis={"tickvals": places, "ticktext": labels, "range": [-0.5, len(steps) - 0.5], "automargin": True, "fixedrange": True},
-        yaxis={"title": {"text": "error"}, "range": [0, top], "gridcolor": "#e8edf2", "fixedrange": True},
+        yaxis={"title": {"text": axis}, "range": [0, top], "gridcolor": "#e8edf2", "fixedrange": True},
     )  # fmt: skip
+
+
+def _beside(value: float, floor: float, top: float) -> str:
+    """Where a number is written, so that the line of the floor does not go through it."""
+    return "bottom center" if 0 <= floor - value < 0.1 * top and value > 0.08 * top else "top center"
 
 
 def ranking(
@@ -239,15 +265,14 @@ def ranking(
                     "color": "#1d2733", "thickness": 1.2, "width": 4}, "hovertemplate": "%{y}: %{x:.1f} %<extra></extra>",
     }  # fmt: skip
     least = min([100 * i[0] for i in intervals if np.isfinite(i[0])] + [0.0])
-    return _chart(
-        [trace],
-        90 + 36 * len(names),
+    return _rows(
+        trace,
+        104 + 36 * len(names),
+        {"title": {"text": "gain above the noise, held out (%)"}, "range": [max(least - 3, -25), 106]},
+        {"ticksuffix": "  "},
         showlegend=False,
-        dragmode=False,
-        margin={"l": 10, "r": 20, "t": 8, "b": 42},
-        xaxis={"title": {"text": "gain above the noise, held out (%)"}, "range": [max(least - 3, -25), 106], "fixedrange": True},
-        yaxis={"autorange": "reversed", "automargin": True, "ticksuffix": "  ", "fixedrange": True},
-    )  # fmt: skip
+        margin={"l": 10, "r": 20, "t": 8, "b": 56},
+    )
 
 
 def course(

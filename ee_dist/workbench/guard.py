@@ -6,6 +6,7 @@ Any page in the browser may send requests to 127.0.0.1, and open a websocket the
 
 from __future__ import annotations
 
+import hashlib
 import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
 from http.cookies import CookieError, SimpleCookie
@@ -41,6 +42,8 @@ class Guard:
 
     def __init__(self, app: App, token: str = "") -> None:
         self.app, self.token = app, token
+        # Cookies are of a host, whatever its port: each workbench there has one of its own name.
+        self.cookie = f"{COOKIE}_{hashlib.sha256(token.encode()).hexdigest()[:8]}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -58,7 +61,9 @@ class Guard:
                 more = [(b"content-security-policy", POLICY.encode()), (b"x-content-type-options", b"nosniff"),
                         (b"referrer-policy", b"no-referrer")]  # fmt: skip
                 if set_cookie:
-                    more.append((b"set-cookie", f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/".encode()))
+                    more.append(
+                        (b"set-cookie", f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/".encode())
+                    )
                 message["headers"] = [*message.get("headers", []), *more]
             await send(message)
 
@@ -77,7 +82,7 @@ class Guard:
         if not self.token:
             return True
         try:
-            cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+            cookie = SimpleCookie(headers.get("cookie", "")).get(self.cookie)
         except CookieError:
             cookie = None
         return self._right(parse_qs(query).get("token", [""])[0]) or (cookie is not None and self._right(cookie.value))

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, confidence, placed, told_all
+from ee_dist.discrepancy.words import Account, above, confidence, placed, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.tasks.results.tables import TIED_STANDING, standing
 from ee_dist.workbench.bench import Step
@@ -68,13 +66,15 @@ class Improved:
 
 @dataclass(frozen=True)
 class Compared:
-    """What task=compare says of a saved model."""
+    """What task=compare says of a saved model. ``starts_s``: of each trial, on the ``timeline`` of its recording in 3-D."""
 
     error: float
     noise_floor: float
     told: str
     headline: str
     folder: Path
+    starts_s: tuple[float, ...]
+    timeline: str
 
 
 def of_explanation(problem: Problem, found: Explanation, account: Account, folder: Path) -> Explained:
@@ -84,7 +84,6 @@ def of_explanation(problem: Problem, found: Explanation, account: Account, folde
 
 
 def _ranked(problem: Problem, found: Explanation, c: Judged, best: Judged) -> Ranked:
-    above = c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0
     how = standing(c, best)
     kind = REFUSED if not c.earned else {"best": BEST, TIED_STANDING: TIED}.get(how, EARNED)
     entry = CATALOGUE[c.terms[0].effect]
@@ -95,7 +94,7 @@ def _ranked(problem: Problem, found: Explanation, c: Judged, best: Judged) -> Ra
         (*found.fixed, *c.hypothesis),
         c.error_heldout,
         c.explained,
-        (above * c.interval[0], above * c.interval[1]),
+        above(c),
         kind,
         c.why_not,
         confidence(c),

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import secrets
 import socket
 import sys
 import webbrowser
+from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
 from fastapi import FastAPI, HTTPException, Response
+from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.responses import FileResponse
 from nicegui import app as toolkit
 from nicegui import ui
@@ -20,13 +23,16 @@ from rich.console import Console
 from ee_dist.effects.model_file import read_model
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.errors import defect
+from ee_dist.tasks.results.tables import command, setting
 from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
+from ee_dist.workbench import saved
 from ee_dist.workbench.guard import Guard, is_loopback
 from ee_dist.workbench.pages.page import show_session
 from ee_dist.workbench.pages.recovery import show_recovery
 from ee_dist.workbench.session import Session
 
 TITLE = "ee_dist workbench"
+EVERYWHERE = ("0.0.0.0", "::")
 
 
 def bound(host: str, port: int) -> socket.socket:
@@ -51,9 +57,16 @@ def bound(host: str, port: int) -> socket.socket:
 
 def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) -> None:
     """Answer until ended. What cannot be opened is said before anything is served."""
+    log = Path(config.log) if config.log else None
+    kept = None
+    if log is not None and saved.is_session(log):
+        kept, log = saved.read(log), None
+        config, by = replace(config, engine=replace(config.engine, name=kept.engine)), kept.by
     session = Session(config, by, out)
-    if config.log:
-        show_recovery(Path(config.log), out)
+    if kept is not None:
+        session.reopen(kept)
+    elif log is not None:
+        show_recovery(log, out)
     elif config.measured:
         session.load(config.measured, config.model)
     elif config.model:
@@ -62,7 +75,7 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     token = "" if is_loopback(host) else secrets.token_urlsafe(24)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     _files(app, out)
-    if not config.log:
+    if log is None:
         show_session(session)
     if session.measured is not None:
         session.attempt(session.begin)
@@ -70,13 +83,27 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     toolkit.on_exception(lambda error: session.say(defect(error, out)))
     for name in ("nicegui", "uvicorn", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    ui.run_with(app, title=TITLE, show_welcome_message=False, reconnect_timeout=20.0)
-    server = uvicorn.Server(
-        uvicorn.Config(Guard(app, token), log_config=None, access_log=False, timeout_graceful_shutdown=1)
+    # To squeeze what is sent takes longer than to hand it over, unless a network lies between.
+    squeeze = GZipMiddleware if token else None
+    ui.run_with(
+        app, title=TITLE, dark=None, show_welcome_message=False, reconnect_timeout=20.0, gzip_middleware_factory=squeeze
     )
-    address = f"http://{host if ':' not in host else f'[{host}]'}:{sock.getsockname()[1]}/"
+    # What is loaded by now stays: neither the collector nor the toolkit, which looks for its server, goes through it again.
+    gc.freeze()
+    settings = uvicorn.Config(
+        Guard(app, token),
+        log_config=None,
+        access_log=False,
+        timeout_graceful_shutdown=1,
+        ws_per_message_deflate=bool(token),
+    )
+    server = uvicorn.Server(settings)
+    # Who comes from elsewhere asks for this machine by its name.
+    named = host if host not in EVERYWHERE else socket.gethostname()
+    address = f"http://{named if ':' not in named else f'[{named}]'}:{sock.getsockname()[1]}/"
     address += f"?token={token}" if token else ""
-    Console().print(f"The workbench: {address} (Ctrl-C ends it)", highlight=False, soft_wrap=True)
+    console = Console()
+    console.print(f"The workbench: {address} (Ctrl-C ends it)", highlight=False, soft_wrap=True)
     sys.stdout.flush()
     if show and (os.environ.get("DISPLAY") or sys.platform in ("darwin", "win32")):
         webbrowser.open(address)
@@ -85,6 +112,10 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     finally:
         session.close()
         sock.close()
+        if session.measured is not None:
+            console.print(
+                f"To go on: {command(['task=workbench', setting('log', out)])}", highlight=False, soft_wrap=True
+            )
 
 
 def _files(app: FastAPI, folder: Path) -> None:

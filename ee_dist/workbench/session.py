@@ -26,9 +26,10 @@ from ee_dist.tasks.measurements import Measurements, load
 from ee_dist.tasks.results.tables import command, setting
 from ee_dist.tasks.ways import AUTO, way_of
 from ee_dist.trials.log import Array
-from ee_dist.workbench import commands, verbs
+from ee_dist.workbench import commands, saved, verbs
 from ee_dist.workbench.bench import Bench, Step, bench_of
 from ee_dist.workbench.results import Compared, Explained, Improved
+from ee_dist.workbench.saved import Saved
 from ee_dist.workbench.sight import Place, Seen, Sight
 from ee_dist.workbench.verbs import Ended, Request
 from ee_dist.workbench.worker import BusyError, Progress, Worker
@@ -147,15 +148,21 @@ class Session:
         self.tell("opened")
         return found
 
+    def reopen(self, kept: Saved) -> None:
+        """A session that ended, with its model, ladder and commands. Raises what ``load`` raises, and EffectError."""
+        found = self.load(list(kept.measured), kept.model)
+        self.bench, self.commands = kept.bench(found.robot), kept.commands
+
     def begin(self) -> None:
         """Compare the model as it is; what ``load`` began. Raises what the way of comparing raises."""
         measured = self._open()
-        self.sight = Sight(measured, self.live, way_of(measured, self.by))
+        self.sight = Sight(replace(measured, model=self.bench.terms), self.live, way_of(measured, self.by))
         self.seen = self.sight.seen(self.bench.terms)
-        off = self.seen.found.error
-        self.bench = self.bench.stepped(Step("the model as it was", off, off, "nothing was fitted"))
-        self._note("compare", self.bench.terms)
-        self.worker.warm()
+        if not self.bench.ladder:
+            off = self.seen.found.error
+            self.bench = self.bench.stepped(Step("the model as it was", off, off, "nothing was fitted"))
+            self._note("compare", self.bench.terms)
+        self._save()
         self.tell("seen")
 
     def place(self) -> Place:
@@ -248,7 +255,18 @@ class Session:
             if step:
                 self.bench = _by_hand(self.bench, self.seen.found.error)
                 self._note("compare", terms)
+        self._save()
         self.tell("seen")
+
+    def _save(self) -> None:
+        """Onto the disk, so that ``log=`` of this folder goes on with it."""
+        measured = [str(f.resolve()) for f in self._open().files]
+        entries = tuple(map(saved.saved_entry, self.bench.entries))
+        began = None if self._began is None else str(Path(self._began).resolve())
+        saved.write(
+            self.folder,
+            Saved(tuple(measured), began, self.by, self.config.engine.name, entries, self.bench.ladder, self.commands),
+        )
 
     def _remember(self) -> None:
         self._slid = None
@@ -286,6 +304,7 @@ class Session:
         if verb == verbs.ADD:
             self._note("explain", terms, f"task.only=[{effect}]")
         self._note(task, terms, *more.get(verb, ()))
+        self._save()
 
     def cancel(self) -> None:
         self.worker.cancel()
@@ -305,6 +324,7 @@ class Session:
         config = commands.asked(self.config, measured, path)
         self.worker.start(Request(verbs.COMPARE, config, self.by, fresh(self.folder / verbs.COMPARE)))
         self.commands = (*self.commands, commands.line("compare", config, self.by))
+        self._save()
         return path
 
     def export(self, to: str) -> Path:
@@ -318,6 +338,7 @@ class Session:
         with contextlib.redirect_stdout(io.StringIO()):
             export.run(config, export.Options(to=to), folder)
         self.commands = (*self.commands, command(["task=export", setting("model", str(config.model)), f"to={to}"]))
+        self._save()
         self.tell("kept")
         return folder
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ee_dist.discrepancy.compare import Comparison, circumstances, compare, rows_of
+from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, compare, rows_of
 from ee_dist.discrepancy.problem import Problem, Series, error
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.config import Config
@@ -112,7 +112,7 @@ class Sight:
     def worst(self, seen: Seen) -> Place:
         """The channel and trial that the largest part of the error sits in, among readings that can be drawn."""
         problem = self.problem
-        table = by_trial(problem, seen)
+        table = by_trial(problem, np.nan_to_num(seen.residual, posinf=0.0))
         drawn = {c for c in range(len(problem.channels)) if (problem.layout.reading & (problem.channel_of == c)).any()}
         table = np.where([c in drawn for c in range(table.shape[1])], table, -1.0)
         trial, channel = np.unravel_index(int(np.argmax(table)), table.shape)
@@ -125,15 +125,6 @@ class Sight:
             alone = replace(self.measured, trials=(self.measured.trials[trial],))
             self._single[trial] = self.way.make(alone, self.config)
         return self._single[trial]
-
-
-def by_trial(problem: Problem, seen: Seen) -> Array:
-    """(trials, channels) root mean square of the residual; 0 where there is no value."""
-    width = len(problem.channels)
-    cell = problem.trial_of * width + problem.channel_of
-    count = np.bincount(cell, minlength=len(problem.trials) * width)
-    energy = np.bincount(cell, weights=np.nan_to_num(seen.residual, posinf=0.0) ** 2, minlength=len(count))
-    return np.sqrt(energy / np.maximum(count, 1)).reshape(-1, width)
 
 
 def _nothing(problem: Problem) -> Comparison:

@@ -1,4 +1,4 @@
-"""task=workbench: a page on which to compare, explain, add and watch the error fall; or to follow a run (log=RUN)."""
+"""task=workbench: a page to compare, explain, add and watch the error fall; log=RUN follows a run, log=SESSION goes on."""
 
 from __future__ import annotations
 

@@ -138,10 +138,17 @@ def _auto(request: Request, told: Progress) -> results.Improved:
 
 def _compare(request: Request, told: Progress) -> results.Compared:
     from ee_dist.tasks import compare
+    from ee_dist.viewing.stream import RUN_TIME, starts_of
 
     told("comparing", 0.0)
     problem, found, account = compare.run(request.config, compare.Options(by=request.by), request.folder)
-    return results.Compared(found.error, found.noise_floor, problem.told(found.error), account.headline, request.folder)
+    # On the clock of the recording, less the time of each trial's first row: what the charts call a time, plus this.
+    begins = starts_of([(k, [m.log]) for k, m in enumerate(problem.measured)])
+    starts = tuple(b - float(m.log.times_s[0]) for b, m in zip(begins, problem.measured, strict=True))
+    told_error = problem.told(found.error)
+    return results.Compared(
+        found.error, found.noise_floor, told_error, account.headline, request.folder, starts, RUN_TIME
+    )
 
 
 def _within(prefix: str, told: Progress) -> Progress:

@@ -136,3 +136,14 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         account = improve_account(problem, found)  # type: ignore[arg-type]
         assert account.headline.endswith(said) or said in account.headline
         assert account.good is (verdict == EXPLAINED) and ("Nothing" in account.headline) is account.good
+
+
+def test_units_are_told_behind_values_and_not_in_names():
+    stage, servo = linear_stage(), servo_pendulum()
+    assert (
+        told(term("coulomb_friction", "carriage", torque_nm=20.4), stage)
+        == "coulomb friction at carriage (force 20.4 N)"
+    )
+    assert told(term("coulomb_friction", "servo", torque_nm=0.1), servo) == "coulomb friction at servo (torque 0.1 N.m)"
+    soft = told(term("elastic_transmission", "carriage", compliance_rad_nm=1e-4), stage)
+    assert soft == "elastic transmission at carriage (compliance 0.0001 m/N)"

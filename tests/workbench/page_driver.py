@@ -22,19 +22,23 @@ READY_S, PATIENCE_S = 120.0, 120.0
 class Bench:
     """``python -m ee_dist task=workbench ...`` in a folder, ended at the end of the block."""
 
+    program: tuple[str, ...] = ("-m", "ee_dist")
+
     def __init__(self, folder: Path, *arguments: str) -> None:
         self.folder, self.arguments = folder, arguments
-        self.address = ""
+        self.address, self.lines = "", list[str]()
 
     def __enter__(self) -> Self:
-        command = [sys.executable, "-m", "ee_dist", "task=workbench", "task.port=0", "task.show=false", *self.arguments]
-        environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+        words = ["task=workbench", "task.port=0", "task.show=false", *self.arguments]
+        command = [sys.executable, *self.program, *words]
+        self.environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
         self.errors = (self.folder / "errors.txt").open("w+")
         self.process = subprocess.Popen(
-            command, cwd=self.folder, env=environment, stdout=subprocess.PIPE, stderr=self.errors, text=True
+            command, cwd=self.folder, env=self.environment, stdout=subprocess.PIPE, stderr=self.errors, text=True
         )
         assert self.process.stdout is not None
         for line in self.process.stdout:
+            self.lines.append(line)
             found = re.search(r"http://\S+", line)
             if found:
                 self.address = found[0]
@@ -42,8 +46,16 @@ class Bench:
         self.process.wait()
         raise AssertionError(f"the workbench ended: {self.said()}")
 
+    @property
+    def searcher(self) -> int:
+        """The process in which long verbs run."""
+        lists = Path(f"/proc/{self.process.pid}/task").glob("*/children")
+        children = [int(child) for found in lists for child in found.read_text().split()]
+        return next(c for c in children if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes())
+
     def said(self) -> str:
-        self.errors.flush()
+        if not self.errors.closed:
+            self.errors.flush()
         return Path(self.errors.name).read_text()
 
     def end(self) -> int:
@@ -67,9 +79,11 @@ class Bench:
 class Person(HeadlessBrowser):
     """A browser with hands. Elements are found by the marks that the page gives them, through its own accessibility."""
 
-    def go(self, address: str, width: int = 1280, height: int = 900) -> None:
+    def go(self, address: str, width: int = 1280, height: int = 900, *, dark: bool = False) -> None:
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self._ask("Emulation.setDeviceMetricsOverride", metrics, page=True)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self._ask("Emulation.setEmulatedMedia", {"features": [scheme]}, page=True)
         self._events.clear()
         self._ask("Page.navigate", {"url": address}, page=True)
         self._until("Page.loadEventFired")
@@ -121,9 +135,26 @@ class Person(HeadlessBrowser):
         for kind in ("mousePressed", "mouseReleased"):
             self.mouse(kind, x, y)
 
+    def received(self) -> int:
+        """Bytes that came over the network and the websocket since the page was asked for."""
+        self.evaluate("1")
+        files = [e["params"]["encodedDataLength"] for e in self._events if e["method"] == "Network.loadingFinished"]
+        frames = [
+            e["params"]["response"]["payloadData"]
+            for e in self._events
+            if e["method"] == "Network.webSocketFrameReceived"
+        ]
+        return int(sum(files)) + sum(map(len, frames))
+
     def mouse(self, kind: str, x: float, y: float) -> None:
         event = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1}
         self._ask("Input.dispatchMouseEvent", event, page=True)
+
+    def drop(self, path: Path) -> None:
+        """A file into the page's place for files."""
+        asked = {"expression": "document.querySelector('input[type=file]')"}
+        place = self._ask("Runtime.evaluate", asked, page=True)["result"]["objectId"]
+        self._ask("DOM.setFileInputFiles", {"files": [str(path)], "objectId": place}, page=True)
 
     def type(self, text: str) -> None:
         self._ask("Input.insertText", {"text": text}, page=True)
@@ -135,8 +166,14 @@ class Person(HeadlessBrowser):
                 event["text"] = text
             self._ask("Input.dispatchKeyEvent", event, page=True)
 
-    def picture(self, path: Path) -> None:
-        shot = self._ask("Page.captureScreenshot", {"format": "png"}, page=True)["data"]
+    def picture(self, path: Path, *, whole: bool = False) -> None:
+        """Of what is in sight, or of the ``whole`` page."""
+        clip: dict[str, Any] = {}
+        if whole:
+            width, height = self.evaluate("[innerWidth, document.documentElement.scrollHeight]")
+            part = {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}
+            clip = {"clip": part, "captureBeyondViewport": True}
+        shot = self._ask("Page.captureScreenshot", {"format": "png", **clip}, page=True)["data"]
         path.write_bytes(base64.b64decode(shot))
 
     def complaints(self) -> tuple[str, ...]:

@@ -8,9 +8,10 @@ import pytest
 
 from ee_dist.tasks.config import ConfigError
 from ee_dist.viewing.web_viewer import cut_off
-from ee_dist.workbench.guard import COOKIE, Guard
+from ee_dist.workbench.guard import Guard
 
 HERE = "127.0.0.1:8765"
+SESAME = Guard(None, "sesame")
 
 
 @pytest.mark.parametrize(("headers", "answered"), [
@@ -32,12 +33,12 @@ def test_only_its_own_page_on_this_machine(headers, answered):
     ({"host": "robot.lan:8765"}, "", False),
     ({"host": "robot.lan:8765"}, "token=wrong", False),
     ({"host": "robot.lan:8765"}, "token=sesame", True),
-    ({"host": "robot.lan:8765", "cookie": f"{COOKIE}=sesame"}, "", True),
-    ({"host": "robot.lan:8765", "cookie": f"{COOKIE}=sesame", "origin": "http://evil.example"}, "", False),
+    ({"host": "robot.lan:8765", "cookie": f"{SESAME.cookie}=sesame"}, "", True),
+    ({"host": "robot.lan:8765", "cookie": f"{SESAME.cookie}=sesame", "origin": "http://evil.example"}, "", False),
     ({"host": HERE}, "", False),
 ])  # fmt: skip
 def test_others_need_the_token(headers, query, answered):
-    assert Guard(None, "sesame").allowed(headers, query) is answered
+    assert SESAME.allowed(headers, query) is answered
 
 
 def test_two_workbenches_on_one_port():

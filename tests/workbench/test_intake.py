@@ -10,12 +10,10 @@ import pytest
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig
 from ee_dist.workbench.intake import Answers, Intake, options_of
 from ee_dist.workbench.session import Session
-from ee_dist.workbench.worker import Worker
 
 
 @pytest.fixture
-def intake(tmp_path, monkeypatch):
-    monkeypatch.setattr(Worker, "warm", lambda _: None)
+def intake(tmp_path):
     session = Session(Config(engine=EngineConfig("mujoco")), "auto", tmp_path / "bench")
     yield Intake(session)
     session.close()

@@ -3,10 +3,13 @@ by the command line, has the error that the page said."""
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
+import os
 import re
+import shlex
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -17,9 +20,8 @@ pytest.importorskip("nicegui", reason="needs the extra 'workbench'")
 
 from page_driver import Bench, Person
 
-from ee_dist.tasks import compare
-from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.viewing.browser import BrowserError, chromium
+from ee_dist.workbench.guard import Guard
 
 try:
     chromium()
@@ -38,21 +40,46 @@ def refused(address: str, **headers: str) -> int:
         return error.code
 
 
+def pointed_at(person: Person) -> None:
+    """The robot goes to the instant under the mouse: what rerun's viewer would be told, here by one that only listens."""
+    person.evaluate(
+        "(() => { const f = document.createElement('iframe'); f.className = 'robot'; document.body.append(f);"
+        "f.contentWindow._handle = { viewer_control: (b) => { window.asked = [...b]; return Promise.resolve(); } };"
+        "window.robotOn = ['run_time', 300]; })()"
+    )
+    x, y, width, height = person.wait(
+        "(() => { const r = document.querySelector('.nsewdrag').getBoundingClientRect(); "
+        "return [r.x, r.y, r.width, r.height]; })()"
+    )
+    person.mouse("mouseMoved", x + width / 2, y + height / 2)
+    asked = person.wait("window.asked")
+    # Field 6 of the request; in it the timeline by its name, and a time in nanoseconds.
+    assert bytes(asked[:15]) == b"\x32" + bytes([len(asked) - 2]) + b"\x12\x0a\x0a\x08run_time\x1a" and asked[16] == 8
+    assert 300.5 < sum((b & 127) << (7 * k) for k, b in enumerate(asked[17:])) / 1e9 < 301.5
+    person.evaluate("document.querySelector('iframe.robot').remove()")
+
+
 def test_the_story(recording: Path, tmp_path: Path) -> None:
     with Bench(tmp_path, f"measured={recording}", "engine=mujoco", "hydra.run.dir=bench") as bench:
         with Person() as person:
-            person.go(bench.address)
-            person.waits_for("The model is off")
-            start = person.wait(NUMBER)
-            person.wait("document.querySelectorAll('.js-plotly-plot .main-svg').length > 4")
-            # A closed tab stops nothing: the search goes on, and who comes back finds what it found.
-            person.open("Explain")
-            person.click("What is missing?")
-            person.waits_for("s so far")
-            person.go("about:blank")
-            person.go(bench.address)
-            person.waits_for("measured")
-            person.open("Explain")
+            with Person() as first:
+                first.go(bench.address)
+                first.waits_for("The model is off")
+                # A search whose process is killed is told, and begun again.
+                first.key("2", 50, "2")
+                first.click("What is missing?")
+                first.waits_for("s so far")
+                os.kill(bench.searcher, signal.SIGKILL)
+                first.waits_for("nothing is lost: start it again")
+                first.click("What is missing?")
+                first.waits_for("s so far")
+                # Another browser shows the same session, and has it when this one is closed in the middle of a search.
+                person.go(bench.address)
+                start = person.wait(NUMBER)
+                person.wait("document.querySelectorAll('.js-plotly-plot .main-svg').length > 4")
+                pointed_at(person)
+                person.open("Explain")
+                person.waits_for("s so far")
             person.wait(FOUND)
             assert "coulomb friction at servo" in person.text()
             # By hand: its values were found by the search; now the slider is moved away, and back.
@@ -71,6 +98,7 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
             person.open("Keep")
             person.click("Keep the model")
             person.waits_for("task=compare says")
+            line = re.findall(r"python -m ee_dist (task=compare .*model\.yaml.*)", person.text())[-1]
             said = float(re.search(r"\(error ([\d.]+)\)", person.text())[1])
             overflow = person.evaluate("document.documentElement.scrollWidth - innerWidth")
             assert overflow <= 0
@@ -87,9 +115,41 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
         assert refused(f"{bench.address}files/..%2f..%2ferrors.txt") == 404
         assert bench.end() == 130
         assert "kept in bench" in bench.said() and len(bench.said().strip().splitlines()) == 1
-    config = Config(engine=EngineConfig("mujoco"), evaluator=EvaluatorConfig("serial"), measured=str(recording))
-    config.model = str(tmp_path / "bench" / "model.yaml")
-    with contextlib.redirect_stdout(io.StringIO()):
-        compare.run(config, compare.Options(rerun=False), tmp_path / "again")
+    # The last of the command lines that the page gives, as it stands there.
+    command = [sys.executable, "-m", "ee_dist", *shlex.split(line), "hydra.run.dir=again"]
+    subprocess.run(command, cwd=tmp_path, env=bench.environment, capture_output=True, check=True)
     again = json.loads((tmp_path / "again" / "summary.json").read_text())
     assert f"{again['error']:.6g}" == f"{said:.6g}"
+
+
+def test_others_bring_the_token_and_what_cannot_be_read_is_told(recording: Path, tmp_path: Path) -> None:
+    nonsense, table = tmp_path / "nonsense.mcap", tmp_path / "table.csv"
+    nonsense.write_bytes(b"this is no recording" * 9)
+    table.write_text("who,what\nyou,me\n")
+    with Bench(tmp_path, "task.host=0.0.0.0", "robot=servo_pendulum", "hydra.run.dir=bench") as bench:
+        port, token = re.search(r":(\d+)/\?token=(\S+)", bench.address).groups()
+        here = f"http://127.0.0.1:{port}/"
+        assert refused(here) == 403
+        assert refused(f"{here}?token=wrong") == 403
+        assert refused(f"{here}?token={token}") == 200
+        assert refused(here, Cookie=f"{Guard(None, token).cookie}={token}") == 200
+        assert refused(f"{here}?token={token}", Origin="http://evil.example") == 403
+        assert refused(f"{here}_nicegui_ws/socket.io/?EIO=4&transport=polling") == 403
+        with Person() as person:
+            person.go(here)
+            person.waits_for("open the address that it printed")
+            person.go(f"{here}?token={token}")
+            person.waits_for("Drop a file here")
+            person.drop(nonsense)
+            person.waits_for("expected a recording written by ee_dist")
+            person.drop(table)
+            person.waits_for("table.csv: ")
+            person.drop(recording)
+            person.waits_for("The model is off")
+            assert token not in person.evaluate("location.href")
+        command = [sys.executable, "-m", "ee_dist", "task=workbench", f"task.port={port}", f"measured={recording}"]
+        other = subprocess.run(
+            command, cwd=tmp_path, env=bench.environment, capture_output=True, text=True, check=False
+        )
+        assert other.returncode == 2 and "if another workbench is open there" in other.stderr
+        assert len(other.stderr.strip().splitlines()) == 1

@@ -14,21 +14,20 @@ import pytest
 
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.effects.catalogue import EffectError, term
-from ee_dist.tasks import compare
-from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
-from ee_dist.workbench import verbs
+from ee_dist.tasks import compare, trial
+from ee_dist.tasks.config import Config, ConfigError, EngineConfig, EvaluatorConfig, RobotConfig
+from ee_dist.workbench import saved, verbs
 from ee_dist.workbench.bench import FIT, HAND, Step
 from ee_dist.workbench.results import Improved
 from ee_dist.workbench.session import Session
 from ee_dist.workbench.verbs import Ended, Request
-from ee_dist.workbench.worker import Worker
 
 FRICTION = "coulomb_friction@servo"
+PLAN = ["multisine:seconds=2,amplitude=0.5,seed=1"]
 
 
 @pytest.fixture
-def session(recording, tmp_path, monkeypatch):
-    monkeypatch.setattr(Worker, "warm", lambda _: None)
+def session(recording, tmp_path):
     found = Session(Config(engine=EngineConfig("mujoco")), "auto", tmp_path / "bench")
     found.load(str(recording), None)
     found.begin()
@@ -135,3 +134,43 @@ def test_a_search_that_is_killed_or_cancelled_loses_nothing(session):
     session.cancel()
     until(lambda: "cancelled" in session.notice)
     assert session.bench is before and session.explained is None and session.progress is None
+
+
+def test_a_session_goes_on_where_it_ended(session, tmp_path):
+    session.add(FRICTION, {"torque_nm": 0.09})
+    session.add("viscous_friction@servo", {"damping_nm_s_rad": 0.001})
+    session.switch(1, False)
+    session.close()
+    kept = saved.read(session.folder)
+    again = Session(session.config, kept.by, tmp_path / "again")
+    again.reopen(kept)
+    again.begin()
+    assert again.bench == session.bench and again.commands == session.commands
+    assert again.seen.found.error == session.seen.found.error
+    again.close()
+    (session.folder / saved.FILE).write_text('{"format": 1, "measured": ["x"]}')
+    with pytest.raises(ConfigError, match="no session of the workbench can be read"):
+        saved.read(session.folder)
+
+
+def test_what_explain_refuses_is_refused_when_it_is_added(tmp_path):
+    """By measured torques, which nothing need be simulated for: the friction is known, and the motor is as strong as it says."""
+    config = Config(
+        robot=RobotConfig(name="servo_pendulum"), engine=EngineConfig("mujoco"), evaluator=EvaluatorConfig("serial")
+    )
+    options = trial.Options(excitations=PLAN, repeats=1, noise=0.002, motor_torque=True)
+    with contextlib.redirect_stdout(io.StringIO()):
+        trial.run(replace(config, hidden=FRICTION), options, tmp_path / "tried")
+    bench = Session(config, "force_balance", tmp_path / "bench")
+    bench.load(str(tmp_path / "tried" / "trial.mcap"), None)
+    bench.begin()
+    bench.add(FRICTION, {"torque_nm": 0.135})
+    useless = "parallel_spring@servo"
+    request = Request(verbs.ADD, bench._asked(bench.bench.terms), "force_balance", tmp_path / "add", useless, True)
+    with contextlib.redirect_stdout(io.StringIO()):
+        found = verbs.done(request, lambda *_: None)
+    assert found.steps[-1].refused and found.steps[-1].error_heldout is not None
+    bench._after(request, Ended(found))
+    assert [e.on for e in bench.bench.entries] == [True, False] and bench.notice.startswith("Refused: parallel spring")
+    assert bench.bench.ladder[-1].refused == found.steps[-1].refused
+    bench.close()

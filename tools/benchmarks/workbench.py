@@ -1,76 +1,236 @@
-"""How long a move of a slider takes on the workbench, from the session to new curves, and how long a session takes to begin.
+"""How long the workbench takes, as a person at the browser has it, beside what it aims at:
 
-    python tools/benchmarks/workbench.py
+    python tools/benchmarks/workbench.py [start] [slider] [long]
 
-CPU milliseconds, medians; the browser's drawing comes on top (about 20 ms for 1600 points).
+start: from the command to the first page. slider: from a move of the mouse on a slider to redrawn curves on the screen. long:
+20 trials of 60 s at 500 Hz. Without a word all three. Wall milliseconds in headless Chromium, of which other programs on
+the machine are a part, and CPU milliseconds of the workbench's process. Needs Chromium.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
-import statistics
+import os
+import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from ee_dist.discrepancy.problem import Series
-from ee_dist.tasks import trial
-from ee_dist.tasks.config import Config, EngineConfig, RobotConfig
-from ee_dist.viewing.curves import Overlay
-from ee_dist.workbench import charts
-from ee_dist.workbench.session import Session
-from ee_dist.workbench.thin import stretch
+import numpy as np
 
-CASES = {
-    "servo_pendulum": ("coulomb_friction@servo", "multisine:seconds=4,amplitude=0.5,seed=1"),
-    "quadruped_lab": ("coulomb_friction@knee_front_left", "sway:seconds=4.2,amplitude=0.1,seed=1"),
-}
-MOVES = 20
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "workbench"))
+
+from page_driver import Bench, Person
+
+from benchmarks.workbench_logs import LONG, PENDULUM, QUADRUPED, Log, written
+from ee_dist.recording.reader import read_run
+
+MOVES = 40
+FIRST_PAGE_MS = 3000.0
+SLIDE_MS = {"pendulum": 100.0, "quadruped": 300.0}
+FLUID_MS = 300.0
+"""What a hand that zooms or asks for another curve may have to wait."""
+COMPLETE = (
+    "parseFloat(document.querySelector('.number').innerText) > 0 && "
+    "document.querySelectorAll('.js-plotly-plot .main-svg').length > 4"
+)
+LAUNCH = (
+    "import sys, time; from nicegui import ui; print('toolkit', time.time(), time.process_time(), flush=True); "
+    "import runpy; sys.argv[0] = 'ee_dist'; runpy.run_module('ee_dist', run_name='__main__', alter_sys=True)"
+)
+WATCH = """((kind) => {
+  const plot = [...document.querySelectorAll('.js-plotly-plot')].find((p) => p.offsetParent && p.data?.[0]?.name === 'measured');
+  const values = () => JSON.stringify(plot.data.map((d) => [d.x, d.y]));
+  const seen = values();
+  window.redrawn = new Promise((done) => {
+    let begun = null;
+    addEventListener(kind, (e) => { begun = e.timeStamp; }, {capture: true, once: true});
+    const look = () => {
+      if (begun === null || values() === seen) return;
+      plot.removeListener('plotly_afterplot', look);
+      // A message from within a frame is read when that frame is on the screen.
+      requestAnimationFrame(() => { const after = new MessageChannel();
+        after.port1.onmessage = () => done(performance.now() - begun); after.port2.postMessage(0); });
+    };
+    plot.on('plotly_afterplot', look);
+  });
+})(%r)"""
+PLACE = """(() => { const r = [...document.querySelectorAll(%r)].find((e) => e.offsetParent).getBoundingClientRect();
+  return [r.x, r.y, r.width, r.height]; })()"""
+SHOWN = """(() => { const p = [...document.querySelectorAll('.js-plotly-plot')].find(
+  (p) => p.offsetParent && p.data?.[0]?.name === 'measured');
+  return [p.data[0].x, ...p.layout.xaxis.range]; })()"""
 
 
-def drawn(series: Series | None) -> None:
-    if series is not None:
-        curve = Overlay("channel", "trial", series.unit, series.times_s, series.measured, series.predicted)
-        charts.overlay(stretch(curve).curve, "key")
+class Timed(Bench):
+    """The workbench by a launcher that says when the toolkit was imported."""
+
+    program = ("-c", LAUNCH)
+
+    @property
+    def imported(self) -> tuple[float, float]:
+        """When that was, and the CPU seconds that the process had used by then."""
+        found = next(line.split() for line in self.lines if line.startswith("toolkit "))
+        return float(found[1]), float(found[2])
 
 
-def measure(robot: str) -> tuple[float, float, float]:
-    """CPU milliseconds of a move, of a release, and of the beginning of a session."""
-    effect, plan = CASES[robot]
-    with tempfile.TemporaryDirectory() as folder:
-        config = Config(robot=RobotConfig(name=robot), engine=EngineConfig("mujoco"), hidden=effect)
-        (Path(folder) / "trial").mkdir()
-        with contextlib.redirect_stdout(io.StringIO()):
-            trial.run(config, trial.Options(excitations=[plan], repeats=1), Path(folder) / "trial")
-        session = Session(config, "auto", Path(folder) / "bench")
-        session.worker.warm = lambda: None  # type: ignore[method-assign]
-        start = time.process_time()
-        session.load(str(Path(folder) / "trial"), None)
-        session.begin()
-        begun = time.process_time() - start
-        session.add(effect)
-        place, entry = session.place(), session.bench.entries[0]
-        name, top = entry.term.values[0][0], entry.candidate.bounds[0][1]
-        moves, releases = [], []
-        for k in range(MOVES):
-            start = time.process_time()
-            drawn(session.slide(0, {name: top * (0.2 + 0.02 * k)}, place).series)
-            moves.append(time.process_time() - start)
-        for k in range(3):
-            session.slide(0, {name: top * (0.7 + 0.02 * k)}, place)
-            start = time.process_time()
-            session.release()
-            releases.append(time.process_time() - start)
-        session.close()
-    return 1e3 * statistics.median(moves), 1e3 * statistics.median(releases), 1e3 * begun
+def cpu_s(pid: int) -> float:
+    """User and system seconds of a process with its threads."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def row(what: str, figures: str, aim_ms: float | None = None, got_ms: float | None = None) -> None:
+    aim = "" if aim_ms is None or got_ms is None else f"aim {aim_ms:.0f} ms: {'met' if got_ms <= aim_ms else 'MISSED'}"
+    print(f"{what:<62}{figures:<58}{aim}", flush=True)
+
+
+def opened(log: Log, folder: Path) -> Timed:
+    written(log, folder / "trial.mcap")
+    return Timed(folder, f"measured={folder / 'trial.mcap'}", "engine=mujoco", "hydra.run.dir=bench")
+
+
+def first_page(bench: Timed, person: Person, begun: float) -> float:
+    """Milliseconds from the import of the toolkit to the page with all that it shows; it prints what lies between."""
+    pid = bench.process.pid
+    stamps = {"toolkit imported": bench.imported, "answers": (time.time(), cpu_s(pid))}
+    person.go(bench.address)
+    stamps["page loaded"] = (time.time(), cpu_s(pid))
+    person.wait(COMPLETE)
+    stamps["complete"] = (time.time(), cpu_s(pid))
+    told = ", ".join(f"{name} {t - begun:.1f} ({cpu:.1f})" for name, (t, cpu) in stamps.items())
+    print(f"    seconds from the command, and CPU seconds of the workbench: {told}")
+    return 1e3 * (stamps["complete"][0] - bench.imported[0])
+
+
+def start(folder: Path) -> None:
+    with Person() as person:
+        bench = opened(PENDULUM, folder)
+        begun = time.time()
+        with bench:
+            took = first_page(bench, person, begun)
+            row("first page, after the import of the toolkit", f"{took:.0f} ms", FIRST_PAGE_MS, took)
+            person.go("about:blank")
+            again = time.time()
+            person.go(bench.address)
+            person.wait(COMPLETE)
+            row("the page once more, in another tab", f"{1e3 * (time.time() - again):.0f} ms")
+
+
+def redrawn(person: Person, kind: str, act: Callable[[], None]) -> float:
+    """Milliseconds from an event to other curves on the screen."""
+    person.evaluate(WATCH % kind)
+    act()
+    return float(person.evaluate("window.redrawn"))
+
+
+@dataclass(frozen=True)
+class Took:
+    """Some acts one after the other: wall milliseconds of each; CPU milliseconds of the workbench and bytes of one."""
+
+    wall_ms: list[float]
+    cpu_ms: float
+    received: float
+
+    def __str__(self) -> str:
+        most = np.quantile(self.wall_ms, 0.95)
+        figures = (
+            f"median {self.median:.0f} ms, 95 % {most:.0f} ms, CPU {self.cpu_ms:.0f} ms, {self.received / 1e3:.0f} kB"
+        )
+        return f"{figures} ({len(self.wall_ms)} times)"
+
+    @property
+    def median(self) -> float:
+        return float(np.median(self.wall_ms))
+
+
+def timed(bench: Bench, person: Person, kind: str, acts: Iterable[Callable[[], None]]) -> Took:
+    received, spent = person.received(), cpu_s(bench.process.pid)
+    took = [redrawn(person, kind, act) for act in acts]
+    cpu = 1e3 * (cpu_s(bench.process.pid) - spent) / len(took)
+    return Took(took, cpu, (person.received() - received) / len(took))
+
+
+def slider(log: Log, folder: Path) -> None:
+    """The slider of an effect that is added by hand, dragged."""
+    with opened(log, folder) as bench, Person() as person:
+        person.go(bench.address)
+        person.wait(COMPLETE)
+        person.open("Add")
+        x, y, width, height = person.wait(PLACE % "input[aria-label^='Add an effect']")
+        person.press(x + width / 2, y + height / 2)
+        wanted = log.effect.replace("@", " at ").replace("_", " ")
+        person.type(wanted)
+        person.click(wanted, "[role=option]")
+        person.click("Add", "main button")
+        person.wait("[...document.querySelectorAll('.q-slider')].some((e) => e.offsetParent)")
+        time.sleep(2.0)
+        x, y, width, height = person.evaluate(PLACE % ".q-slider")
+        places = [x + width * (0.2 + 0.6 * k / MOVES) for k in range(MOVES + 3)]
+        moves = [partial(person.mouse, "mouseMoved", at, y + height / 2) for at in places]
+        person.mouse("mousePressed", places[0], y + height / 2)
+        for move in moves[:3]:
+            move()
+            time.sleep(1.0)
+        took = timed(bench, person, "mousemove", moves[3:])
+        person.mouse("mouseReleased", places[-1], y + height / 2)
+        row(f"slider to curves: {log.size}", str(took), SLIDE_MS[log.name], took.median)
+
+
+def long(folder: Path) -> None:
+    """Many rows: what comes over the wire, and how soon another curve, and a stretch row by row, is there."""
+    with Person() as person:
+        bench = opened(LONG, folder)
+        begun = time.time()
+        with bench:
+            took_ms = first_page(bench, person, begun)
+            row(
+                f"opened: {LONG.size}",
+                f"{took_ms:.0f} ms, {person.received() / 1e6:.1f} MB with the toolkit's own files",
+            )
+            log = read_run(folder / "trial.mcap").trials[0].log
+            person.evaluate("document.activeElement.blur()")
+            took = timed(bench, person, "keydown", [partial(person.key, "ArrowRight", 39)] * 8)
+            row("another trial, by key", str(took), FLUID_MS, took.median)
+            zooms = [partial(_dragged, person, 0.5 - 0.2 / k, 0.5 + 0.2 / k) for k in (1, 2, 3, 4)]
+            took = timed(bench, person, "mouseup", zooms)
+            row("zoomed in, thinned anew", str(took), FLUID_MS, took.median)
+            times, first, last = person.evaluate(SHOWN)
+            rows = (log.times_s >= first) & (log.times_s <= last)
+            shown = np.array([first <= t <= last for t in times])
+            exact = shown.sum() == rows.sum() and np.allclose(np.array(times)[shown], log.times_s[rows], atol=1e-5)
+            told = "every row" if exact else "NOT every row"
+            row("", f"in sight then: {last - first:.2f} s, {shown.sum()} of {rows.sum()} rows, {told}")
+
+
+def _dragged(person: Person, begin: float, end: float) -> None:
+    """The mouse from one place of the chart to another, as shares of its width."""
+    x, y, width, height = person.evaluate(PLACE % ".js-plotly-plot .nsewdrag")
+    person.mouse("mousePressed", x + begin * width, y + height / 2)
+    for k in (1, 2, 3):
+        person.mouse("mouseMoved", x + (begin + (end - begin) * k / 3) * width, y + height / 2)
+    person.mouse("mouseReleased", x + end * width, y + height / 2)
 
 
 def main() -> None:
-    print(f"{'one trial of':<18}{'move':>8}{'release':>10}{'begin':>8}  (CPU ms)")
-    for robot in CASES:
-        move, release, begin = measure(robot)
-        print(f"{robot:<18}{move:8.0f}{release:10.0f}{begin:8.0f}")
+    parts = sys.argv[1:] or ["start", "slider", "long"]
+    with tempfile.TemporaryDirectory() as name:
+        for part in parts:
+            folder = Path(name) / part
+            folder.mkdir()
+            if part == "start":
+                start(folder)
+            elif part == "slider":
+                for log in (PENDULUM, QUADRUPED):
+                    (folder / log.name).mkdir()
+                    slider(log, folder / log.name)
+            elif part == "long":
+                long(folder)
+            else:
+                sys.exit(f"no part {part!r}; there are: start, slider, long")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.compare import Comparison, circumstances, heat, span_of
+from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.problem import Problem
@@ -31,11 +31,7 @@ Models = Sequence[tuple[str, Hypothesis]]
 
 def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
     """Every channel of every trial, with the error that the first of the models leaves there."""
-    width = len(problem.channels)
-    cells = len(problem.trials) * width
-    where = problem.trial_of * width + problem.channel_of
-    energy = np.bincount(where, weights=residual**2, minlength=cells)
-    rms = np.sqrt(energy / np.maximum(np.bincount(where, minlength=cells), 1))
+    rms = by_trial(problem, residual)
     later = [{(s.trial, s.channel): s.predicted for s in problem.series(terms)} for _, terms in models[1:]]
     return [
         Overlay(
@@ -46,7 +42,7 @@ def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
             s.measured,
             s.predicted,
             later[0].get((s.trial, s.channel)) if later else None,
-            float(rms[s.trial * width + s.channel]),
+            float(rms[s.trial, s.channel]),
         )
         for s in problem.series(models[0][1])
     ]

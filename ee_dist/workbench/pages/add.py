@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from ee_dist.discrepancy.words import placed, plain, without_unit
+from ee_dist.discrepancy.words import placed, plain, quantity
 from ee_dist.effects.catalogue import CATALOGUE
 from ee_dist.workbench import verbs
 from ee_dist.workbench.bench import Entry
@@ -127,21 +127,21 @@ class AddView(View):
                 ui.button(icon="delete", on_click=lambda: self.page.act(self.session.remove, k)).props(
                     'flat dense aria-label="remove"'
                 ).mark(f"remove-{k}")
-            robot = self.session.measured.robot if self.session.measured else None
             for p, (low, high) in zip(entry.candidate.effect.parameters, entry.candidate.bounds, strict=True):
-                unit = p.unit if robot is None else entry.candidate.effect.unit(p.name, robot, entry.term.target)
-                self._slider(k, entry, p.name, unit, low, high)
+                self._slider(k, entry, p.name, low, high)
             for flag in entry.flags:
                 quiet(flag)
 
-    def _slider(self, k: int, entry: Entry, name: str, unit: str, low: float, high: float) -> None:
-        value = dict(entry.term.values)[name]
-        shown = "" if unit in ("1", "channel") else f" ({unit})"
+    def _slider(self, k: int, entry: Entry, name: str, low: float, high: float) -> None:
+        value, effect, term = dict(entry.term.values)[name], entry.candidate.effect, entry.term
+        robot = self.session.measured.robot if self.session.measured else None
+        unit = effect.parameter(name).unit if robot is None else effect.unit(name, robot, term.target)
+        shown, said = "" if unit in ("1", "channel") else f" ({unit})", quantity(term, name, robot)
         with ui.row().classes("w-full items-center no-wrap gap-2"):
             with ui.column().classes("gap-0").style("flex: 1 1 auto; min-width: 0"):
-                quiet(f"{plain(without_unit(name, unit))}{shown}, {low:.3g} to {high:.3g}")
+                quiet(f"{said}{shown}, {low:.3g} to {high:.3g}")
                 slider = ui.slider(min=low, max=high, step=(high - low) / STEPS, value=value).props(
-                    f'aria-label="{escape(plain(name))}"'
+                    f'aria-label="{escape(f"{said} of {placed(entry.name)}{shown}")}"'
                 )
                 slider.mark(f"slider-{k}-{name}")
                 slider.on("update:model-value", lambda e: self.moves.ask((k, name, float(e.args))), throttle=0.02)

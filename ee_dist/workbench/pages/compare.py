@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from ee_dist.discrepancy.compare import by_trial
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.words import compare_account
 from ee_dist.workbench import charts
 from ee_dist.workbench.pages.curves import Curves
 from ee_dist.workbench.pages.robot import RobotPanel
 from ee_dist.workbench.pages.view import View, heading, of, quiet
-from ee_dist.workbench.sight import Cloud, by_trial
+from ee_dist.workbench.sight import Cloud
 
 
 class CompareView(View):
@@ -63,7 +64,8 @@ class CompareView(View):
             )
         if topics & {"seen", "place"}:
             names = [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)]
-            self.map.update_figure(charts.heat(by_trial(problem, seen), problem.channels, names, place))
+            cells = by_trial(problem, np.nan_to_num(seen.residual, posinf=0.0))
+            self.map.update_figure(charts.heat(cells, problem.channels, names, place))
             self._parts = await of(session.do(sight.clouds, seen.residual, place))
         self.curves.draw(await of(session.do(sight.series, seen.terms, place)))
         self._draw_clouds(problem.layout.units[place[1]])

@@ -15,6 +15,9 @@ from ee_dist.workbench import charts
 from ee_dist.workbench.pages.desk import Desk
 from ee_dist.workbench.thin import stretch
 
+HOVERED = "(e) => window.robotAt?.(e.points[0].x)"
+"""In the browser alone: a mouse that moves asks nothing of the session."""
+
 
 class Curves:
     """A chart of the place that the page looks at."""
@@ -23,6 +26,7 @@ class Curves:
         self.page, self.height = page, height
         self.plot = ui.plotly(charts.overlay(_empty(), "", height=height)).classes("w-full")
         self.plot.on("plotly_relayout", self._zoomed)
+        self.plot.on("plotly_hover", js_handler=HOVERED)
         self.drawn = 0
 
     def draw(self, series: Series | None, mark: tuple[str, Array] | None = None, better: Array | None = None) -> None:

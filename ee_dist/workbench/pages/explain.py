@@ -10,7 +10,7 @@ from ee_dist.workbench.pages.curves import Curves
 from ee_dist.workbench.pages.view import View, heading, of, quiet
 from ee_dist.workbench.results import REFUSED, Ranked
 
-WORDS = {"best": "best", "tied": "tied with the best", "earned": "earned its place", "not": "refused"}
+WORDS = {"best": "Best", "tied": "Tied with the best", "earned": "Earned its place", "not": "Refused"}
 STAGES = {"screening": "screened", "scanning": "scanned over their range", "fitting": "fitted and judged"}
 
 
@@ -34,7 +34,7 @@ class ExplainView(View):
                 heading("Ranked, with 95 % intervals")
                 self.ranking = ui.plotly(charts.ranking(["-"], [0.0], [(0.0, 0.0)], ["not"])).classes("w-full")
                 self.list = ui.column().classes("w-full gap-0")
-            with ui.element("section").classes("card"):
+            with ui.element("section").classes("card stays"):
                 heading("Its mark in the residual")
                 self.mark_note = quiet()
                 self.curves = Curves(self.page)

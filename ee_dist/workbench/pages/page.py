@@ -28,8 +28,13 @@ CALM = (
     "<script>addEventListener('unhandledrejection', (e) => "
     "{ if (String(e.reason).includes('displayed plot div')) e.preventDefault(); });</script>"
 )
+UNSAID = "<script>if (location.search) history.replaceState(null, '', location.pathname);</script>"
+"""The token has become a cookie: it need not stand in the address bar and in the browser's memory."""
 MOVES = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
+IDLE_S = 4.0
+"""After which the process of the long verbs is started: not while a page needs the processor to come up."""
 STYLE = Path(__file__).with_name("style.css")
+FOLLOW = Path(__file__).with_name("follow.js")
 KEYS = "Keys: 1 to 5 choose a view, arrows another trial or channel in Compare, e explains, u takes back, Esc cancels a search."
 
 
@@ -64,7 +69,8 @@ class Page:
 
         client.on_delete(self.session.listen(hear))
         ui.add_css(STYLE)
-        ui.add_head_html(CALM)
+        ui.add_head_html(CALM + UNSAID)
+        ui.add_head_html(f"<script>{FOLLOW.read_text()}</script>")
         ui.colors(primary="#0072b2", positive="#009e73", negative="#c04a00")
         with ui.element("main").classes("bench"):
             self._head()
@@ -85,6 +91,7 @@ class Page:
                             view.build()
                 ui.label(KEYS).classes("quiet")
         ui.keyboard(on_key=self._key, ignore=["input", "select", "textarea"])
+        ui.timer(IDLE_S, self.session.worker.warm, once=True)
         self.changed("opened")
 
     def _head(self) -> None:

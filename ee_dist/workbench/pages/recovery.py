@@ -14,7 +14,6 @@ from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, REPAIR, RunRecord
 from ee_dist.tasks.config import ConfigError
 from ee_dist.viewing import story
-from ee_dist.viewing.rerun_scene import write_rrd
 from ee_dist.workbench import charts
 from ee_dist.workbench.pages.robot import shown
 from ee_dist.workbench.pages.view import heading, quiet
@@ -58,6 +57,8 @@ class Followed:
     def scene(self) -> Path:
         """The run so far as a rerun recording."""
         assert self.run is not None
+        from ee_dist.viewing.rerun_scene import write_rrd  # slow to load, and needed only when somebody looks
+
         self.out.mkdir(parents=True, exist_ok=True)
         path = self.out / "run.rrd"
         write_rrd(self.run, path)
@@ -159,5 +160,5 @@ class RecoveryPage:
         path = await asyncio.to_thread(self.followed.scene)
         with self.client, self.place:
             self.place.clear()
-            frame = ui.element("iframe").props('title="robot in 3-D"').style("width:100%; height:520px; border:0")
+            frame = ui.element("iframe").props('title="robot in 3-D"').classes("robot")
             ui.run_javascript(shown(frame.html_id, quote(path.name)))

@@ -23,8 +23,11 @@ SHOWN = """
 
 def shown(element: str, recording: str) -> str:
     """The script that opens a recording of the session's folder in a frame, once the page has it."""
-    viewer = "/viewer/index.html?hide_welcome_screen&persist=0&notebook=0&url="
-    address = f"{json.dumps(viewer)} + encodeURIComponent(location.origin + {json.dumps('/files/' + recording)})"
+    viewer = "/viewer/index.html?hide_welcome_screen&persist=0&notebook=0&theme="
+    theme = "(document.body.classList.contains('body--dark') ? 'dark' : 'light') + '&url='"
+    address = (
+        f"{json.dumps(viewer)} + {theme} + encodeURIComponent(location.origin + {json.dumps('/files/' + recording)})"
+    )
     return SHOWN % {"id": json.dumps(element), "address": address}
 
 
@@ -33,21 +36,24 @@ class RobotPanel:
 
     def __init__(self, page: Desk) -> None:
         self.page = page
-        self._shown = ""
+        self._shown, self._wanted = "", False
         with ui.element("section").classes("card"):
             heading("The robot, and the model's ghost")
             self.note = quiet(
-                "Measured robot and predicted ghost side by side, in rerun, from task=compare of this model."
+                "Measured robot and predicted ghost, in rerun, from task=compare of this model. It goes to the instant that the "
+                "mouse points at in the curves, and to where they are zoomed in."
             )
             ui.button("Show in 3-D", icon="view_in_ar", on_click=self._ask).props("outline no-caps").mark("robot")
             self.place = ui.element("div").classes("w-full")
 
     async def _ask(self) -> None:
+        self._wanted = True
         await self.page.begin(verbs.COMPARE)
 
     def draw(self, topics: set[str]) -> None:
         kept = self.page.session.kept
-        if kept is None or str(kept.folder) == self._shown:
+        if kept is None or not self._wanted or str(kept.folder) == self._shown:
+            self._follow(topics)
             return
         recording = kept.folder / f"{verbs.COMPARE}.rrd"
         if not recording.is_file():
@@ -57,6 +63,16 @@ class RobotPanel:
         path = quote(recording.relative_to(self.page.session.folder).as_posix())
         self.place.clear()
         with self.place:
-            frame = ui.element("iframe").props('title="robot in 3-D"').style("width:100%; height:520px; border:0")
+            frame = ui.element("iframe").props('title="robot in 3-D"').classes("robot")
             ui.link("the recording", f"/files/{path}").classes("quiet")
         ui.run_javascript(shown(frame.html_id, path))
+        self._follow(topics | {"place"})
+
+    def _follow(self, topics: set[str]) -> None:
+        """Tell the page where on the recording's clock the trial begins that the charts show; go where they are zoomed to."""
+        kept, place = self.page.session.kept, self.page.place
+        if kept is None or place is None or not topics & {"place", "look"}:
+            return
+        span = self.page.span_s
+        at = "" if span is None else f" window.robotAt({span[0]});"
+        ui.run_javascript(f"window.robotOn = {json.dumps([kept.timeline, kept.starts_s[place[0]]])};{at}")

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from nicegui import ui
 
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.tasks.results.labels import axis_of, drawn
 from ee_dist.workbench import charts
+from ee_dist.workbench.bench import Step
 from ee_dist.workbench.pages.view import View, heading, quiet
 
 
@@ -26,8 +31,10 @@ class WatchView(View):
         session = self.session
         if session.sight is None or session.seen is None:
             return
-        ladder, told = session.bench.ladder, session.sight.problem.told
-        self.plot.update_figure(charts.ladder(ladder, session.seen.found.noise_floor))
+        ladder, problem = session.bench.ladder, session.sight.problem
+        told, floor = problem.told, drawn(problem, session.seen.found.noise_floor)
+        shown = [replace(s, error_fit=drawn(problem, s.error_fit), error_heldout=_drawn(problem, s)) for s in ladder]
+        self.plot.update_figure(charts.ladder(shown, floor, axis_of(problem)))
         self.steps.clear()
         with self.steps:
             for s in ladder:
@@ -40,3 +47,7 @@ class WatchView(View):
                     ui.label(f"{s.name}: fitted {told(s.error_fit)}, {held}")
                     if s.refused:
                         ui.label(f"Refused: {s.refused}.").style("font-weight:600")
+
+
+def _drawn(problem: Problem, step: Step) -> float | None:
+    return None if step.error_heldout is None else drawn(problem, step.error_heldout)

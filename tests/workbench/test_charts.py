@@ -1,0 +1,45 @@
+"""What is sent to be drawn: every number that can be seen, and no lists, which the toolkit would watch item by item."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ee_dist.viewing.curves import Overlay
+from ee_dist.workbench import charts
+from ee_dist.workbench.bench import Step
+from ee_dist.workbench.thin import POINTS, stretch
+
+
+def overlay(rows: int, step_s: float) -> Overlay:
+    t = np.arange(rows) * step_s
+    return Overlay("position", "trial", "rad", t, np.sin(t), np.sin(t + 0.01))
+
+
+def test_a_stretch_of_a_long_log_is_drawn_row_by_row_and_every_row_has_its_time():
+    part = stretch(overlay(300_000, 0.002), 590.0, 592.0)
+    assert part.exact
+    lines = charts.overlay(part.curve, "key")["data"]
+    times = np.array(lines[0]["x"])
+    inside = (times >= 590.0) & (times <= 592.0)
+    assert inside.sum() == 1001 and np.allclose(np.diff(times), 0.002, atol=1e-9)
+    assert np.allclose(lines[0]["y"], part.curve.measured, atol=1e-6)
+    whole = stretch(overlay(300_000, 0.002))
+    assert not whole.exact and len(whole.curve.times_s) <= POINTS + 2
+
+
+def test_curves_are_sent_as_they_are_and_gaps_as_gaps():
+    curve = overlay(5, 0.1)
+    curve.predicted[2] = np.nan
+    lines = charts.overlay(curve, "key")["data"]
+    assert lines[1]["y"][2] is None and lines[2]["y"][2] is None and lines[1]["y"][1] is not None
+    assert all(isinstance(line[axis], tuple) for line in lines for axis in "xy")
+
+
+def test_a_refused_step_is_crossed_out_and_no_number_stands_on_the_floor():
+    steps = (Step("start", 8.0, 8.0), Step("a", 0.9, 0.95, "windows"), Step("b", 0.8, 2.0, "windows", "it is luck"))
+    found = charts.ladder(steps, 1.0, "error (mrad)")
+    lines = {line["name"]: line for line in found["data"]}
+    assert lines["refused"]["x"] == [2] and lines["held out"]["x"] == [0, 1]
+    assert lines["held out"]["textposition"] == ["top center", "bottom center"]
+    assert "refused" in found["layout"]["xaxis"]["ticktext"][2]
+    assert found["layout"]["yaxis"]["title"]["text"] == "error (mrad)"
