@@ -204,8 +204,7 @@ def _pruned(
     if not old:
         return current, ()
     if len(current.u) >= LARGE:
-        start = [(Model(current.parts), current.u)]
-        (fit,) = follow_valley(search, start, search.everything, PRIOR, 1, WIDTHS[-1:])
+        (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 1, WIDTHS[-1:])
         kept = pruned(search, fit, own, tried, added)
         names = {c.name for c in kept.parts}
         return kept, tuple(c.name for c in current.parts if c.name not in names)

@@ -353,9 +353,7 @@ def _ranges(found: Improvement, new: Sequence[Term], robot: Robot) -> str:
         if term.name in told_of:
             range_ = f"{p.low:.3g} to {p.high:.3g}{_unit(term, p.name, robot)}"
             sure = not p.flag and np.isfinite(p.high - p.low)
-            told_of[term.name].append(
-                f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip()
-            )
+            told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
     out = [
         (f"{placed(name)}: " if len(told_of) > 1 else "") + ", ".join(values)
         for name, values in told_of.items()
