@@ -24,7 +24,15 @@ from omegaconf.errors import OmegaConfBaseException
 
 from ee_dist.tasks.compose import check_flags, check_used, config_folder, handling, plain, quoted, settings
 from ee_dist.tasks.config import ConfigError
-from ee_dist.tasks.errors import USER_ERRORS, RayLostError, abandon_evaluators, defect, hydra_message, unasked_end
+from ee_dist.tasks.errors import (
+    USER_ERRORS,
+    RayLostError,
+    abandon_evaluators,
+    defect,
+    hydra_message,
+    unasked_end,
+    when_lost,
+)
 from ee_dist.tasks.folder import (
     NO_NAME,
     SETTINGS,
@@ -49,6 +57,7 @@ def run(composed: DictConfig) -> None:
     """One job. A user's mistake ends it here: Hydra would add lines of its own."""
     hydra_settings: Any = HydraConfig.get()
     out = Path(hydra_settings.runtime.output_dir)
+    when_lost(lambda why: _lost(why, out))
     try:
         out = _folder(hydra_settings)
         config, module, options = settings(composed)
@@ -64,8 +73,7 @@ def run(composed: DictConfig) -> None:
             module.run(config, options, out)
     except RayLostError as error:
         remove_made()
-        abandon_evaluators()
-        leaving.leave(f"{error}; {_what_is_kept(out)}", MISTAKE)
+        _lost(str(error), out)
     except USER_ERRORS as error:
         remove_made()
         onward = "" if isinstance(error, ConfigError) else _how_to_go_on(out)
@@ -86,6 +94,12 @@ def run(composed: DictConfig) -> None:
         if multiprocessing.parent_process() is not None:
             os._exit(getattr(stop, "status", STOPPED))  # one job of several side by side: the sweep says the line
         _leave(stop, out)
+
+
+def _lost(why: str, out: Path) -> NoReturn:
+    """Without Ray: its libraries in this process are of no use any more, not even to end it."""
+    abandon_evaluators()
+    leaving.leave(f"{why}; {_what_is_kept(out)}", MISTAKE)
 
 
 def _what_is_kept(out: Path) -> str:

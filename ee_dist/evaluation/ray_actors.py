@@ -51,6 +51,8 @@ WORTH_A_CALL = 24
 too few for all workers."""
 LOOK_S = 1.0
 """How long to wait for results before looking whether Ray is still there."""
+LOST_S = 5.0
+"""How long what ended a worker may take to end itself: a raylet that was asked to ends its workers first."""
 PATIENCE, PATIENCE_S = 30.0, 120.0
 """A call that takes this many times what it should, and this long (s), hangs: its worker is killed, and it is done again."""
 NEWEST = 0.3
@@ -187,11 +189,11 @@ class RayEvaluator:
             cause = getattr(error, "cause", None)
             raise (cause if isinstance(cause, Exception) else EvaluatorError(_last_line(error))) from None
         except ActorDiedError as error:
-            if gone := lost():
+            if gone := lost(LOST_S):
                 raise RayLostError(f"Ray is lost: {gone}") from None
             raise EvaluatorError(f"a worker could not be started: {_last_line(error)}") from None
         except RayError as error:
-            raise RayLostError(f"Ray is lost: {lost() or _last_line(error)}") from None
+            raise RayLostError(f"Ray is lost: {lost(LOST_S) or _last_line(error)}") from None
 
     def process_ids(self) -> list[int]:
         """Processes of the actors, for tests that kill one."""

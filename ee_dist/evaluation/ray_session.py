@@ -12,11 +12,16 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+import psutil
+
+from ee_dist.evaluation.ray_watch import Watch
 
 
 class EvaluatorError(RuntimeError):
@@ -38,6 +43,10 @@ LOOK_S = 0.5
 _SOCKET_PATH = 40
 """Longest name of Ray's folder, characters: sockets lie in it, and the system takes 107 for the name of one."""
 _LEAVE_S = 10.0
+KNOCK_S = 2.0
+"""How often to look whether a cluster of others still answers."""
+_HEADS = ("gcs_server", "raylet")
+"""Without these processes of its own nothing of Ray goes on."""
 
 
 class _Guard:
@@ -71,16 +80,28 @@ class _Guard:
 
 
 _guard: _Guard | None = None
+_watch: Watch | None = None
 _address: str | None = None
+_farewell: list[Callable[[str], None]] = []
+_begun: dict[str, psutil.Process] = {}
+"""Ray's processes by name while it starts: what has it in its own books is not there yet."""
+
+
+def when_lost(farewell: Callable[[str], None]) -> None:
+    """What to call, from another thread, where Ray is lost and the main thread does not come back to hear of it."""
+    _farewell[:] = [farewell]
 
 
 def start_ray(address: str | None, workers: int) -> None:
     """Connect to the cluster at ``address``, or start Ray on this machine. Raises EvaluatorError."""
     import ray
+    from ray._private import ray_constants
 
     global _guard, _address
     if ray.is_initialized():
         return
+    # Ray's answer to SIGTERM is a dump of stacks; ours is a line.
+    ray_constants.RAY_DISABLE_FAILURE_SIGNAL_HANDLER = True
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.CRITICAL}
     if address:
         _knock(address)
@@ -103,6 +124,7 @@ def start_ray(address: str | None, workers: int) -> None:
         # Inherited by the workers that Ray has ready: with a runtime_env it would start others, and a second later.
         environment = {**ONE_THREAD, **_guard.environment}
     starter = _Starter(options)
+    _begun.clear()
     with _environment(environment):
         starter.start()
         while not starter.over.wait(LOOK_S):
@@ -117,6 +139,24 @@ def start_ray(address: str | None, workers: int) -> None:
             raise _unreachable(address, first)
         raise RayLostError(f"Ray did not start ({first}); evaluator=serial does without it")
     _address = address
+    _look_on(address)
+
+
+def _look_on(address: str | None) -> None:
+    global _watch
+
+    def find() -> str | None:
+        ray = sys.modules.get("ray")
+        return _gone() if ray is not None and ray.is_initialized() else None
+
+    def farewell(why: str) -> None:
+        for say in _farewell:
+            say(f"Ray is lost: {why}")
+
+    if _watch is not None:
+        _watch.stop()
+    _watch = Watch(find, lambda why: RayLostError(f"Ray is lost: {why}"), farewell, KNOCK_S if address else LOOK_S)
+    _watch.start()
 
 
 class _Starter(threading.Thread):
@@ -143,6 +183,7 @@ class _Starter(threading.Thread):
 
 def stop_ray() -> None:
     """Stop what ``start_ray`` started, or leave the cluster. Ray's own way at the end of a process begins with a nap."""
+    _stop_watch()
     ray = sys.modules.get("ray")
     if ray is not None and ray.is_initialized():
         ray.shutdown()
@@ -152,25 +193,60 @@ def stop_ray() -> None:
 def abandon_ray() -> None:
     """End the processes of a Ray that we started, without a word to them. Does nothing for a cluster of others."""
     global _guard
+    _stop_watch()
     if _guard is not None:
         _guard.release()
         _guard = None
 
 
-def lost() -> str | None:
-    """What of Ray is gone, if anything: a process that we started, or the cluster."""
+def _stop_watch() -> None:
+    global _watch
+    if _watch is not None:
+        _watch.stop()
+        _watch = None
+
+
+def lost(within_s: float = 0.0) -> str | None:
+    """What of Ray is gone, if anything: a process that we started, or the cluster. ``within_s``: how long to wait for it,
+    where something has failed already: what is on its way out is still there for a while."""
+    end = time.monotonic() + within_s
+    while (gone := _gone()) is None and time.monotonic() < end:
+        time.sleep(0.1)
+    if gone is not None and _watch is not None:
+        _watch.taken.set()
+    return gone
+
+
+def _gone() -> str | None:
     if _guard is not None:
         import ray
 
         node = getattr(ray._private.worker, "_global_node", None)
-        dead = node.dead_processes() if node is not None else []
-        return f"its process {dead[0][0]} has ended" if dead else None
+        dead = [name for name, _ in node.dead_processes()] if node is not None else _ended()
+        return f"its process {dead[0]} has ended" if dead else None
     if _address:
         try:
             _knock(_address)
         except EvaluatorError as error:
             return str(error)
     return None
+
+
+def _ended() -> list[str]:
+    """Names of Ray's processes that were there at an earlier look, while it starts, and have ended."""
+    with suppress(psutil.Error):
+        for child in psutil.Process().children():
+            with suppress(psutil.Error):
+                if child.name() in _HEADS:
+                    _begun.setdefault(child.name(), child)
+    return [name for name, process in _begun.items() if not _runs(process)]
+
+
+def _runs(process: psutil.Process) -> bool:
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.Error:
+        return False
 
 
 @contextmanager

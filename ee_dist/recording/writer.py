@@ -149,13 +149,16 @@ class RunWriter:
             _sync_folder(self.path.parent)
 
     def abandon(self) -> None:
-        """Close the ``.part`` with what was recorded and without marking it complete. Never raises."""
+        """Close the ``.part`` with what was recorded and without marking it complete; without any record, remove it.
+        Never raises."""
         if self._open:
             self._open = False
             with suppress(OSError, ValueError):
                 self._save()
             with suppress(OSError):
                 self._file.close()
+                if not self._channels:
+                    self.part.unlink()
 
     def __enter__(self) -> RunWriter:
         return self

@@ -46,6 +46,8 @@ BUILT_IN: dict[str, Callable[..., Robot]] = {
     "servo_pendulum": servo_pendulum,
     "linear_stage": linear_stage,
 }
+LONGEST_NAME = 1000
+"""Characters of the name of a file, with its folders; systems take some more."""
 READERS = {"urdf": "ee_dist.robots.urdf:read_urdf", "mjcf": "ee_dist.engines.mujoco.mjcf:read_mjcf"}
 """What reads a file of a kind, loaded when there is one to read: robots know no engine, but one engine knows its own files."""
 
@@ -122,7 +124,10 @@ def _of_file(kind: str, data: Mapping[str, Any], folder: Path, where: str) -> tu
     for key in data:
         if key not in (kind, *KEYS):
             raise RobotError(f"{where}: unknown key {quoted(key)}; {near(str(key), (kind, *KEYS))}")
-    return robot_of_body(read_body(kind, folder / str(data[kind])), data, where)
+    name = data[kind]
+    if not isinstance(name, str) or not name.isprintable() or not 0 < len(name) <= LONGEST_NAME:
+        raise RobotError(f"{where}: {kind}: expected the name of a file, not {quoted(name)}")
+    return robot_of_body(read_body(kind, folder / name), data, where)
 
 
 def robot_of(name: str, source: str | None = None, drives: str | None = None) -> tuple[Robot, tuple[str, ...]]:

@@ -52,8 +52,12 @@ def check_file(path: Path, largest: int) -> None:
 
 
 def yaml_of(path: Path, load: Callable[[str], Any] = load_yaml) -> Any:
-    """Plain data out of YAML. Raises UntrustedError, and OSError as ``open`` does."""
-    text = text_of(path)
+    """Plain data out of a file of YAML. Raises UntrustedError, and OSError as ``open`` does."""
+    return plain_of(text_of(path), load)
+
+
+def plain_of(text: str, load: Callable[[str], Any] = load_yaml) -> Any:
+    """Plain data out of YAML. Raises UntrustedError."""
     try:
         _check_depth(text)
         return bounded(load(text))

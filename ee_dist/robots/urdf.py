@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, folded
@@ -84,7 +85,7 @@ class _Reader:
             carried[j.child] = j
         roots = [name for name in links if name not in carried]
         if len(roots) != 1:
-            found = ", ".join(repr(r) for r in roots) or "none (the joints form a loop)"
+            found = listed(map(quoted, roots), "none (the joints form a loop)")
             raise self.fail("robot", f"expected one link that no joint carries, found {found}")
         order = self.order(roots[0], joints)
         if len(order) != len(links):
@@ -101,11 +102,11 @@ class _Reader:
         given = [n for n in given if n != kept_parts[0].name]
         if given:
             assumed.append(
-                f"helper links without mass get {HELPER_KG:g} kg and {HELPER_KG_M2:g} kg.m^2: {_list(given)}"
+                f"helper links without mass get {HELPER_KG:g} kg and {HELPER_KG_M2:g} kg.m^2: {listed(given)}"
             )
         if self.meshes:
             self.notes.insert(0, f"collision meshes of {len(self.meshes)} links left out: only boxes, spheres, cylinders "
-                                 f"and capsules touch the floor ({_list(list(self.meshes))})")  # fmt: skip
+                                 f"and capsules touch the floor ({listed(self.meshes)})")  # fmt: skip
         self.hint_at_pivots(kept_parts, kept_joints)
         moving = [j.name for j in kept_joints if j.kind != "fixed"]
         return Body(
@@ -179,7 +180,7 @@ class _Reader:
                 found.append(part.name)
         if found:
             self.notes.append(
-                f"{PIVOT_HINT}{_list(found)} looks as if it were about the joint; URDF means the centre of mass: "
+                f"{PIVOT_HINT}{listed(found)} looks as if it were about the joint; URDF means the centre of mass: "
                 "if it is, add 'inertia_about: joint' to the robot's description"
             )
 
@@ -245,9 +246,7 @@ class _Reader:
             found = e.find(tag)
             link = found.get("link", "") if found is not None else ""
             if link not in links:
-                raise self.fail(
-                    where, f"its {tag} link {quoted(link)} is not in the file; there are: {_list(list(links))}"
-                )
+                raise self.fail(where, f"its {tag} link {quoted(link)} is not in the file; there are: {listed(links)}")
             ends[tag] = link
         position, rotation = self.origin(e, where)
         mimic = e.find("mimic")
@@ -352,8 +351,3 @@ def turn_of_rpy(rpy: Vec3) -> Quat:
         cr * cp * sy - sr * sp * cy,
         cr * cp * cy + sr * sp * sy,
     )
-
-
-def _list(names: list[str]) -> str:
-    """A few names in one short line."""
-    return ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")

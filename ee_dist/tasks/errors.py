@@ -13,7 +13,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import EffectError, loaded_plugins
 from ee_dist.engines.contract import EngineError
 from ee_dist.engines.drivers import DriverError
-from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, abandon_ray
+from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, abandon_ray, when_lost
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError, known_settings, unknown_key
@@ -22,7 +22,7 @@ from ee_dist.trials.excitation import ExcitationError
 from ee_dist.trials.hardware import HardwareError
 from ee_dist.trials.log import LogError
 
-__all__ = ("USER_ERRORS", "RayLostError", "abandon_evaluators", "defect", "hydra_message", "unasked_end")
+__all__ = ("USER_ERRORS", "RayLostError", "abandon_evaluators", "defect", "hydra_message", "unasked_end", "when_lost")
 
 _LONGEST = 300
 """Characters of an error that nobody foresaw: some libraries put whole arrays into theirs."""

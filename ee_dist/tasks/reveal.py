@@ -74,10 +74,15 @@ def run(config: Config, options: Options, out: Path) -> None:
 
 def score(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -> Score:
     """What an explain or improve run says against the truth. Raises ConfigError for a summary of another verb."""
-    if summary.get("task") == "explain":
-        return _of_explanation(summary, hidden, robot)
-    if summary.get("task") == "improve":
-        return _of_model(summary, hidden, robot)
+    ways = {"explain": _of_explanation, "improve": _of_model}
+    task = str(summary.get("task"))
+    if task in ways:
+        try:
+            return ways[task](summary, hidden, robot)
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+            raise ConfigError(
+                f"task.explained: its summary is not as task={task} writes it; it was changed, or is of another version"
+            ) from None
     raise ConfigError(f"task.explained: a summary of task={summary.get('task')}; expected one of explain or improve")
 
 

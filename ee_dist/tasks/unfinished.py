@@ -22,9 +22,9 @@ from ee_dist.recording.reader import read_logs
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.model import Robot
-from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
+from ee_dist.robots.untrusted import UntrustedError, json_of, plain_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.folder import shown
+from ee_dist.tasks.folder import SETTINGS, held, shown
 from ee_dist.tasks.summary import config_digest, config_yaml
 from ee_dist.trials.hardware import Hardware
 from ee_dist.trials.log import SensorLog
@@ -58,14 +58,11 @@ class Unfinished:
         """Raises ConfigError where the run in the folder was started with other settings or versions."""
         try:
             found = json_of(text_of(self.folder / _RUN))
-            digest, settings, versions = (
-                str(found["digest"]),
-                yaml.safe_load(found["settings"]),
-                dict(found["versions"]),
-            )
+            digest, text, versions = str(found["digest"]), str(found["settings"]), dict(found["versions"])
+            settings = plain_of(text)
         except FileNotFoundError:
             return  # killed before it began
-        except (OSError, UntrustedError, KeyError, TypeError, ValueError, yaml.YAMLError) as error:
+        except (OSError, UntrustedError, KeyError, TypeError, ValueError) as error:
             raise ConfigError(f"resume={shown(self.folder.parent)}: its {FOLDER}/{_RUN} is damaged ({error})") from None
         for name, theirs in versions.items():
             if name in _PACKAGES and installed().get(name) != theirs:
@@ -178,7 +175,8 @@ def unfinished(out: Path, config: Config, options: Any, resume: bool) -> Iterato
             found.forget()
         raise
     finally:
-        if found.empty:
+        # What else lies there may be of this run (generations that the job before had in memory): then resume= starts it anew.
+        if found.empty and set(held(out)) <= {SETTINGS, FOLDER}:
             found.forget()
         found.close()
         _current = None

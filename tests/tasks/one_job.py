@@ -38,44 +38,59 @@ def composed(groups: tuple[str, ...]) -> DictConfig:
 
 def run(*arguments: str) -> tuple[int, str]:
     """Status, and what it said on the error stream."""
-    with _listening() as said:
+    with listening() as said:
         try:
             status = _run(quoted(list(arguments)))
         except SystemExit as stop:
             status = int(stop.code or 0)
         finally:
-            HydraConfig.instance().cfg = None
+            forget()
     return status, said.getvalue()
+
+
+def prepared(arguments: list[str]) -> DictConfig:
+    """What Hydra composes of a command line. Raises ConfigError and HydraException."""
+    check_flags(arguments)
+    overrides = OverridesParser.create().parse_overrides(arguments)
+    chosen = [o.input_line for o in overrides if o.key_or_group in GROUPS and not isinstance(o.value(), dict)]
+    settings = copy.deepcopy(composed(tuple(chosen)))
+    rest = [o for o in overrides if o.input_line not in chosen]
+    with open_dict(settings):
+        settings.hydra.overrides.task = [o.input_line for o in overrides if not o.key_or_group.startswith("hydra")]
+        settings.hydra.overrides.hydra = [o.input_line for o in overrides if o.key_or_group.startswith("hydra")]
+    OmegaConf.set_struct(settings, True)
+    ConfigLoaderImpl._apply_overrides_to_config(rest, settings)
+    with open_dict(settings):
+        settings.hydra.mode = RunMode.RUN
+        settings.hydra.runtime.output_dir = str(Path(str(settings.hydra.run.dir)).absolute())
+    return settings
+
+
+def without_hydra(settings: DictConfig) -> DictConfig:
+    """The settings as a job gets them."""
+    HydraConfig.instance().set_config(settings)
+    with open_dict(settings):
+        del settings["hydra"]
+    return settings
+
+
+def forget() -> None:
+    HydraConfig.instance().cfg = None
 
 
 def _run(arguments: list[str]) -> int:
     try:
-        check_flags(arguments)
-        overrides = OverridesParser.create().parse_overrides(arguments)
-        chosen = [o.input_line for o in overrides if o.key_or_group in GROUPS and not isinstance(o.value(), dict)]
-        settings = copy.deepcopy(composed(tuple(chosen)))
-        rest = [o for o in overrides if o.input_line not in chosen]
-        with open_dict(settings):
-            settings.hydra.overrides.task = [o.input_line for o in overrides if not o.key_or_group.startswith("hydra")]
-            settings.hydra.overrides.hydra = [o.input_line for o in overrides if o.key_or_group.startswith("hydra")]
-        OmegaConf.set_struct(settings, True)
-        ConfigLoaderImpl._apply_overrides_to_config(rest, settings)
-        with open_dict(settings):
-            settings.hydra.mode = RunMode.RUN
-            settings.hydra.runtime.output_dir = str(Path(str(settings.hydra.run.dir)).absolute())
+        settings = prepared(arguments)
     except ConfigError as error:
         return program._complain(str(error))
     except HydraException as error:
         return program._complain(hydra_message(error))
-    HydraConfig.instance().set_config(settings)
-    with open_dict(settings):
-        del settings["hydra"]
-    program.run(settings)
+    program.run(without_hydra(settings))
     return 0
 
 
 @contextlib.contextmanager
-def _listening() -> Iterator[io.StringIO]:
+def listening() -> Iterator[io.StringIO]:
     said = io.StringIO()
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
         yield said

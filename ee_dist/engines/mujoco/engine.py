@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import logging
 import os
 from collections import OrderedDict
 from collections.abc import Hashable, Sequence
-
-import mujoco
 
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.loop import in_batches, up_to
 from ee_dist.engines.mujoco.bodies import Group, MuJoCoBodies
 from ee_dist.engines.mujoco.model import Model, structure_key
+from ee_dist.engines.mujoco.warned import no_file_of_warnings
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.trials.log import SensorLog
-
-_log = logging.getLogger(__name__)
-"""MuJoCo's warnings, which it would else write to a file in the working folder. All tell of a robot whose log says so too."""
 
 MODELS = 256
 """Compiled structures kept for reuse (about 0.15 MB each), beyond which the longest unused are dropped."""
@@ -35,8 +30,7 @@ class MuJoCoEngine:
         self.threads = threads or os.cpu_count() or 1
         self.largest_batch = largest_batch
         self._models: OrderedDict[Hashable, Model] = OrderedDict()
-        if mujoco.get_mju_user_warning() is None:
-            mujoco.set_mju_user_warning(_log.debug)
+        no_file_of_warnings()
 
     def rollout(self, rollouts: Sequence[Rollout]) -> list[SensorLog]:
         return in_batches(rollouts, self._place, up_to(self.largest_batch))

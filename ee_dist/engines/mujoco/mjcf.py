@@ -17,6 +17,7 @@ import numpy as np
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
+from ee_dist.engines.mujoco.warned import no_file_of_warnings
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, entries, folded
 from ee_dist.robots.inertia import rotation_matrix
@@ -56,6 +57,7 @@ def read_mjcf(path: str | Path) -> Body:
 def compiled(path: str | Path) -> Any:
     """MuJoCo's model of the file without what only shows. Raises MjcfError."""
     file = Path(path)
+    no_file_of_warnings()
     try:
         _scan(file, file.parent, (), 1)
     except XmlError as error:

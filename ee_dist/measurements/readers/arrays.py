@@ -23,6 +23,10 @@ TRIAL = re.compile(
 """What groups are called that hold a trial each."""
 
 
+_SIGNS = (b"\x93NUMPY", b"\x80")
+"""How an array begins, and a pickle, which deserves a reason of its own."""
+
+
 def recorded(file: Path, name: str, arrays: Mapping[str, Any], notes: tuple[str, ...] = ()) -> Recorded:
     """A trial of arrays: those of one length are one table, numbers and texts its header.
 
@@ -86,7 +90,10 @@ def _shapes(arrays: Mapping[str, Any]) -> str:
 def read_npz(file: Path, options: Options) -> tuple[Recorded, ...]:
     """NumPy's .npz and .npy. Pickled objects are never loaded: they could run code. Raises MeasurementError."""
     try:
-        if zipfile.is_zipfile(file):
+        packed = zipfile.is_zipfile(file)
+        if not packed and not file.read_bytes()[:6].startswith(_SIGNS):
+            raise MeasurementError(f"{file}: not an archive of NumPy (.npz) nor an array (.npy); is it cut short?")
+        if packed:
             with zipfile.ZipFile(file) as archive:
                 bounded(file, sum(i.file_size for i in archive.infolist()))
         else:
@@ -107,9 +114,9 @@ def read_npz(file: Path, options: Options) -> tuple[Recorded, ...]:
         if not arrays and notes:
             raise MeasurementError(f"{file}: {notes[0]}; save arrays of numbers")
         return (recorded(file, "", arrays, tuple(notes)),)
-    except MeasurementError:
+    except (MeasurementError, MemoryError, FileNotFoundError, PermissionError):
         raise
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+    except Exception as error:  # Headers are parsed as Python, and archives as zip: both raise what they stumble upon.
         if "pickle" in str(error).lower() or "object" in str(error).lower():
             raise MeasurementError(
                 f"{file}: holds Python objects (a pickle), which are not loaded: they could run code; save arrays of numbers"

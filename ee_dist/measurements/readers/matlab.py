@@ -2,71 +2,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+import json
+import struct
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.readers.arrays import in_one_line, recorded
+from ee_dist.measurements.readers.arrays import recorded
 from ee_dist.measurements.readers.hdf5 import read_hdf5
-from ee_dist.measurements.readers.options import Options, bounded
+from ee_dist.measurements.readers.options import MOST_BYTES, Options, bounded
 from ee_dist.measurements.table import Recorded
+
+PATIENCE_S = 300.0
+"""For one file, loading SciPy included."""
+_LENGTH = struct.Struct("<Q")
+_APART = Path(__file__).with_name("matlab_apart.py")
+_reader: list[subprocess.Popen[bytes]] = []
+_one_at_a_time = threading.Lock()
 
 
 def read_mat(file: Path, options: Options) -> tuple[Recorded, ...]:
     """MATLAB's files to version 7 by SciPy, 7.3 by h5py. Structs are columns ``run.q``, arrays of structs trials.
 
-    Raises MeasurementError.
+    SciPy reads in a process of its own, which some damaged files end. Raises MeasurementError.
     """
-    from scipy import io  # slow to load, and needed only here
-
-    try:
-        sizes = [float(np.prod(shape, dtype=float)) for _, shape, _ in io.whosmat(str(file))]
-        bounded(file, 8 * sum(sizes))
-        content = io.loadmat(str(file), simplify_cells=True, verify_compressed_data_integrity=True)
-    except NotImplementedError:
+    file.open("rb").close()  # says what is wrong with the file itself
+    said, arrays = _asked(file)
+    if said.get("newer"):
         return read_hdf5(file, options)
-    except MeasurementError:
+    bounded(file, float(said.get("size", 0)))
+    if "error" in said:
+        what = " ".join(str(said["error"]).split())[:120]
+        raise MeasurementError(f"{file}: not a MATLAB file, or cut short: {what}")
+    found = []
+    for name, told in said["trials"]:
+        columns = {k: arrays[v[0]] if isinstance(v, list) else v for k, v in told.items()}
+        if not any(np.asarray(v).dtype.kind in "fiub" for v in columns.values()):
+            raise MeasurementError(
+                f"{file}: no arrays of numbers in it (timeseries, tables and objects are not read): "
+                "save arrays or structs of arrays"
+            )
+        found.append(recorded(file, name, columns))
+    return tuple(found)
+
+
+def _asked(file: Path) -> tuple[dict[str, Any], list[Any]]:
+    """What the other process found, and the arrays that it names by number. Raises MeasurementError where it died of it."""
+    with _one_at_a_time, _process() as process:
+        assert process.stdin is not None and process.stdout is not None
+        process.stdin.write(json.dumps(str(file.absolute())).encode() + b"\n")
+        process.stdin.flush()
+        impatience = threading.Timer(PATIENCE_S, process.kill)
+        impatience.start()
+        try:
+            head = process.stdout.read(_LENGTH.size)
+            length = _LENGTH.unpack(head)[0] if len(head) == _LENGTH.size else 0
+            body = process.stdout.read(length) if length < 4 * MOST_BYTES else b""
+        finally:
+            impatience.cancel()
+        if not length or len(body) < length:
+            raise MeasurementError(f"{file}: damaged: what reads MATLAB's files (SciPy) crashed on it; save it again")
+    with np.load(io.BytesIO(body), allow_pickle=False) as answer:
+        said = json.loads(answer["said"].tobytes())
+        return said, [answer[str(k)] for k in range(len(answer.files) - 1)]
+
+
+@contextmanager
+def _process() -> Iterator[subprocess.Popen[bytes]]:
+    """The one that reads; kept for the next file, unless it died or somebody interrupted it."""
+    if not _reader or _reader[0].poll() is not None:
+        command = [sys.executable, "-I", str(_APART), str(MOST_BYTES)]
+        pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
+        _reader[:] = [subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nowhere, start_new_session=True)]
+    process = _reader[0]
+    try:
+        yield process
+    except BaseException:
+        process.kill()
+        process.wait()
+        for stream in (process.stdin, process.stdout):
+            with suppress(OSError):
+                if stream is not None:
+                    stream.close()
+        _reader.clear()
         raise
-    except OSError as error:
-        if error.errno:
-            raise
-        raise MeasurementError(f"{file}: not a MATLAB file, or cut short: {in_one_line(error)}") from None
-    except Exception as error:  # The parser raises what it stumbles upon.
-        raise MeasurementError(f"{file}: not a MATLAB file, or cut short: {in_one_line(error)}") from None
-    flat: dict[str, Any] = {}
-    trials: dict[str, list[dict[str, Any]]] = {}
-    _flatten({k: v for k, v in content.items() if not k.startswith("__")}, "", flat, trials, 0)
-    if trials:
-        name, runs = max(trials.items(), key=lambda item: len(item[1]))
-        found = []
-        for k, run in enumerate(runs):
-            inner: dict[str, Any] = {}
-            _flatten(run, "", inner, {}, 0)
-            found.append(recorded(file, f"{name} {k + 1}", inner))
-        return tuple(found)
-    if not any(np.asarray(v).dtype.kind in "fiub" for v in flat.values()):
-        raise MeasurementError(
-            f"{file}: no arrays of numbers in it (timeseries, tables and objects are not read): save arrays or structs of arrays"
-        )
-    return (recorded(file, "", flat),)
-
-
-def _flatten(data: Mapping[str, Any], before: str, into: dict[str, Any], trials: dict[str, Any], depth: int) -> None:
-    for key, value in data.items():
-        name = f"{before}{key}"
-        if isinstance(value, Mapping) and depth < 6:
-            _flatten(value, f"{name}.", into, trials, depth + 1)
-        elif (
-            isinstance(value, (list, np.ndarray))
-            and len(np.shape(value)) == 1
-            and len(value)
-            and isinstance(value[0], Mapping)
-        ):
-            trials[name] = list(value)
-        elif isinstance(value, (str, int, float, bool)) or (
-            isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
-        ):
-            into[name] = value

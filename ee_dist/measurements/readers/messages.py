@@ -27,6 +27,10 @@ STAMP_APART_S = 10.0
 """A stamp this far from when the message was logged counts from something else (since boot, say): the log time is taken."""
 
 
+LATEST_NS = 2**62
+"""The year 2116: beyond it a time is no time, and sums of two do not fit into 64 bits."""
+
+
 def is_series(kind: str) -> bool:
     """Whether messages of a type can hold a robot's channels."""
     return not _NO_SERIES.search(kind)
@@ -50,7 +54,10 @@ class Gatherer:
         self.notes: list[str] = []
 
     def add(self, topic: str, log_ns: int, message: Any) -> None:
-        """A message: a mapping, or an object with annotated fields. Raises MeasurementError where memory would not do."""
+        """A message: a mapping, or an object with annotated fields. Raises MeasurementError where memory would not do, and for
+        a time that no clock has."""
+        if not 0 <= log_ns < LATEST_NS:
+            raise MeasurementError(f"{self.file}: {topic}: a message logged at {log_ns} ns; the file is damaged")
         for stamp_ns, flat, parts in _rows(message, log_ns):
             if not flat:
                 continue
@@ -159,6 +166,8 @@ def _nanoseconds(value: Any) -> int | None:
     whole = next((inner[k] for k in ("sec", "secs", "seconds") if k in inner), None)
     part = next((inner[k] for k in ("nanosec", "nsecs", "nsec", "nanos") if k in inner), None)
     if not isinstance(whole, (int, float)) or not isinstance(part, (int, float)):
+        return None
+    if not (abs(whole) < LATEST_NS / 1e9 and abs(part) < LATEST_NS):
         return None
     return int(whole) * 10**9 + int(part)
 

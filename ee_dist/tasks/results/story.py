@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from ee_dist.robots.untrusted import UntrustedError, yaml_of
+from ee_dist.robots.untrusted import yaml_of
 
 REPORT = "report.html"
 MOST = 100
@@ -41,5 +41,5 @@ def _asked(folder: Path) -> tuple[str, list[Path]]:
         where, measured = Path(hydra["hydra"]["runtime"]["cwd"]), asked["measured"] or []
         several = [measured] if isinstance(measured, str) else measured
         return str(asked["task"]["name"]), [(where / str(m)).resolve() for m in several]
-    except (OSError, UntrustedError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError):
         return "", []

@@ -1,0 +1,208 @@
+"""Feed damaged files to every reader for as long as told, within bounds of time and memory, and keep each that fails.
+
+    python tools/fuzz.py --minutes 2 --seed 0 --table fuzz.md
+
+Each reader runs in a process of its own, which is started again after a crash. A failure is an error that is none of ours, one
+that is not one line, a crash, a hang, or more than the bound of seconds or of memory for one file. The samples and the damage
+are those of ``tests/fuzz``; a file that failed goes into ``tests/fuzz/found/READER``, where it is a test. Minutes are of the
+processor, so that it does not matter what else the machine does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import multiprocessing
+import os
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from random import Random
+
+FUZZ = Path(__file__).parents[1] / "tests" / "fuzz"
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(FUZZ))
+
+from damage import FOREIGN, damaged  # noqa: E402
+from samples import OURS, SAMPLES, Sample, place  # noqa: E402
+from samples import sample as sample_of  # noqa: E402
+
+SECONDS = 10.0
+"""Of the processor, for one file; all samples are smaller than 200 kB."""
+STUCK_S = 300.0
+"""Without any progress, of real time."""
+MEGABYTES = 300.0
+"""Of memory, above what the process had before it read the file."""
+SETTLED = 20
+"""Files before memory is looked at: libraries are loaded when they are first needed."""
+MOST = 20
+"""Failures of one reader, after which there is enough to mend."""
+TELL_EVERY = 50
+
+
+@dataclass
+class Figures:
+    """Of one reader. ``read`` and ``refused`` count calls: some samples have several readers."""
+
+    files: int = 0
+    cpu_s: float = 0.0
+    read: int = 0
+    refused: int = 0
+    longest_s: float = 0.0
+    most_mb: float = 0.0
+    failures: dict[str, str] = field(default_factory=dict)
+
+    def row(self, name: str) -> str:
+        return (
+            f"| {name} | {self.files} | {self.cpu_s / 60:.1f} | {self.read} | {self.refused} | {self.longest_s:.2f} "
+            f"| {self.most_mb:.0f} | {len(self.failures)} |"
+        )
+
+
+class Labour:
+    """One process that reads: what it reads now is in ``now``, its figures are in ``told``, before anything can go wrong."""
+
+    def __init__(self, name: str, seed: int, cpu_s: float, folder: Path, figures: Figures) -> None:
+        self.name, self.seed, self.cpu_s, self.folder, self.figures = name, seed, cpu_s, folder, figures
+
+    def run(self) -> None:
+        warnings.simplefilter("ignore")
+        sample = sample_of(self.name)
+        others = tuple(next(iter(sample_of(n).files.values())) for n in ("URDF", "NumPy", "JSON", "CSV"))
+        silent = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(silent, 1)
+        os.dup2(silent, 2)
+        (self.folder / "files").mkdir()
+        path = place(sample, self.folder / "files")
+        for read in sample.readers:  # loads what they need
+            with contextlib.suppress(sample.allowed):
+                read(path)
+        signal.signal(signal.SIGPROF, _late)
+        start, begun, first, base = time.process_time(), self.figures.cpu_s, self.figures.files, peak_mb()
+        while self.figures.cpu_s < self.cpu_s and len(self.figures.failures) < MOST:
+            rng = Random(f"{self.seed} {self.name} {self.figures.files}")
+            target = rng.choice(sample.targets())
+            content = rng.choice(FOREIGN) if rng.random() < 0.02 else damaged(rng, sample.files[target], others)
+            (self.folder / "now").write_bytes(json.dumps([self.figures.files, target]).encode() + b"\n" + content)
+            (self.folder / "files" / target).write_bytes(content)
+            trouble, seconds = self.read(sample, path)
+            mb = peak_mb()
+            if self.figures.files < first + SETTLED:
+                base = mb
+            elif mb - base > MEGABYTES and not trouble:
+                trouble = f"memory: {mb - base:.0f} MB"
+            (self.folder / "files" / target).write_bytes(sample.files[target])
+            self.figures.most_mb = max(self.figures.most_mb, mb - base)
+            self.figures.longest_s = max(self.figures.longest_s, seconds)
+            self.figures.files += 1
+            self.figures.cpu_s = begun + time.process_time() - start
+            if trouble and (key := _said(trouble)) not in self.figures.failures:
+                self.figures.failures[key] = trouble
+                keep(self.name, self.figures.files - 1, target, content)
+            if trouble or self.figures.files % TELL_EVERY == 0:
+                self.tell()
+        self.tell()
+
+    def read(self, sample: Sample, path: Path) -> tuple[str, float]:
+        """What went wrong, if anything, and the seconds that it took."""
+        trouble, began = "", time.process_time()
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        for read in sample.readers:
+            try:
+                read(path)
+                self.figures.read += 1
+            except sample.allowed as error:
+                self.figures.refused += 1
+                if isinstance(error, OURS) and ("\n" in str(error) or len(str(error)) > 2000):
+                    trouble = f"not one line: {str(error)[:300]!r}"
+            except BaseException as error:
+                trouble = "".join(traceback.format_exception(error)[-8:])[-2500:]
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        return trouble, time.process_time() - began
+
+    def tell(self) -> None:
+        part = self.folder / "told.part"
+        part.write_text(json.dumps(asdict(self.figures)))
+        part.replace(self.folder / "told")
+
+
+def peak_mb() -> float:
+    """The most that this process had since the last call, MB."""
+    status = Path("/proc/self/status").read_text()
+    Path("/proc/self/clear_refs").write_text("5")
+    return float(status.split("VmHWM:")[1].split()[0]) / 1024
+
+
+def _late(*_: object) -> None:
+    raise TimeoutError(f"more than {SECONDS:g} s")
+
+
+def _said(trouble: str) -> str:
+    """The same failure in the same words: its last line and where it was raised."""
+    lines = [line.strip() for line in trouble.splitlines() if line.strip()]
+    places = [line for line in lines if line.startswith("File ")]
+    return lines[-1][:60] + (f" {places[-1][-70:]}" if places else "")
+
+
+def keep(name: str, number: int, target: str, content: bytes) -> None:
+    folder = FUZZ / "found" / name.replace(" ", "_").replace(",", "")
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{number}__{target.replace('/', '+')}").write_bytes(content)
+
+
+def fuzz(name: str, seed: int, minutes: float) -> Figures:
+    """One reader for so long, its process started again where it crashed or hung."""
+    figures = Figures()
+    while figures.cpu_s < 60 * minutes and len(figures.failures) < MOST:
+        with tempfile.TemporaryDirectory() as place:
+            folder, now = Path(place), Path(place) / "now"
+            labour = Labour(name, seed, 60 * minutes, folder, figures)
+            process = multiprocessing.get_context("fork").Process(target=labour.run)
+            process.start()
+            seen, since = -1, time.monotonic()
+            while process.is_alive():
+                process.join(1.0)
+                stamp = now.stat().st_mtime_ns if now.exists() else -1
+                if stamp != seen:
+                    seen, since = stamp, time.monotonic()
+                elif time.monotonic() - since > STUCK_S:
+                    process.kill()
+            if (folder / "told").exists():
+                figures = Figures(**json.loads((folder / "told").read_text()))
+            if process.exitcode:
+                if not now.exists():
+                    sys.exit(f"{name}: its sample could not be made")
+                head, _, content = now.read_bytes().partition(b"\n")
+                figures.files, target = json.loads(head)
+                figures.failures[f"ended with status {process.exitcode} at {figures.files}"] = ""
+                keep(name, figures.files, target, content)
+                figures.files += 1
+    return figures
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--minutes", type=float, default=1.0, help="of the processor, for each reader")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", nargs="*", default=[], choices=[*SAMPLES, []], help="names of readers")
+    parser.add_argument("--table", type=Path, help="append the figures there, as Markdown")
+    given = parser.parse_args()
+    bad = 0
+    for name in given.only or SAMPLES:
+        figures = fuzz(name, given.seed, given.minutes)
+        print(figures.row(name), *(f"  {k}\n{v}" for k, v in figures.failures.items()), sep="\n", flush=True)
+        if given.table:
+            with given.table.open("a", encoding="utf-8") as file:
+                file.write(figures.row(name) + "\n")
+        bad += len(figures.failures)
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
