@@ -70,6 +70,7 @@ class _Import:
         supply = None
         if self.mapping.supply is not None:
             supply = self._column(self.mapping.supply, "V", "supply", step_like=True)
+        external = self._external()
         self._released(commands)
         self._look(commands)
         joints = None
@@ -85,6 +86,7 @@ class _Import:
             joints=joints,
             torques=torques,
             supply_v=supply,
+            external=external,
         )
         record = TrialRecord(self.index, self.report.trial, HARDWARE, Commands(commands.copy()), log, self._settings())
         return record, self.report
@@ -226,6 +228,20 @@ class _Import:
             return None
         return np.stack(
             [self._column(columns[m], units[m], f"{what} of {m}", True) for m in self.robot.motor_names], axis=1
+        )
+
+    def _external(self) -> Array | None:
+        """Known torques on the joints that are not the drives', (T, M); none where the mapping names no column."""
+        columns = self.mapping.external
+        if not columns:
+            return None
+        units, rest = torque_units(self.robot), np.zeros(len(self.at_s))
+        return np.stack(
+            [
+                self._column(columns[m], units[m], f"external torque on {m}", False) if m in columns else rest
+                for m in self.robot.motor_names
+            ],
+            axis=1,
         )
 
     def _released(self, commands: Array) -> None:

@@ -103,6 +103,7 @@ class Mapping:
     sensors: Dictionary[str, Column | Estimated]
     commands: Dictionary[str, Column]
     torques: Dictionary[str, Column] = field(default_factory=dict)
+    external: Dictionary[str, Column] = field(default_factory=dict)
     supply: Column | None = None
     enabled: Column | None = None
     settings: tuple[Setting, ...] = ()
@@ -121,14 +122,14 @@ class Mapping:
         """(group, name, column) of every channel that is a column."""
         groups: tuple[tuple[str, Dictionary[str, Any]], ...] = (
             ("sensors", self.sensors), ("commands", self.commands), ("torques", self.torques),
-            ("supply", {"": self.supply}), ("enabled", {"": self.enabled}),
+            ("external", self.external), ("supply", {"": self.supply}), ("enabled", {"": self.enabled}),
         )  # fmt: skip
         return [(group, name, c) for group, columns in groups for name, c in columns.items() if isinstance(c, Column)]
 
 
 _KEYS = (
     "robot", "format", "records", "separator", "header", "decimal", "tables", "split", "time", "rate_hz", "sensors",
-    "commands", "torques", "supply", "enabled", "settings", "trial",
+    "commands", "torques", "external", "supply", "enabled", "settings", "trial",
 )  # fmt: skip
 
 
@@ -167,7 +168,7 @@ def mapping_of(data: Any, file: Path) -> Mapping:
             k: _column(v, f"{where}: {group}: {k}")
             for k, v in _table(data.get(group) or {}, f"{where}: {group}").items()
         }
-        for group in ("commands", "torques")
+        for group in ("commands", "torques", "external")
     }
     mapping = Mapping(
         source=file,
@@ -176,6 +177,7 @@ def mapping_of(data: Any, file: Path) -> Mapping:
         sensors=sensors,
         commands=groups["commands"],
         torques=groups["torques"],
+        external=groups["external"],
         supply=single.get("supply"),
         enabled=single.get("enabled"),
         settings=_settings(data.get("settings"), where),

@@ -200,7 +200,8 @@ def digest_of(records: list[TrialRecord]) -> str:
     total = hashlib.sha256()
     for r in records:
         total.update(repr((r.index, r.name, r.believed, r.log.sensor_names, r.log.motor_names)).encode())
-        for values in (r.log.times_s, r.log.sensors, r.log.commands, r.log.joints, r.log.torques, r.log.supply_v):
+        log = r.log
+        for values in (log.times_s, log.sensors, log.commands, log.joints, log.torques, log.supply_v, log.external):
             if values is not None:
                 total.update(np.ascontiguousarray(values).tobytes())
     return total.hexdigest()

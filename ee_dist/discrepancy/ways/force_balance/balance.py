@@ -71,6 +71,8 @@ def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]
         np.ascontiguousarray(a[:, joints]) for a in (motion.position, motion.speed, motion.acceleration, motion.torque)
     )
     needed = needed[:, joints] + np.array([d.rotor_inertia for d in drives]) * qdd
+    if motion.external is not None:
+        needed = needed - motion.external[:, joints]
     p, uses = _fields(drives)
     active = given * p["strength"]
     torque = active - p["spring"] * (q - p["spring_rest"]) + p["offset_torque"]
