@@ -117,6 +117,9 @@ class Drive:
     """If positive, active torque scales with (measured supply) / (this)."""
     command: str = "position"
     """One of COMMANDS."""
+    command_speed: float = float("inf")
+    """Velocity limit of the controller, rad/s: how fast it lets a commanded position move, or how large a commanded speed it
+    obeys. It has nothing to do with ``speed_limit``, which is the motor's."""
     # -- what may be wrong or missing (neutral values); for a slide read m for rad and N for N.m --
     strength: float = 1.0
     command_gain: float = 1.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -172,6 +173,7 @@ def test_broken_xml_names_the_line(tmp_path: Path) -> None:
         ),
         ("urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: smell}]", "no sensor kind 'smell'"),
         ("urdf: ARM\nfree_bas: true", "unknown key 'free_bas'; did you mean free_base"),
+        ("urdf: ARM\nvelocity_limits: yes", "velocity_limits: expected 'scale' .*'obeyed' .*, not True"),
         ("urdf: ARM\ninertia_about: hinge", "inertia_about: expected 'centre' .*'joint', not 'hinge'"),
         ("urdf: ARM\ninertia_about: joint", "has more inertia about the joint than the .* they are about its centre"),
         ("urdf: ARM\ntime_step_s: 2", "seconds, not milliseconds"),
@@ -327,3 +329,17 @@ def test_a_drive_without_a_speed_limit_has_the_speed_of_its_joint_as_scale() -> 
     assert math.isinf(robot.drives[0].speed_limit)
     assert channel_range(robot, velocity) == 2 * robot.joint("shoulder").top_speed
     assert math.isfinite(channel_range(robot.with_joint("shoulder", top_speed=math.inf), velocity))
+
+
+def test_controllers_may_keep_to_the_velocity_limits_of_the_file() -> None:
+    body = read_urdf(ARM)
+    drives = {"shoulder": {"kp": 20}, "elbow": {"kp": 10, "command_speed": 0.5}}
+    scaled, obeyed = (
+        robot_of_body(body, {"drives": drives, "velocity_limits": how}, "arm.yaml")[0] for how in ("scale", "obeyed")
+    )
+    tops = [obeyed.joint(d.joint).top_speed for d in obeyed.drives]
+    assert [d.command_speed for d in scaled.drives] == [math.inf, 0.5]
+    assert [d.command_speed for d in obeyed.drives] == [tops[0], 0.5]
+    bare = replace(body, joints=tuple(replace(j, top_speed=math.inf) for j in body.joints))
+    with pytest.raises(RobotError, match="velocity_limits: obeyed: the file states none"):
+        robot_of_body(bare, {"drives": drives, "velocity_limits": "obeyed"}, "arm.yaml")
