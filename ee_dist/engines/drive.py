@@ -230,6 +230,8 @@ class DrivePath:
             self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, sloped,
             self.integral, self.last_active, self.current, active, stiffness, damping,
         )  # fmt: skip
+        if self.uses["current_gain"]:
+            self.current = self.current / self.p["current_gain"]
         return active, stiffness, damping
 
 

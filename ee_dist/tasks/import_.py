@@ -21,7 +21,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping, read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
-from ee_dist.measurements.proposal.model import UNITS_TO_ASK, Hints, Proposal
+from ee_dist.measurements.proposal.model import FIT, UNITS_TO_ASK, Hints, Proposal
 from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.measurements.readers import FORMATS, kind_of
 from ee_dist.measurements.report import Report, describe
@@ -102,12 +102,16 @@ def run(config: Config, options: Options, out: Path) -> None:
 def hints_of(options: Options) -> Hints:
     """What the user said beside the file. Raises ConfigError."""
     joints = None if options.joints is None else [str(j) for j in _listed(options.joints)]
-    gains: list[float] | None = None
-    if options.gains is not None:
+    gains: list[float] | str | None = None
+    if options.gains == FIT:
+        gains = FIT
+    elif options.gains is not None:
         gains = []
         for g in _listed(options.gains):
             if isinstance(g, bool) or not isinstance(g, (int, float)) or not math.isfinite(g) or g == 0:
-                raise ConfigError(f"task.gains: expected numbers in N.m per A, none of them 0, not {quoted(g)}")
+                raise ConfigError(
+                    f"task.gains: expected numbers in N.m per A, none of them 0, or '{FIT}', not {quoted(g)}"
+                )
             gains.append(float(g))
     if options.unit is not None:
         one_of("task.unit", options.unit, UNITS_TO_ASK)
