@@ -144,11 +144,29 @@ def test_a_wrong_urdf_is_one_clear_line(tmp_path: Path, edits: dict[str, object]
     assert "arm.urdf" in str(caught.value)
 
 
-def test_a_xacro_says_how_it_becomes_a_urdf(tmp_path: Path) -> None:
+def test_a_xacro_says_how_it_becomes_a_urdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
     file = tmp_path / "arm.urdf.xacro"
     file.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:macro name="m"/></robot>')
-    with pytest.raises(UrdfError, match=r"is a xacro, .*run 'xacro arm.urdf.xacro > robot.urdf'"):
+    with pytest.raises(UrdfError, match=r"is a xacro, .*install xacro, or run 'xacro arm.urdf.xacro > robot.urdf'"):
         load_robot(file)
+
+
+def test_a_xacro_is_expanded_by_the_program_that_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stand-in for ROS's program, which is not: it prints what the file names, or fails as xacro does."""
+    program = tmp_path / "bin" / "xacro"
+    program.parent.mkdir()
+    program.write_text(
+        f"#!/bin/sh\nif grep -q broken $1; then echo 'trace'; echo 'No such macro: arm' >&2; exit 2; fi\ncat {ARM}\n"
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}:/usr/bin:/bin")
+    file = tmp_path / "arm.urdf.xacro"
+    file.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:arm name="m"/></robot>')
+    assert [p.name for p in read_urdf(file).parts] == [p.name for p in read_urdf(ARM).parts]
+    file.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="broken"/>')
+    with pytest.raises(UrdfError, match=r"arm.urdf.xacro: xacro failed: No such macro: arm$"):
+        read_urdf(file)
 
 
 def test_broken_xml_names_the_line(tmp_path: Path) -> None:
