@@ -31,12 +31,10 @@ WORTH = 0.1
 """Share of the squared error above the noise floor that an effect must take off where more than noise is left with it.
 Where a model is wrong in ways that no effect describes (another simulator, resampled records), some effect always takes a
 little of it, surely and wrongly."""
-HALF = 0.5
-"""Share of what an effect explains that one with fewer loose ends must explain to be named instead of it."""
 LUCK = "its gain on held-out data is no more than luck"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes less than a tenth of what is above the noise"
-VAGUE = "none of its numbers is told from neutral, and one that is explains at least half as much"
+VAGUE = "none of its numbers is told from neutral; a plainer effect explains as much for each of its own"
 
 
 @dataclass(eq=False)
@@ -178,7 +176,7 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
     """Best held-out energy first, those that earned their place before the others; ties are named, and of those that are
     tied with the best the one with the fewest numbers goes first: a richer law can always mimic a simpler one."""
     for j in found:
-        if j.vague and j.earned and any(_plain(k) and k.explained >= HALF * j.explained for k in found):
+        if j.vague and j.earned and any(_plainer(k, j) for k in found):
             j.why_not = VAGUE
     ordered = sorted(found, key=lambda j: (not j.earned, float(j.held.sum())))
     for k, j in enumerate(ordered):
@@ -200,8 +198,9 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
     return ordered
 
 
-def _plain(j: Judged) -> bool:
-    return j.earned and not j.vague
+def _plainer(one: Judged, vague: Judged) -> bool:
+    """Whether an effect whose numbers are told explains as much for each of them as a vague one does for each of its own."""
+    return one.earned and not one.vague and one.explained * vague.proposal.size >= vague.explained * one.proposal.size
 
 
 def tied(one: Judged, other: Judged) -> bool:
