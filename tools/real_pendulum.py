@@ -20,7 +20,6 @@ from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
@@ -66,7 +65,7 @@ def _table(name: str, problem: Problem, page: Page) -> None:
             rows.append((law, as_it_is, as_it_is, "-"))
             continue
         fit = fit_one(search, Model(parts), [np.full(len(parts), START)])
-        held = cross_fit(search, [(fit.model, fit.u)], cut, WIDTHS[1:])[0]
+        held = cross_fit(search, [(fit.model, fit.u)], cut)[0]
         numbers = "; ".join(
             f"{p.value:.3g} ({p.low:.3g} to {p.high:.3g}{', ' + p.flag if p.flag else ''})"
             for p in parameters(problem, fit)
