@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy  # which loads its parts when they are used: signals take a second
@@ -65,13 +66,22 @@ def start_of(log: SensorLog, robot: Robot) -> State | None:
 def speeds_of(log: SensorLog, robot: Robot) -> Array:
     """Measured speeds (T, M); differences of the positions where a joint has no sensor for it. Of a sensor that is known to
     be noisy, a smooth course: a start that is off by the noise of one row goes on for seconds."""
+    place = {motor: k for k, motor in enumerate(robot.motor_names)}
+    read = tuple(
+        (place[s.target], c, bool(s.noise))
+        for c, s in enumerate(robot.sensors)
+        if s.kind == "velocity" and s.target in place
+    )
+    return _speeds(log, read)
+
+
+@lru_cache(maxsize=32)
+def _speeds(log: SensorLog, read: tuple[tuple[int, int, bool], ...]) -> Array:
+    """``read``: (joint, channel, whether it is noisy) of each sensor of a speed. Kept: a search asks for it with every model."""
     assert log.joints is not None
     out = np.gradient(log.joints, float(np.median(np.diff(log.times_s))), axis=0)
-    for k, motor in enumerate(robot.motor_names):
-        for c, sensor in enumerate(robot.sensors):
-            if sensor.kind == "velocity" and sensor.target == motor:
-                seen = log.sensors[:, c]
-                out[:, k] = (
-                    scipy.signal.savgol_filter(seen, SMOOTHED, 2) if sensor.noise and len(seen) > SMOOTHED else seen
-                )
+    for k, c, noisy in read:
+        seen = log.sensors[:, c]
+        out[:, k] = scipy.signal.savgol_filter(seen, SMOOTHED, 2) if noisy and len(seen) > SMOOTHED else seen
+    out.setflags(write=False)
     return out

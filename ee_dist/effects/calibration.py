@@ -13,7 +13,15 @@ from dataclasses import replace
 from ee_dist.effects import scales
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range
-from ee_dist.effects.targets import damped_drives, is_arm, motors, motors_with_speed_limit, position_drives, powered
+from ee_dist.effects.targets import (
+    bolted_motors,
+    damped_drives,
+    is_arm,
+    motors,
+    motors_with_speed_limit,
+    position_drives,
+    powered,
+)
 from ee_dist.robots.model import Drive, Quat, Robot
 
 STABLE = 1.8
@@ -44,6 +52,24 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
         )
 
     return robot.map_drive(target, stronger)
+
+
+@effect(
+    "current_gain",
+    family="drive",
+    targets=bolted_motors,
+    parameters=(
+        Parameter("factor", "1", 0.01, 100.0, 1.0, "torque of the motor over what is read off its current", 0.01),
+    ),
+    ranges=scales.always(factor=(0.2, 5.0)),
+    physics="The torque that a motor makes of each ampere is another than the gain with which its current was read: the motor "
+    "moves as it did, and the torques that were logged are off by one factor.",
+    signature="Measured torque in proportion to what the motion and friction need, by another factor than 1. Masses and friction "
+    "off by that factor look the same: only masses that are known fix it.",
+    searchable=False,
+)
+def current_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    return robot.map_drive(target, lambda d: replace(d, current_gain=d.current_gain * values["factor"]))
 
 
 def _slopes(robot: Robot, target: str) -> dict[str, Range]:
@@ -147,6 +173,7 @@ def gear_ratio(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
             rotor_inertia=d.rotor_inertia * n * n,
             torque_limit=d.torque_limit * n,
             speed_limit=d.speed_limit / n,
+            command_speed=d.command_speed / n if d.command == "position" else d.command_speed,
             command_gain=d.command_gain * n if d.command == "torque" else d.command_gain / n,
             zero_offset=d.zero_offset / n,
             deadband=d.deadband / n,

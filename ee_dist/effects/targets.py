@@ -27,6 +27,11 @@ def powered(robot: Robot) -> tuple[str, ...]:
     return tuple(d.joint for d in robot.drives if d.command != "none")
 
 
+def bolted_motors(robot: Robot) -> tuple[str, ...]:
+    """Joints that a motor moves, of a robot whose forces can be balanced."""
+    return () if robot.free_base else powered(robot)
+
+
 def position_drives(robot: Robot) -> tuple[str, ...]:
     """Joints under a position controller."""
     return tuple(d.joint for d in robot.drives if d.command == "position")

@@ -1,6 +1,6 @@
 """The drive path: from command to joint torque, for a whole batch at once and the same for every engine.
 
-    command -> delay -> gain -> controller (of position, with deadband and zero offset, of speed, or none)
+    command -> delay -> gain -> velocity limit -> controller (of position, with deadband and zero offset, of speed, or none)
             -> motor (torque limit, back-EMF, strength, supply)
             -> transmission (backlash, compliance) -> joint (spring, offset, a user's own laws, friction, brake, stops)
 
@@ -62,6 +62,8 @@ class DrivePath:
         self.motor = np.stack([derived[n] if n in derived else p[n] for n in MOTOR])
         self.shape, self.one = shape, np.ones(shape)
         self.integral = np.zeros(shape)
+        self.goal: Array | None = None
+        """Where a controller with a velocity limit has let its commands (B, M) go so far."""
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
         limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
@@ -148,6 +150,8 @@ class DrivePath:
         open: no torque and no back-EMF; what sits on the joint (friction, spring, stops) stays.
         """
         wanted = self._command(command)
+        if self.uses["command_speed"]:
+            wanted = self._limited(wanted, q, enabled)
         position, speed = (q, qd) if self.transmission is None else self.transmission.motor_side(q, qd)
         active, stiffness, damping = self._motor(wanted, position, speed, supply_v, enabled)
         if self.transmission is not None:
@@ -191,6 +195,18 @@ class DrivePath:
             command = command * self.p["command_gain"]
         return command
 
+    def _limited(self, wanted: Array, q: Array, enabled: Array | None) -> Array:
+        """Commands under the velocity limits of their controllers. A goal sets out from where the joint stands, and stays with
+        it while the drive is released."""
+        top, led = self.p["command_speed"], self.kind == POSITION
+        goal = q if self.goal is None else self.goal
+        if enabled is not None:
+            goal = np.where(enabled > 0, goal, q)
+        self.goal = np.where(
+            led, np.clip(wanted, goal - top * self.dt, goal + top * self.dt), np.clip(wanted, -top, top)
+        )
+        return np.where(np.isfinite(top) & (self.kind <= SPEED), self.goal, wanted)
+
     def _motor(
         self, wanted: Array, position: Array, speed: Array, supply_v: Array | None, enabled: Array | None
     ) -> tuple[Array, Array, Array]:
@@ -214,6 +230,8 @@ class DrivePath:
             self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, sloped,
             self.integral, self.last_active, self.current, active, stiffness, damping,
         )  # fmt: skip
+        if self.uses["current_gain"]:
+            self.current = self.current / self.p["current_gain"]
         return active, stiffness, damping
 
 

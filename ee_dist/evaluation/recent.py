@@ -57,5 +57,5 @@ class RecentEvaluator:
 
 def size_of(log: SensorLog) -> int:
     """Bytes of a log's arrays."""
-    arrays = (log.times_s, log.sensors, log.commands, log.base_pose, log.joints, log.torques, log.supply_v)
-    return sum(a.nbytes for a in arrays if a is not None)
+    parts = (log.times_s, log.sensors, log.commands, log.base_pose, log.joints, log.torques, log.supply_v, log.external)
+    return sum(a.nbytes for a in parts if a is not None)

@@ -20,12 +20,14 @@ FORMATS = ("mjcf", "urdf", "yaml", "python")
 NATIVE, SHIM, NOT = "native", "shim", "not expressible"
 ACTUATOR = frozenset({"kp", "kd", "torque_limit", "speed_limit", "strength", "command_gain", "zero_offset", "back_emf"})
 """Of a drive, what an actuator of MuJoCo has: gains, limits, a damping, a bias."""
+READING = frozenset({"current_gain"})
+"""Of a drive, what no motion depends on."""
 JOINT = frozenset({"rotor_inertia", "viscous", "coulomb", "brake", "spring", "spring_rest", "offset_torque"})
 NATIVE_DRIVE: Mapping[str, frozenset[str]] = {
-    "mjcf": ACTUATOR | JOINT,
-    "urdf": frozenset(),
+    "mjcf": ACTUATOR | JOINT | READING,
+    "urdf": READING,
     "yaml": frozenset(DRIVE_NUMBERS),
-    "python": frozenset(),
+    "python": READING,
 }
 BODY = frozenset({"parts", "joints", "lost"})
 NATIVE_ROBOT: Mapping[str, frozenset[str]] = {

@@ -67,6 +67,7 @@ class Shim:
         self.last_speed: Any = None
         self.last_torque = zero.copy()
         self.motor_at: Any = None
+        self.goal: Any = None
         self.side, self.carried, self.motor_speed = zero.copy(), zero.copy(), zero.copy()
         self.delay = Delay(d["delay_s"], self.dt) if d["delay_s"].any() else None
         self.late = Delay(self.s["delay_s"], self.dt) if self.s["delay_s"].any() else None
@@ -85,7 +86,7 @@ class Shim:
         wanted = np.asarray(command, dtype=float)[self.source]
         if self.delay is not None:
             wanted = self.delay(wanted)
-        wanted = wanted * d["command_gain"]
+        wanted = self._limited(wanted * d["command_gain"], q, enabled)
         elastic = (d["backlash"] > 0) | (d["compliance"] > 0)
         at, turning = self._motor_side(q, qd, elastic)
         active, stiffness, damping = self._motor(wanted, at, turning, supply_v, enabled)
@@ -96,6 +97,15 @@ class Shim:
         torque = self._stops(torque, q, qd)
         self.last_speed, self.last_torque = qd.copy(), torque.copy()
         return torque + self.native * qd
+
+    def _limited(self, wanted: Array, q: Array, enabled: float) -> Array:
+        """What the velocity limits of the controllers let through: goals set out from where the joints stand."""
+        top, by_position = self.d["command_speed"], self.kinds == "position"
+        goal = self.goal if self.goal is not None and enabled > 0 else q
+        step = top * self.dt
+        self.goal = np.where(by_position, np.clip(wanted, goal - step, goal + step), np.clip(wanted, -top, top))
+        limited = np.isfinite(top) & (by_position | (self.kinds == "speed"))
+        return np.where(limited, self.goal, wanted)
 
     def _motor(self, wanted: Array, at: Array, turning: Array, supply_v: float | None, enabled: float) -> Any:
         d = self.d

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,7 +16,7 @@ from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.clocks import Clocked, check_grid
 from ee_dist.measurements.errors import MeasurementError, nearest
-from ee_dist.measurements.mapping import Column, Estimated, Mapping
+from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, grid, held, linear, smoothed
@@ -50,7 +51,15 @@ def import_file(path: str | Path, mapping: Mapping, robot: Robot, index: int = 0
 def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[tuple[TrialRecord, Report]]:
     """Every trial of the files. Raises MeasurementError: see ``readers``, ``trials``, ``clocks`` and ``check_names``."""
     check_names(mapping, robot)
-    return [_Import(r, mapping, robot, i).run() for i, r in enumerate(trials_of(files, mapping))]
+    found = [_Import(r, mapping, robot, i).run() for i, r in enumerate(trials_of(files, mapping))]
+    names = [report.trial for _, report in found]
+    for i, setting in enumerate(mapping.settings):
+        for wanted in setting.trials:
+            if not fnmatch.filter(names, wanted):
+                raise MeasurementError(
+                    f"{mapping.source}: settings[{i}]: trials: no trial is named {quoted(wanted)}; {nearest(wanted, names)}"
+                )
+    return found
 
 
 class _Import:
@@ -70,6 +79,7 @@ class _Import:
         supply = None
         if self.mapping.supply is not None:
             supply = self._column(self.mapping.supply, "V", "supply", step_like=True)
+        external = self._external()
         self._released(commands)
         self._look(commands)
         joints = None
@@ -85,6 +95,7 @@ class _Import:
             joints=joints,
             torques=torques,
             supply_v=supply,
+            external=external,
         )
         record = TrialRecord(self.index, self.report.trial, HARDWARE, Commands(commands.copy()), log, self._settings())
         return record, self.report
@@ -228,6 +239,20 @@ class _Import:
             [self._column(columns[m], units[m], f"{what} of {m}", True) for m in self.robot.motor_names], axis=1
         )
 
+    def _external(self) -> Array | None:
+        """Known torques on the joints that are not the drives', (T, M); none where the mapping names no column."""
+        columns = self.mapping.external
+        if not columns:
+            return None
+        units, rest = torque_units(self.robot), np.zeros(len(self.at_s))
+        return np.stack(
+            [
+                self._column(columns[m], units[m], f"external torque on {m}", False) if m in columns else rest
+                for m in self.robot.motor_names
+            ],
+            axis=1,
+        )
+
     def _released(self, commands: Array) -> None:
         """A drive that is switched off obeys no command: its command is NaN."""
         if self.mapping.enabled is None:
@@ -272,17 +297,26 @@ class _Import:
     def _settings(self) -> Hypothesis:
         found = []
         for s in self.mapping.settings:
-            values = {}
-            for key, value in s.values.items():
-                if isinstance(value, tuple):
-                    name, scale = value
-                    entry = self.header.get(name)
-                    if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not math.isfinite(entry):
-                        raise MeasurementError(
-                            f"{self.report.file}: header entry {quoted(name)} for {s.effect} is {quoted(entry)}; "
-                            "expected a number"
-                        )
-                    value = float(entry) * scale
-                values[key] = value
+            if s.trials and not any(fnmatch.fnmatchcase(self.report.trial, wanted) for wanted in s.trials):
+                continue
+            values = {k: self._given(v, s.effect) if isinstance(v, Given) else v for k, v in s.values.items()}
             found.append(term(s.effect, s.target, **values))
         return tuple(found)
+
+    def _given(self, value: Given, effect: str) -> float:
+        """A number of the file's header, or of a column that is one number all through the trial. Raises MeasurementError."""
+        entry: Any = self.header.get(value.name)
+        if value.place == "column":
+            seen = self.main.table.numbers(value.name)
+            if (seen != seen[0]).any():
+                raise MeasurementError(
+                    f"{self.report.file}: column {quoted(value.name)} for {effect} changes within the trial ({seen.min():g} to "
+                    f"{seen.max():g}); if these are trials of their own, add 'split: {{column: {value.name}}}'"
+                )
+            entry = float(seen[0])
+        if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not math.isfinite(entry):
+            raise MeasurementError(
+                f"{self.report.file}: {value.place} entry {quoted(value.name)} for {effect} is {quoted(entry)}; "
+                "expected a number"
+            )
+        return float(entry) * value.scale

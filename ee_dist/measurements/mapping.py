@@ -83,13 +83,24 @@ class Estimated:
 
 
 @dataclass(frozen=True)
+class Given:
+    """A number that a file states, times ``scale``: an entry of its header, or a column that is the same all through a trial."""
+
+    place: str
+    """``header`` or ``column``."""
+    name: str
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
 class Setting:
-    """What is known to be special about a trial, as an effect: a value is a number, or taken from the file's header."""
+    """What is known to be special about a trial, as an effect: a value is a number, or one that the file states."""
 
     effect: str
     target: str
-    values: Dictionary[str, float | tuple[str, float]]
-    """Parameter to a number, or to (header key, scale)."""
+    values: Dictionary[str, float | Given]
+    trials: tuple[str, ...] = ()
+    """Names of the trials that it is for, with * and ?; none: all."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +114,7 @@ class Mapping:
     sensors: Dictionary[str, Column | Estimated]
     commands: Dictionary[str, Column]
     torques: Dictionary[str, Column] = field(default_factory=dict)
+    external: Dictionary[str, Column] = field(default_factory=dict)
     supply: Column | None = None
     enabled: Column | None = None
     settings: tuple[Setting, ...] = ()
@@ -121,14 +133,14 @@ class Mapping:
         """(group, name, column) of every channel that is a column."""
         groups: tuple[tuple[str, Dictionary[str, Any]], ...] = (
             ("sensors", self.sensors), ("commands", self.commands), ("torques", self.torques),
-            ("supply", {"": self.supply}), ("enabled", {"": self.enabled}),
+            ("external", self.external), ("supply", {"": self.supply}), ("enabled", {"": self.enabled}),
         )  # fmt: skip
         return [(group, name, c) for group, columns in groups for name, c in columns.items() if isinstance(c, Column)]
 
 
 _KEYS = (
     "robot", "format", "records", "separator", "header", "decimal", "tables", "split", "time", "rate_hz", "sensors",
-    "commands", "torques", "supply", "enabled", "settings", "trial",
+    "commands", "torques", "external", "supply", "enabled", "settings", "trial",
 )  # fmt: skip
 
 
@@ -167,7 +179,7 @@ def mapping_of(data: Any, file: Path) -> Mapping:
             k: _column(v, f"{where}: {group}: {k}")
             for k, v in _table(data.get(group) or {}, f"{where}: {group}").items()
         }
-        for group in ("commands", "torques")
+        for group in ("commands", "torques", "external")
     }
     mapping = Mapping(
         source=file,
@@ -176,6 +188,7 @@ def mapping_of(data: Any, file: Path) -> Mapping:
         sensors=sensors,
         commands=groups["commands"],
         torques=groups["torques"],
+        external=groups["external"],
         supply=single.get("supply"),
         enabled=single.get("enabled"),
         settings=_settings(data.get("settings"), where),
@@ -383,19 +396,25 @@ def _number(value: Any, where: str) -> float:
 def _setting(value: Any, where: str) -> Setting:
     if not isinstance(value, Dictionary) or "effect" not in value:
         raise MeasurementError(f"{where}: expected {{effect: ..., target: ..., <parameter>: ...}}, not {shown(value)}")
-    values: dict[str, float | tuple[str, float]] = {}
+    values: dict[str, float | Given] = {}
     for key, entry in value.items():
-        if key in ("effect", "target"):
+        if key in ("effect", "target", "trials"):
             continue
-        if isinstance(entry, Dictionary) and set(entry) <= {"header", "scale"} and "header" in entry:
+        place = next((p for p in ("header", "column") if isinstance(entry, Dictionary) and p in entry), "")
+        if place and set(entry) <= {place, "scale"}:
             scale = _number(entry.get("scale", 1.0), f"{where}: {key}: scale")
             if scale == 0:
                 raise MeasurementError(f"{where}: {key}: scale: 0 makes every value the same; expected another number")
-            values[str(key)] = (str(entry["header"]), scale)
+            values[str(key)] = Given(place, str(entry[place]), scale)
         elif isinstance(entry, (int, float)) and not isinstance(entry, bool):
             values[str(key)] = _number(entry, f"{where}: {key}")
         else:
             raise MeasurementError(
-                f"{where}: {key}: expected a number or {{header: key, scale: number}}, not {shown(entry)}"
+                f"{where}: {key}: expected a number, {{header: key, scale: number}} or {{column: name, scale: number}}, "
+                f"not {shown(entry)}"
             )
-    return Setting(str(value["effect"]), str(value.get("target", "")), values)
+    trials = value.get("trials", [])
+    trials = [trials] if isinstance(trials, str) else trials
+    if not isinstance(trials, list) or not all(isinstance(t, str) and t for t in trials):
+        raise MeasurementError(f"{where}: trials: expected names such as [heavy_1, 'heavy_*'], not {shown(trials)}")
+    return Setting(str(value["effect"]), str(value.get("target", "")), values, tuple(trials))

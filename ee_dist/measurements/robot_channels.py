@@ -38,6 +38,7 @@ def check_names(mapping: Mapping, robot: Robot) -> None:
         ("sensors", mapping.sensors, robot.sensor_names),
         ("commands", mapping.commands, motors),
         ("torques", mapping.torques, motors),
+        ("external", mapping.external, motors),
     ):
         for name in names:
             if name not in allowed:

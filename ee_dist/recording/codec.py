@@ -19,7 +19,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
 _ALWAYS = ("sensors", "commands")
-_TABLES = ("base_pose", "joints", "torques")
+_TABLES = ("base_pose", "joints", "torques", "external")
 _SERIES = "supply_v"
 _JOINT_UNITS = {"hinge": "rad", "slide": "m"}
 

@@ -11,6 +11,7 @@ or a URDF (or ``mjcf: arm.xml``) with what the file cannot say ::
     free_base: false            # bolted to the world (default), or free to move
     time_step_s: 0.002
     has_floor: false
+    velocity_limits: scale      # or obeyed, where the controllers keep to the file's velocity limits
     inertia_about: centre       # or joint, where the file's inertias are about the joints
     drives:                     # joint: any field of a drive; unnamed joints swing freely
       shoulder: {kp: 40, kd: 1, torque_limit: 12}

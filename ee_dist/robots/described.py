@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
@@ -21,6 +22,7 @@ KEYS = (
     "start_position_m",
     "gravity_m_s2",
     "inertia_about",
+    "velocity_limits",
     "drives",
     "sensors",
 )
@@ -49,6 +51,8 @@ UNITS = {
     ("motor_torque", "hinge"): "N.m",
     ("motor_torque", "slide"): "N",
 }
+SCALE, OBEYED = "scale", "obeyed"
+"""What ``velocity_limits`` of a file are: a scale for what is measured, or limits that the controllers keep to."""
 OF_JOINT = ("angle", *dict.fromkeys(kind for kind, _ in UNITS))
 TIME_STEP_S = 0.002
 GRAVITY_M_S2 = 9.81
@@ -59,7 +63,7 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
 
     Raises RobotError.
     """
-    drives = _drives(data.get("drives"), body, where)
+    drives = _obeying(_drives(data.get("drives"), body, where), data.get("velocity_limits", SCALE), body, where)
     joints = {j.name: j for j in body.joints}
     driven = [joints[d.joint] for d in drives]
     given = data.get("sensors")
@@ -132,6 +136,21 @@ def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:
         for name in moving
         if name in given or name in body.driven
     )
+
+
+def _obeying(drives: tuple[Drive, ...], asked: Any, body: Body, where: str) -> tuple[Drive, ...]:
+    """The drives; their controllers with the velocity limits of the file, if that is asked for."""
+    if asked not in (SCALE, OBEYED):
+        raise RobotError(
+            f"{where}: velocity_limits: expected '{SCALE}' (for what is measured) or '{OBEYED}' (by the controllers), "
+            f"not {quoted(asked)}"
+        )
+    if asked == SCALE:
+        return drives
+    tops = {j.name: j.top_speed for j in body.joints}
+    if not any(math.isfinite(tops[d.joint]) for d in drives):
+        raise RobotError(f"{where}: velocity_limits: {OBEYED}: the file states none; give drives a 'command_speed'")
+    return tuple(replace(d, command_speed=min(d.command_speed, tops[d.joint])) for d in drives)
 
 
 def _drive(name: str, entry: Mapping[str, Any], found: Mapping[str, float | str], where: str) -> Drive:

@@ -117,8 +117,12 @@ class Drive:
     """If positive, active torque scales with (measured supply) / (this)."""
     command: str = "position"
     """One of COMMANDS."""
+    command_speed: float = float("inf")
+    """Velocity limit of the controller, rad/s: how fast it lets a commanded position move, or how large a commanded speed it
+    obeys. It has nothing to do with ``speed_limit``, which is the motor's."""
     # -- what may be wrong or missing (neutral values); for a slide read m for rad and N for N.m --
     strength: float = 1.0
+    current_gain: float = 1.0  # torque of the motor over what is read off its current
     command_gain: float = 1.0
     zero_offset: float = 0.0  # rad by which the controller's zero lies off the joint's
     deadband: float = 0.0  # rad of error on either side that the controller leaves alone

@@ -8,6 +8,7 @@ Links without mass are folded into their neighbours; see ``fold.py``.
 from __future__ import annotations
 
 import math
+import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -20,7 +21,8 @@ from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, fold
 from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
 from ee_dist.robots.pivots import PIVOT_HINT
-from ee_dist.robots.xml import XmlError, read_xml
+from ee_dist.robots.xacro import PROGRAM, XacroError, expanded, is_xacro
+from ee_dist.robots.xml import XmlError, element_of, read_xml
 
 CONTINUOUS_RAD = 200 * math.pi
 """Stops of a joint that has none: a hundred turns either way."""
@@ -49,12 +51,18 @@ def read_urdf(path: str | Path) -> Body:
     file = Path(path)
     try:
         root, _ = read_xml(file, "a URDF")
-    except XmlError as error:
+        made = expanded(file) if is_xacro(file) else None
+        if made is not None:
+            root = element_of(file, made)
+    except (XmlError, XacroError) as error:
         raise UrdfError(str(error)) from None
     if root.tag != "robot":
         raise UrdfError(f"{file}: the outermost element is <{root.tag}>; a URDF begins with <robot>")
     if "xacro" in root.tag or any("xacro" in str(e.tag) for e in root):
-        raise UrdfError(f"{file}: is a xacro, which makes a URDF: run 'xacro {file.name} > robot.urdf' and name that")
+        how = "call it .xacro" if shutil.which(PROGRAM) else "install xacro"
+        raise UrdfError(
+            f"{file}: is a xacro, which makes a URDF: {how}, or run 'xacro {file.name} > robot.urdf' and name that"
+        )
     return _Reader(file, root).body()
 
 

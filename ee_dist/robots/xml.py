@@ -32,9 +32,16 @@ def read_xml(path: str | Path, what: str = "a robot") -> tuple[ET.Element, bytes
         raise XmlError(f"{file}: {error}; expected {what}") from None
     except OSError as error:
         raise XmlError(f"{file}: cannot be read ({error.strerror}); expected {what}") from None
+    return element_of(file, data), data
+
+
+def element_of(file: Path, data: bytes) -> ET.Element:
+    """The outermost element of what stands, or would stand, in a file. Raises XmlError: too large, a DTD, too deep, not XML."""
+    if len(data) > LARGEST_BYTES:
+        raise XmlError(f"{file}: makes {len(data) / 1e6:.0f} MB; the description of a robot has at most 50")
     _look(file, data)
     try:
-        return ET.fromstring(data), data
+        return ET.fromstring(data)
     except (ET.ParseError, ValueError, LookupError) as error:
         raise XmlError(f"{file}: not well-formed XML: {error}") from None
 

@@ -21,7 +21,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping, read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
-from ee_dist.measurements.proposal.model import UNITS_TO_ASK, Hints, Proposal
+from ee_dist.measurements.proposal.model import FIT, UNITS_TO_ASK, Hints, Proposal
 from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.measurements.readers import FORMATS, kind_of
 from ee_dist.measurements.report import Report, describe
@@ -102,12 +102,16 @@ def run(config: Config, options: Options, out: Path) -> None:
 def hints_of(options: Options) -> Hints:
     """What the user said beside the file. Raises ConfigError."""
     joints = None if options.joints is None else [str(j) for j in _listed(options.joints)]
-    gains: list[float] | None = None
-    if options.gains is not None:
+    gains: list[float] | str | None = None
+    if options.gains == FIT:
+        gains = FIT
+    elif options.gains is not None:
         gains = []
         for g in _listed(options.gains):
             if isinstance(g, bool) or not isinstance(g, (int, float)) or not math.isfinite(g) or g == 0:
-                raise ConfigError(f"task.gains: expected numbers in N.m per A, none of them 0, not {quoted(g)}")
+                raise ConfigError(
+                    f"task.gains: expected numbers in N.m per A, none of them 0, or '{FIT}', not {quoted(g)}"
+                )
             gains.append(float(g))
     if options.unit is not None:
         one_of("task.unit", options.unit, UNITS_TO_ASK)
@@ -200,7 +204,8 @@ def digest_of(records: list[TrialRecord]) -> str:
     total = hashlib.sha256()
     for r in records:
         total.update(repr((r.index, r.name, r.believed, r.log.sensor_names, r.log.motor_names)).encode())
-        for values in (r.log.times_s, r.log.sensors, r.log.commands, r.log.joints, r.log.torques, r.log.supply_v):
+        log = r.log
+        for values in (log.times_s, log.sensors, log.commands, log.joints, log.torques, log.supply_v, log.external):
             if values is not None:
                 total.update(np.ascontiguousarray(values).tobytes())
     return total.hexdigest()

@@ -24,7 +24,7 @@ class SensorLog:
 
     Shapes: times_s (T,), sensors (T, S), commands (T, M) in radians (metres for a slide). Where known: base_pose (T, 7)
     as x, y, z, qx, qy, qz, qw in the frame of the floor; joints (T, M) joint positions; torques (T, M) of the drives;
-    supply_v (T,). Arrays are read-only.
+    supply_v (T,); external (T, M) torques on the joints that are known and not the drives'. Arrays are read-only.
     """
 
     times_s: Array
@@ -37,6 +37,7 @@ class SensorLog:
     joints: Array | None = None
     torques: Array | None = None
     supply_v: Array | None = None
+    external: Array | None = None
     travel_m: float = float("nan")
     """How far the body went along +x of the floor, from the start to the last row."""
 
@@ -49,6 +50,7 @@ class SensorLog:
             "joints": (steps, len(self.motor_names)),
             "torques": (steps, len(self.motor_names)),
             "supply_v": (steps,),
+            "external": (steps, len(self.motor_names)),
         }
         for name, shape in expected.items():
             value = getattr(self, name)
@@ -94,6 +96,7 @@ class SensorLog:
             joints=cut(self.joints),
             torques=cut(self.torques),
             supply_v=cut(self.supply_v),
+            external=cut(self.external),
             travel_m=float("nan")
             if self.base_pose is None
             else float(self.base_pose[last - 1, 0] - self.base_pose[first, 0]),

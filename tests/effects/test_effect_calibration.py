@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from effect_robots import ARM_M, MASS_KG, Bench, G, lever, slider
 
 from ee_dist.effects import term
+from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.quadruped import quadruped
 
 HOLD_NM = MASS_KG * G * ARM_M
@@ -21,6 +23,17 @@ def test_motor_gain_scales_the_torque_and_leaves_the_back_emf(bench: Bench, chan
     assert log.torques[0, 0] == pytest.approx((1 + change) * 10.0)
     # The same back-EMF eats a larger torque at a higher speed.
     assert log.channel("velocity")[-1] == pytest.approx(1 + change, rel=0.01)
+
+
+def test_current_gain_changes_what_is_read_and_not_what_moves(bench: Bench) -> None:
+    robot = with_motor_torques(slider(kp=100.0, torque_limit=10.0))
+    plain, other = (
+        bench.run(robot, term("current_gain", "joint", factor=f), steps=200, command=0.3) for f in (1.0, 1.25)
+    )
+    read = plain.channel("motor_torque_joint")
+    assert np.array_equal(plain.channel("position"), other.channel("position"))
+    assert np.abs(read).max() > 0
+    assert other.channel("motor_torque_joint") == pytest.approx(read / 1.25)
 
 
 def test_back_emf_lowers_the_speed_without_load(bench: Bench) -> None:

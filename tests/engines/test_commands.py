@@ -120,3 +120,30 @@ def test_the_unit_and_span_of_a_command_follow_from_the_drive(
     assert command_span(robot, robot.drives[0]) == span
     planned = Excitation("multisine", 1.0, 0.5).commands(robot)
     assert np.abs(planned).max() <= 0.5 * span[1]
+
+
+def test_a_controllers_velocity_limit_slows_a_goal_and_cuts_a_speed(any_engine: Engine) -> None:
+    stiff = {"kp": 4000.0, "kd": 180.0, "command_speed": 0.5}
+    limited, free = slide(**stiff), slide(**(stiff | {"command_speed": np.inf}))
+    goal = np.full((1, 1), 0.2)
+    (log, untouched), (alone,) = (
+        any_engine.rollout([Rollout(r, Commands(goal), 600) for r in some]) for some in ((limited, free), (free,))
+    )
+    assert np.array_equal(untouched.sensors, alone.sensors), "a neighbour's limit changes no bit"
+    speed = log.channel("velocity")
+    assert np.median(speed[100:180]) == pytest.approx(0.5, rel=0.01)
+    assert untouched.channel("velocity").max() > 1.0
+    assert log.channel("position")[-1] == pytest.approx(0.2, rel=1e-3)
+
+    led = run(any_engine, slide(command="speed", kp=40.0, command_speed=0.3), 1500, commands=np.full((1, 1), 2.0))
+    assert led.channel("velocity")[-1] == pytest.approx(0.3, rel=2e-3)
+
+
+def test_a_released_drive_sets_out_anew_from_where_its_joint_is(any_engine: Engine) -> None:
+    robot = slide(kp=400.0, kd=40.0, command_speed=0.1)
+    goal, on = np.full((300, 1), 1.0), np.ones(300)
+    on[:150] = 0.0
+    rollout = Rollout(robot, Commands(goal), 300, start=at([0.5], [0.0]), enabled=on)
+    (log,) = any_engine.rollout([rollout])
+    assert log.channel("position")[149] == pytest.approx(0.5, abs=1e-9)
+    assert log.channel("position")[-1] < 0.5 + 0.1 * 150 * STEP_S + 1e-3

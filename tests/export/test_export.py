@@ -230,3 +230,11 @@ def test_the_page_says_what_becomes_of_each_effect() -> None:
     tool = runpy.run_path(str(root / "tools" / "export_table.py"))
     assert (root / "docs" / "export.md").read_text() == tool["page"](), "run: python tools/export_table.py"
     assert all(f"| {name} |" in tool["table"]() for name in CATALOGUE)
+
+
+def test_the_velocity_limits_of_controllers_are_in_the_shim() -> None:
+    slow = replace(BENCH, drives=tuple(replace(d, command_speed=0.2) for d in BENCH.drives))
+    assert needs_shim(slow, "mjcf") and not needs_shim(BENCH, "mjcf")
+    assert followed(slow, with_shim=True) < 0.01
+    lag = rollout(BENCH, calm(BENCH)).joints - rollout(slow, calm(slow)).joints
+    assert np.abs(lag).max() > 0.05, "the limit was felt"

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ee_dist.measurements.importer import import_file
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.importer import import_file, import_files
 from ee_dist.measurements.mapping import Mapping, mapping_of
 from ee_dist.measurements.report import describe
 from ee_dist.measurements.sampling import LowPass, decimated, held, linear, smoothed
@@ -157,3 +158,25 @@ def test_held_linear_and_smoothed() -> None:
     assert held(np.array([0.95]), t, v, lead_s=0.1).tolist() == [10.0]
     assert linear(np.array([0.5]), t, v).tolist() == [5.0]
     assert smoothed(np.ones(50), 0.01, 0.1) == pytest.approx(np.ones(50))
+
+
+def test_gains_and_loads_of_single_trials_come_from_columns_and_names(tmp_path: Path) -> None:
+    for name, kp in (("light", 100), ("heavy_1", 200), ("heavy_2", 200)):
+        stage_table().assign(kp=kp).to_csv(tmp_path / f"{name}.csv", index=False)
+    mapping = stage_mapping(
+        settings=[
+            {"effect": "position_gain", "target": "carriage", "factor": {"column": "kp", "scale": 0.01}},
+            {"effect": "part_mass", "target": "carriage", "change": 0.5, "trials": ["heavy_*"]},
+        ]
+    )
+    files = [tmp_path / f"{n}.csv" for n in ("light", "heavy_1", "heavy_2")]
+    found = {r.name: {t.effect: t.values[0][1] for t in r.believed} for r, _ in import_files(files, mapping, STAGE)}
+    heavy = {"position_gain": 2.0, "part_mass": 0.5}
+    assert found == {"light": {"position_gain": 1.0}, "heavy_1": heavy, "heavy_2": heavy}
+
+    wrong = stage_mapping(settings=[{"effect": "part_mass", "target": "carriage", "change": 0.5, "trials": "heavi_1"}])
+    with pytest.raises(MeasurementError, match=r"settings\[0\]: trials: no trial is named 'heavi_1'; .*heavy_1"):
+        import_files(files, wrong, STAGE)
+    stage_table().assign(kp=np.arange(400)).to_csv(tmp_path / "light.csv", index=False)
+    with pytest.raises(MeasurementError, match=r"column 'kp' for position_gain changes within the trial \(0 to 399\)"):
+        import_files(files, mapping, STAGE)

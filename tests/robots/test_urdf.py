@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -143,11 +144,29 @@ def test_a_wrong_urdf_is_one_clear_line(tmp_path: Path, edits: dict[str, object]
     assert "arm.urdf" in str(caught.value)
 
 
-def test_a_xacro_says_how_it_becomes_a_urdf(tmp_path: Path) -> None:
+def test_a_xacro_says_how_it_becomes_a_urdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
     file = tmp_path / "arm.urdf.xacro"
     file.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:macro name="m"/></robot>')
-    with pytest.raises(UrdfError, match=r"is a xacro, .*run 'xacro arm.urdf.xacro > robot.urdf'"):
+    with pytest.raises(UrdfError, match=r"is a xacro, .*install xacro, or run 'xacro arm.urdf.xacro > robot.urdf'"):
         load_robot(file)
+
+
+def test_a_xacro_is_expanded_by_the_program_that_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stand-in for ROS's program, which is not: it prints what the file names, or fails as xacro does."""
+    program = tmp_path / "bin" / "xacro"
+    program.parent.mkdir()
+    program.write_text(
+        f"#!/bin/sh\nif grep -q broken $1; then echo 'trace'; echo 'No such macro: arm' >&2; exit 2; fi\ncat {ARM}\n"
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}:/usr/bin:/bin")
+    file = tmp_path / "arm.urdf.xacro"
+    file.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><xacro:arm name="m"/></robot>')
+    assert [p.name for p in read_urdf(file).parts] == [p.name for p in read_urdf(ARM).parts]
+    file.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="broken"/>')
+    with pytest.raises(UrdfError, match=r"arm.urdf.xacro: xacro failed: No such macro: arm$"):
+        read_urdf(file)
 
 
 def test_broken_xml_names_the_line(tmp_path: Path) -> None:
@@ -172,6 +191,7 @@ def test_broken_xml_names_the_line(tmp_path: Path) -> None:
         ),
         ("urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: smell}]", "no sensor kind 'smell'"),
         ("urdf: ARM\nfree_bas: true", "unknown key 'free_bas'; did you mean free_base"),
+        ("urdf: ARM\nvelocity_limits: yes", "velocity_limits: expected 'scale' .*'obeyed' .*, not True"),
         ("urdf: ARM\ninertia_about: hinge", "inertia_about: expected 'centre' .*'joint', not 'hinge'"),
         ("urdf: ARM\ninertia_about: joint", "has more inertia about the joint than the .* they are about its centre"),
         ("urdf: ARM\ntime_step_s: 2", "seconds, not milliseconds"),
@@ -327,3 +347,17 @@ def test_a_drive_without_a_speed_limit_has_the_speed_of_its_joint_as_scale() -> 
     assert math.isinf(robot.drives[0].speed_limit)
     assert channel_range(robot, velocity) == 2 * robot.joint("shoulder").top_speed
     assert math.isfinite(channel_range(robot.with_joint("shoulder", top_speed=math.inf), velocity))
+
+
+def test_controllers_may_keep_to_the_velocity_limits_of_the_file() -> None:
+    body = read_urdf(ARM)
+    drives = {"shoulder": {"kp": 20}, "elbow": {"kp": 10, "command_speed": 0.5}}
+    scaled, obeyed = (
+        robot_of_body(body, {"drives": drives, "velocity_limits": how}, "arm.yaml")[0] for how in ("scale", "obeyed")
+    )
+    tops = [obeyed.joint(d.joint).top_speed for d in obeyed.drives]
+    assert [d.command_speed for d in scaled.drives] == [math.inf, 0.5]
+    assert [d.command_speed for d in obeyed.drives] == [tops[0], 0.5]
+    bare = replace(body, joints=tuple(replace(j, top_speed=math.inf) for j in body.joints))
+    with pytest.raises(RobotError, match="velocity_limits: obeyed: the file states none"):
+        robot_of_body(bare, {"drives": drives, "velocity_limits": "obeyed"}, "arm.yaml")

@@ -311,6 +311,10 @@ IMPORTS: Rows = (
     ("task=import measured=t.csv task.mapping=time.map", "name the column, or 'time: {rate_hz: 100}'"),
     ("task=import measured=t.csv task.mapping=key.map", "did you mean commands or records or format?"),
     ("task=import measured=t.csv task.mapping=joint.map", "did you mean servo?"),
+    (
+        "task=import measured=t.csv task.mapping=push.map",
+        "external: servo_pendulum has no 'sevro'; did you mean servo?",
+    ),
     ("task=import measured=t.csv task.mapping=sensor.map", "did you mean position?"),
     ("task=import measured=t.csv task.mapping=scale.map", "expected a finite number"),
     ("task=import measured=t.csv task.mapping=list.map", "expected a mapping with 'robot', 'time', 'sensors' and"),

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import WINDOWS, HeldOut, bootstrap
+from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fitted import Model
@@ -33,6 +34,7 @@ little of it, surely and wrongly."""
 LUCK = "its gain on held-out data is no more than luck"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes less than a tenth of what is above the noise"
+VAGUE = "none of its numbers is told from neutral; a plainer effect explains as much for each of its own"
 
 
 @dataclass(eq=False)
@@ -54,6 +56,8 @@ class Judged:
     outcome: HeldOut
     dispersion: float
     why_not: str = ""
+    vague: bool = False
+    """Whether it has several numbers of which these data tell none from neutral: it patches what others say plainly."""
     rank: int = 0
     tied_with: list[str] = field(default_factory=list)
 
@@ -140,7 +144,18 @@ def judge(
         outcome=found,
         dispersion=dispersion if math.isfinite(dispersion) else 1.0,
         why_not=why,
+        vague=_vague(problem, found, proposal),
     )
+
+
+def _vague(problem: Problem, found: HeldOut, proposal: Proposal) -> bool:
+    if len(proposal.parts) > 1 or proposal.size < 2 or not found.fits:
+        return False
+    for fit in found.fits:
+        half = half_widths(problem, fit)[-proposal.size :]
+        if (np.abs(fit.u[-proposal.size :]) > half).any():
+            return False
+    return True
 
 
 def lost(gained: Array) -> float:
@@ -160,6 +175,9 @@ def _best(found: HeldOut) -> Array:
 def ranked(found: Sequence[Judged]) -> list[Judged]:
     """Best held-out energy first, those that earned their place before the others; ties are named, and of those that are
     tied with the best the one with the fewest numbers goes first: a richer law can always mimic a simpler one."""
+    for j in found:
+        if j.vague and j.earned and any(_plainer(k, j) for k in found):
+            j.why_not = VAGUE
     ordered = sorted(found, key=lambda j: (not j.earned, float(j.held.sum())))
     for k, j in enumerate(ordered):
         j.tied_with, j.rank = [], k
@@ -178,6 +196,11 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
     for k, j in enumerate(ordered):
         j.rank = k + 1
     return ordered
+
+
+def _plainer(one: Judged, vague: Judged) -> bool:
+    """Whether an effect whose numbers are told explains as much for each of them as a vague one does for each of its own."""
+    return one.earned and not one.vague and one.explained * vague.proposal.size >= vague.explained * one.proposal.size
 
 
 def tied(one: Judged, other: Judged) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.proposal.blocks import blocks_of
 from ee_dist.measurements.proposal.commands import add_commands
-from ee_dist.measurements.proposal.model import UNKNOWN, Choice, Hints, Proposal
+from ee_dist.measurements.proposal.model import FIT, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.positions import add_positions, ask_for_positions, ranked_positions
 from ee_dist.measurements.proposal.rest import add_rest, add_switches
 from ee_dist.measurements.proposal.speeds import add_speeds
@@ -86,7 +86,7 @@ def _check_hints(robot: Robot, hints: Hints) -> None:
             raise MeasurementError(
                 f"task.joints: {which} is missing or named twice; expected all of {', '.join(robot.motor_names)}"
             )
-    if hints.gains is not None and len(hints.gains) != len(hints.joints or robot.motor_names):
+    if hints.gains is not None and hints.gains != FIT and len(hints.gains) != len(hints.joints or robot.motor_names):
         wanted = len(hints.joints or robot.motor_names)
         raise MeasurementError(
             f"task.gains: {len(hints.gains)} gains for {wanted} joints; expected one each, in N.m per A"

@@ -8,16 +8,19 @@ from typing import Any
 
 SURE, LIKELY, UNKNOWN = "sure", "likely", "unknown"
 SHARE = "percent"
+FIT = "fit"
+"""Instead of gains: to be estimated from what the motion needs by the model."""
 UNITS_TO_ASK = ("rad", "deg", "m", "mm", SHARE)
 
 
 @dataclass(frozen=True)
 class Hints:
     """What a person said because no file can: ``joints`` in the order of the columns, the ``gains`` of the motors (N.m/A, in
-    the same order), the ``unit`` of positions (or "percent" of each joint's range), ``rate_hz`` of rows without a time."""
+    the same order; or FIT), the ``unit`` of positions (or "percent" of each joint's range), ``rate_hz`` of rows without a
+    time."""
 
     joints: Sequence[str] | None = None
-    gains: Sequence[float] | None = None
+    gains: Sequence[float] | str | None = None
     unit: str | None = None
     rate_hz: float | None = None
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ee_dist.measurements.proposal import signals
 from ee_dist.measurements.proposal.blocks import BY_NUMBER, BY_PLACE, Block
-from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
+from ee_dist.measurements.proposal.model import FIT, LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, TORQUE
@@ -23,6 +23,8 @@ WINDOW_S = 0.06
 """Of the means through which torques are compared with what the motion needs."""
 ROUGHER = 1.15
 """What was measured is rougher than what was asked for, by this factor or more."""
+LEAST_SEEN = 0.5
+"""Correlation with what the motion needs from which a gain can be estimated."""
 CLEARLY, WELL = 0.3, 0.3
 """Another order of the joints is asked for if it leaves less than this share of what the robot's leaves, and of all."""
 
@@ -129,7 +131,7 @@ def _as_current(v: View, block: Block) -> tuple[float, list[str]]:
     fit = float(np.median([abs(r.correlation) for r in relations]))
     if fit < 0.5:
         return 0.0, []
-    if v.hints.gains is not None:
+    if v.hints.gains is not None and v.hints.gains != FIT:
         size = float(np.median([abs(r.slope) * abs(g) for r, g in zip(relations, v.gains(), strict=True)]))
         if not 0.3 < size < 3:
             return 1.0, [f"with your gains {size:.2g} times what the motion needs"]
@@ -151,21 +153,50 @@ def _as_current(v: View, block: Block) -> tuple[float, list[str]]:
     return score, [why]
 
 
+def _gains(v: View, relations: list[signals.Relation] | None) -> list[float]:
+    """N.m (N) of each ampere, joint by joint: as said, or the least gains with which the currents are what the motion needs.
+    None, and a question asked, where they cannot be estimated."""
+    if v.hints.gains != FIT:
+        return v.gains()
+    weak = [j.name for j, r in zip(v.joints, relations or (), strict=False) if abs(r.correlation) < LEAST_SEEN]
+    if not relations or weak:
+        v.out.ask(
+            f"torques: the gains of {', '.join(weak) or 'the motors'} cannot be estimated: their currents do not go with what "
+            "the motion needs by the model; say task.gains=[N.m per A, one for each joint]"
+        )
+        return []
+    # Noise in a current flattens none of this: the need is regressed on nothing that was measured but the motion.
+    found = [float(f"{1 / abs(r.slope):.4g}") for r in relations]
+    fits = ",".join(f"current_gain@{m}" for m in v.robot.motor_names)
+    v.out.notes.append(
+        f"gains estimated with the model's masses: {', '.join(f'{g:g}' for g in found)} N.m (N) for each ampere; how sure "
+        f"they are tells task=improve 'effect=[{fits}]'"
+    )
+    return found
+
+
 def torque_units(v: View, block: Block) -> UnitChoice:
     """N.m or N; a current through the gain that was said. A sign turned against the motion's need is turned back."""
     kinds = ["N.m" if j.kind == "hinge" else "N" for j in v.joints]
     current = block.reading.kind == CURRENT or (block.reading.kind is None and v.hints.gains is not None)
     if current and v.hints.gains is None:
-        v.out.ask(f"torques: {block.name} are motor currents; say task.gains=[N.m per A, one for each joint]")
+        v.out.ask(
+            f"torques: {block.name} are motor currents; say task.gains=[N.m per A, one for each joint], or task.gains={FIT} to "
+            "estimate them from the model's masses"
+        )
         return UnitChoice((), UNKNOWN, "a current, whose gain no file can say")
     relations = _beside_need(v, block) if not block.reading.command else None
+    gains = _gains(v, relations) if current else []
+    if current and not gains:
+        return UnitChoice((), UNKNOWN, "a current whose gain cannot be estimated")
     entries, turned, unclear, checked = [], [], [], 0
     for k, unit in enumerate(kinds):
         stated = block.units[k] if block.units else None
         entry: dict[str, Any] = {"unit": stated if stated in ("N.m", "mN.m", "N", "mN") else unit}
         if current:
-            gain = v.gains()[k]
-            entry = {"unit": unit, "scale": gain * (1e-3 if stated == "mA" else 1.0)}
+            # Estimated gains are of the numbers as they stand, whatever their unit.
+            size = 1e-3 if stated == "mA" and v.hints.gains != FIT else 1.0
+            entry = {"unit": unit, "scale": gains[k] * size}
         elif relations is not None and abs(relations[k].correlation) > 0.7:
             size = UNITS[entry["unit"]][1] * abs(relations[k].slope)
             if size > 200 and stated is None:
@@ -189,11 +220,17 @@ def torque_units(v: View, block: Block) -> UnitChoice:
             else:
                 unclear.append(v.joints[k].name)
         entries.append(entry)
-    why = "current times the gain you said" if current else f"{entries[0]['unit']}" + (
+    said = (
+        "current times a gain estimated from what the motion needs"
+        if v.hints.gains == FIT
+        else "current times the gain you said"
+    )
+    why = said if current else f"{entries[0]['unit']}" + (
         ", as large as the motion needs" if checked else ", the usual unit; not checked")  # fmt: skip
     if turned:
         why += f"; sign turned at {', '.join(turned)}: it was against what the motion needs"
     if unclear:
         why += f"; sign at {', '.join(unclear)} not clear, kept as it is: the model needs the other, but not this much"
     stated_all = all(u in ("N.m", "mN.m", "N", "mN") for u in block.units) if block.units else False
-    return UnitChoice(tuple(entries), SURE if (current or stated_all) and not turned and not unclear else LIKELY, why)
+    stated_all = stated_all or (current and v.hints.gains != FIT)
+    return UnitChoice(tuple(entries), SURE if stated_all and not turned and not unclear else LIKELY, why)

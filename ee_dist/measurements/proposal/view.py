@@ -144,8 +144,8 @@ class View:
         return any(c.group == group for c in self.out.choices)
 
     def gains(self) -> list[float]:
-        """The gains in the order of the robot's drives."""
-        assert self.hints.gains is not None
+        """The gains in the order of the robot's drives, where they were said."""
+        assert self.hints.gains is not None and not isinstance(self.hints.gains, str)
         order = list(self.hints.joints or self.robot.motor_names)
         return [float(self.hints.gains[order.index(m)]) for m in self.robot.motor_names]
 

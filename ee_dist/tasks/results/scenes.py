@@ -90,6 +90,7 @@ def _of_series(measured: SensorLog, own: dict[str, Series]) -> SensorLog:
         torques=None,
         base_pose=None,
         supply_v=None,
+        external=None,
     )
 
 

@@ -20,6 +20,7 @@ INSTANT_S = 1e-9
 RUBBING = (*DRY, *LOADED, *SIDED, *SLOPED)
 SEEN = (
     "strength",
+    "current_gain",
     "spring",
     "spring_rest",
     "offset_torque",
@@ -29,6 +30,11 @@ SEEN = (
     *RUBBING,
 )
 """Fields of a drive that a balance of forces sees: neither the controller nor what lies between motor and joint."""
+NUDGE = 1e-4
+"""Share of a measured force by which it is moved to see how the rest follows."""
+LEAST_SLOPE = 0.05
+"""Least change of what is left over for one of the measured force, where a joint moves: a gear that rubs this much away hardly
+lets its motor through."""
 MOST_VALUES = 8_000_000
 """Values that are kept of what joints leave: 64 MB."""
 
@@ -71,8 +77,11 @@ def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]
         np.ascontiguousarray(a[:, joints]) for a in (motion.position, motion.speed, motion.acceleration, motion.torque)
     )
     needed = needed[:, joints] + np.array([d.rotor_inertia for d in drives]) * qdd
+    if motion.external is not None:
+        needed = needed - motion.external[:, joints]
     p, uses = _fields(drives)
-    active = given * p["strength"]
+    through = p["strength"] * p["current_gain"]
+    active = given * through
     torque = active - p["spring"] * (q - p["spring_rest"]) + p["offset_torque"]
     place = {d.joint: k for k, d in enumerate(drives)}
     for law in robot.laws:
@@ -90,9 +99,17 @@ def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]
         # The load on a joint is all that its motion needed beyond its own inertia.
         load = inertia * qdd - needed
         friction.record(-load, rubbed)
-        torque = friction(torque, active, rubbed)
-    # In terms of what was measured: a weak motor would otherwise shrink the residual along with the force.
-    return np.asarray((torque - needed) / np.maximum(p["strength"], 1e-3))
+        after = friction(torque, active, rubbed)
+        if friction.loaded:
+            nudge = NUDGE * np.sqrt(np.mean(active**2, axis=0)) + 1e-12
+            slope = (friction(torque + nudge, active + nudge, rubbed) - after) / nudge
+            # What rests is held by whatever it takes: there the measured force has no say.
+            slope = np.where(motion.rest[:, joints], 1.0, np.maximum(slope, LEAST_SLOPE))
+            after = needed + (after - needed) / slope
+        torque = after
+    # In terms of what was measured: a weak motor, or friction that is a share of the motor's own force, would otherwise
+    # shrink the residual along with the force.
+    return np.asarray((torque - needed) / np.maximum(through, 1e-3))
 
 
 def _rubs(drive: Drive) -> bool:

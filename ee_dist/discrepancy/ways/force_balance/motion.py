@@ -58,13 +58,14 @@ class Moved:
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A measured motion (T, M): positions, speeds, accelerations; ``torque`` that the drives gave; ``rest``: where a joint
-    did not move, as far as its readings tell."""
+    did not move, as far as its readings tell; ``external``: known torques that are not the drives', if there are any."""
 
     position: Array
     speed: Array
     acceleration: Array
     torque: Array
     rest: Mask
+    external: Array | None = None
     known: dict[tuple[object, ...], Moved] = field(default_factory=dict)
 
     def needed(self, robot: Robot) -> tuple[object, Array]:
@@ -110,7 +111,12 @@ def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
     acceleration = np.gradient(speed, dt, axis=0)
     cut = slice(processing.drop_rows, None)
     return Motion(
-        position[cut], speed[cut], acceleration[cut], np.array(torques[cut]), at_rest(joints, dt, processing)[cut]
+        position[cut],
+        speed[cut],
+        acceleration[cut],
+        np.array(torques[cut]),
+        at_rest(joints, dt, processing)[cut],
+        None if log.external is None else np.array(log.external[cut]),
     )
 
 

@@ -57,6 +57,7 @@ def closed_loop(
             start=begin,
             supply_v=log.supply_v,
             enabled=enabled,
+            external=log.external,
             pose=True,
         )
         for m in models

@@ -219,7 +219,13 @@ class Piece:
         """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
         enabled = np.ones(len(self.log)) if self.enabled is None and switched else self.enabled
         return Rollout(
-            model, Commands(self.commands), steps, start=self.start, supply_v=self.log.supply_v, enabled=enabled
+            model,
+            Commands(self.commands),
+            steps,
+            start=self.start,
+            supply_v=self.log.supply_v,
+            enabled=enabled,
+            external=self.log.external,
         )
 
 

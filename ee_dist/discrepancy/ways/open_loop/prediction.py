@@ -128,6 +128,7 @@ def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) ->
         start=start,
         supply_v=trial.log.supply_v,
         enabled=enabled,
+        external=trial.log.external,
     )
 
 

@@ -1,0 +1,41 @@
+"""A xacro made a URDF by ROS's own program, where that is installed.
+
+A xacro is a program: it may name other files and compute. It runs only where its name ends in .xacro, as the user's own command
+would, and what comes out is read within the same bounds as any other file.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+from ee_dist.robots.model import RobotError
+
+PROGRAM = "xacro"
+LONGEST_S = 60.0
+
+
+class XacroError(RobotError):
+    """A xacro that cannot be expanded; one line."""
+
+
+def is_xacro(file: Path) -> bool:
+    return file.suffix.lower() == ".xacro"
+
+
+def expanded(file: Path) -> bytes | None:
+    """The URDF that a xacro makes; None where the program is not installed. Raises XacroError with the last line it said."""
+    program = shutil.which(PROGRAM)
+    if program is None:
+        return None
+    try:
+        done = subprocess.run([program, str(file.resolve())], capture_output=True, timeout=LONGEST_S, check=False)
+    except subprocess.TimeoutExpired:
+        raise XacroError(f"{file}: xacro took more than {LONGEST_S:g} s") from None
+    except OSError as error:
+        raise XacroError(f"{file}: xacro cannot be run ({error.strerror})") from None
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip().splitlines() or ["nothing was said"]
+        raise XacroError(f"{file}: xacro failed: {said[-1][:300]}")
+    return done.stdout

@@ -1,0 +1,89 @@
+"""What explains with numbers that no data tell apart gives way to what explains plainly; friction by load is no way to shrink a
+residual along with the force that it is a share of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from linear_problem import ROBOT, Linear
+from way_samples import measure, problem_by, samples
+
+from ee_dist.discrepancy.evidence.holdout import HeldOut, windows
+from ee_dist.discrepancy.evidence.judge import VAGUE, judge, ranked
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.candidates import Proposal, candidate
+from ee_dist.discrepancy.search.fit import fit_one
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.effects.catalogue import term
+from ee_dist.robots.model import Robot
+
+
+def judged(explained: float, vague: bool) -> object:
+    """The least of a judgement that a ranking looks at."""
+    cut = SimpleNamespace(by_unit=lambda e: e)
+    one = SimpleNamespace(
+        name=f"{explained}", explained=explained, vague=vague, why_not="", held=np.full(20, 1000.0 * (1 - explained)),
+        outcome=SimpleNamespace(cut=cut), dispersion=1.0, proposal=SimpleNamespace(size=4 if vague else 1), tied_with=[], rank=0,
+    )  # fmt: skip
+    return Following(one)
+
+
+class Following:
+    """Has ``earned`` follow ``why_not``."""
+
+    def __init__(self, one: SimpleNamespace) -> None:
+        self.__dict__.update(one.__dict__)
+
+    @property
+    def earned(self) -> bool:
+        return not self.why_not
+
+
+@pytest.mark.parametrize(("plain", "named"), [(0.3, 0.3), (0.2, 0.9)])
+def test_a_vague_explanation_gives_way_to_a_plain_one_that_explains_as_much_for_each_number(
+    plain: float, named: float
+) -> None:
+    vague, other = judged(0.9, vague=True), judged(plain, vague=False)
+    order = ranked([vague, other])  # type: ignore[list-item]
+    assert order[0].explained == named
+    assert vague.why_not == (VAGUE if plain == named else "")  # type: ignore[attr-defined]
+
+
+def test_a_law_of_two_numbers_is_vague_where_the_two_cannot_be_told_apart() -> None:
+    problem = Linear(())
+    rng, rows = np.random.default_rng(0), len(problem.trial_of)
+    part, mask = candidate(problem.robot, "friction_asymmetry", ROBOT.motor_names[0]), np.ones(rows, dtype=bool)
+    one, other, noise = rng.standard_normal((3, rows))
+    said = {}
+    for name, second in (("alike", one + 1e-4 * other), ("apart", other)):
+        slopes = 30.0 * np.stack([one, second], axis=1)
+        fit = Fit(Model((part,)), np.array([0.3, 0.3]), float(noise @ noise), noise, slopes, mask)
+        found = HeldOut(windows(problem), noise, 1.0, (fit, fit))
+        said[name] = judge(problem, 2.0 * noise, found, Proposal((part,)), fit.model, 10).vague
+    assert said == {"alike": True, "apart": False}
+
+
+def arm_with(share: float) -> tuple[Robot, object]:
+    sample = samples()["arm"]
+    hidden = tuple(term("load_friction", m, share=share) for m in sample.robot.motor_names) if share else ()
+    trials = tuple(replace(t) for t in measure(sample, hidden))
+    return sample.robot, problem_by("force_balance", trials, sample.robot)
+
+
+def test_friction_by_load_does_not_shrink_what_is_left() -> None:
+    robot, problem = arm_with(0.0)
+    heavier = (term("part_mass", "upper", change=0.8), term("part_mass", "lower", change=0.8))
+    rubbing = tuple(term("load_friction", m, share=0.75) for m in robot.motor_names)
+    wrong, shrunk = problem.residuals([heavier, (*heavier, *rubbing)])  # type: ignore[attr-defined]
+    assert error(shrunk) > error(wrong)
+
+
+def test_friction_by_load_is_found_at_its_size() -> None:
+    robot, problem = arm_with(0.3)
+    model = Model(tuple(candidate(robot, "load_friction", m) for m in robot.motor_names))
+    fit = fit_one(Search(problem), model, [np.full(2, 0.1)])  # type: ignore[arg-type]
+    assert [t.values[0][1] for t in fit.hypothesis] == pytest.approx([0.3, 0.3], rel=0.1)
