@@ -22,7 +22,7 @@ from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, begin
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
-from ee_dist.discrepancy.search.fit import fit_all, fit_one
+from ee_dist.discrepancy.search.fit import fit_all, fit_one, sticky
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
@@ -78,7 +78,7 @@ def improve(
             names = {c.name for c in current.parts}
             last = _examined(search, current, [c for c in pool if c.name not in names], effort)
             best = last.best
-            if len(current.parts) != looked and _many(problem, last, len(current.parts) - own, spread):
+            if len(current.parts) != looked and _many(search, last, len(current.parts) - own, spread):
                 cuts = travelling(problem) or [windows(problem)]
                 found = everywhere(search, current, own, pool, cuts)
                 looked = len(current.parts)
@@ -123,15 +123,15 @@ def _examined(search: Search, current: Current, pool: Sequence[Candidate], effor
     return examine(search, current, pool, effort)
 
 
-def _many(problem: Problem, found: Examined, added: int, spread: bool) -> bool:
+def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
     """Whether much is left although the search had its chance with few effects; or, where it is known to be ``spread`` over
     many places, anything when no single one is left that stands out."""
     best = found.best
-    if best is not None and added < FEW:
+    if sticky(search) or (best is not None and added < FEW):
         return False
     energy = float((found.base**2).sum()) if best is None else float(best.held.sum())
     enough = NEAR if spread and best is None else FAR
-    return energy > enough**2 * float(problem.floor.sum())
+    return energy > enough**2 * float(search.problem.floor.sum())
 
 
 def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:
