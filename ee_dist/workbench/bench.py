@@ -99,10 +99,10 @@ class Bench:
         found = {t.name: (k, t) for k, t in enumerate(terms)}
         mine: list[Entry] = []
         for entry in self.entries:
-            if not entry.on:
+            if entry.name in found:
+                mine.append(_reported(robot, replace(entry, on=True), *found.pop(entry.name), reports))
+            elif not entry.on:
                 mine.append(entry)
-            elif entry.name in found:
-                mine.append(_reported(robot, entry, *found.pop(entry.name), reports))
         for k, t in found.values():
             mine.append(_reported(robot, Entry(known(robot, t), t), k, t, reports))
         return replace(self, entries=tuple(mine))

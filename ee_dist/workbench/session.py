@@ -32,7 +32,7 @@ from ee_dist.workbench.results import Compared, Explained, Improved
 from ee_dist.workbench.saved import Saved
 from ee_dist.workbench.sight import Place, Seen, Sight
 from ee_dist.workbench.verbs import Ended, Request
-from ee_dist.workbench.worker import BusyError, Progress, Worker
+from ee_dist.workbench.worker import BUSY, BusyError, Progress, Worker
 
 T = TypeVar("T")
 STEPS = "steps"
@@ -296,6 +296,8 @@ class Session:
         terms = self.bench.terms
         if effect:
             parse(measured.robot, effect)
+            # Judged beside the model without it: on top of itself it would gain nothing.
+            terms = tuple(t for t in terms if t.name != effect)
         config = self._asked(terms)
         folder = fresh(self.folder / verb)
         more = {verbs.ADD: (f"effect={effect}",), verbs.FIT: ("effect=none",), verbs.AUTO: ("effect=auto",)}
@@ -351,6 +353,8 @@ class Session:
     def _after(self, request: Request, ended: Ended) -> None:
         """On the session's thread: take in what a long verb found."""
         result = ended.result
+        if self.notice == BUSY:
+            self.notice = ""  # Said while this was under way; it is done now.
         if ended.failed:
             self.say(ended.failed)
         elif isinstance(result, Explained):

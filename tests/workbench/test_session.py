@@ -21,6 +21,7 @@ from ee_dist.workbench.bench import FIT, HAND, Step
 from ee_dist.workbench.results import Improved
 from ee_dist.workbench.session import Session
 from ee_dist.workbench.verbs import Ended, Request
+from ee_dist.workbench.worker import BUSY
 
 FRICTION = "coulomb_friction@servo"
 PLAN = ["multisine:seconds=2,amplitude=0.5,seed=1"]
@@ -110,6 +111,9 @@ def test_what_helps_only_the_fit_is_refused_in_sight(session):
     step = Step("stribeck friction at servo", 8.0, 9.5, "windows", "its gain on held-out data is no more than luck")
     found = Improved("", (), (fitted,), reports, (step,), session.folder)
     request = Request(verbs.ADD, session.config, "auto", session.folder, "stribeck_friction@servo")
+    session.say(BUSY)
+    session._after(request, Ended())
+    assert session.notice == ""  # what was said while a search was under way goes with it
     session._after(request, Ended(found))
     entry = session.bench.entries[0]
     assert not entry.on and entry.origin == FIT and entry.intervals == ((names[0], -0.02, 0.04),)
@@ -158,6 +162,7 @@ def test_what_explain_refuses_is_refused_when_it_is_added(tmp_path):
     config = Config(
         robot=RobotConfig(name="servo_pendulum"), engine=EngineConfig("mujoco"), evaluator=EvaluatorConfig("serial")
     )
+    (tmp_path / "tried").mkdir()
     options = trial.Options(excitations=PLAN, repeats=1, noise=0.002, motor_torque=True)
     with contextlib.redirect_stdout(io.StringIO()):
         trial.run(replace(config, hidden=FRICTION), options, tmp_path / "tried")
@@ -174,3 +179,16 @@ def test_what_explain_refuses_is_refused_when_it_is_added(tmp_path):
     assert [e.on for e in bench.bench.entries] == [True, False] and bench.notice.startswith("Refused: parallel spring")
     assert bench.bench.ladder[-1].refused == found.steps[-1].refused
     bench.close()
+
+
+def test_an_effect_that_is_on_the_bench_is_judged_beside_the_model_without_it(session, monkeypatch):
+    asked = []
+    monkeypatch.setattr(session.worker, "start", asked.append)
+    session.add(FRICTION, {"torque_nm": 0.09})
+    session.start(verbs.ADD, FRICTION)
+    assert asked[0].config.model is None and not asked[0].own
+    fitted = term("coulomb_friction", "servo", torque_nm=0.135)
+    step = Step("coulomb friction at servo", 0.9, 0.9, "windows")
+    session.switch(0, False)
+    session._after(asked[0], Ended(Improved("", (), (fitted,), (), (step,), session.folder)))
+    assert [(e.on, dict(e.term.values)) for e in session.bench.entries] == [(True, {"torque_nm": 0.135})]

@@ -10,6 +10,7 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import driver_of
 from ee_dist.effects.catalogue import apply
 from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.model import Robot
@@ -57,7 +58,7 @@ def written(log: Log, path: Path) -> None:
     hidden = hypothesis(log.effect, robot, np.random.SeedSequence(0))
     changed = apply(robot, hidden)
     plan = [parse(text) for text in log.plan]
-    drivers = [driver_of(e, robot) for e in plan]
+    drivers = [d for e in plan if isinstance(d := driver_of(e, robot), Commands)]  # none of them walks by a network
     asked = [
         Rollout(changed, d, e.steps(robot), seed=k, pose=True)
         for k, (e, d) in enumerate(zip(plan, drivers, strict=True))
