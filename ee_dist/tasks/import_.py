@@ -110,7 +110,7 @@ def hints_of(options: Options) -> Hints:
         for g in _listed(options.gains):
             if isinstance(g, bool) or not isinstance(g, (int, float)) or not math.isfinite(g) or g == 0:
                 raise ConfigError(
-                    f"task.gains: expected numbers in N.m per A, none of them 0, or '{FIT}', not {quoted(g)}"
+                    f"task.gains: expected numbers in N.m per A, none of them 0, not {quoted(g)}; or task.gains={FIT}"
                 )
             gains.append(float(g))
     if options.unit is not None:
