@@ -255,7 +255,7 @@ def term(effect_name: str, target: str = "", **values: float) -> Term:
     entry = find(effect_name)
     for key, value in values.items():
         p = entry.parameter(key)
-        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= sys.float_info.max:
             raise EffectError(f"{effect_name}: {key} must be a number ({p.unit}), not {quoted(value)}")
         if not p.lower <= value <= p.upper:
             raise EffectError(f"{effect_name}: {key} = {value:g} lies outside [{p.lower:g}, {p.upper:g}] {p.unit}")

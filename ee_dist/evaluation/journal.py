@@ -57,7 +57,13 @@ class Journal:
         if len(head) < _HEAD.size:
             return None
         key, dimensions, rows, columns = _HEAD.unpack(head)
-        if not -1 <= dimensions <= 2 or rows * columns > LARGEST:
+        scalar, flat = dimensions == -1, dimensions < 2
+        if (
+            dimensions not in (-1, 1, 2)
+            or not 0 < rows * columns <= LARGEST
+            or (flat and columns > 1)
+            or (scalar and rows > 1)
+        ):
             return None
         content = self._file.read(8 * rows * columns)
         told = self._file.read(_CRC.size)

@@ -19,6 +19,8 @@ from ee_dist.basics.plain_yaml import load_yaml
 LARGEST = 4 * 2**20
 """Bytes of a description, a model or a mapping; ours have a few thousand."""
 DEEPEST = 64
+LONGEST_INTEGER = 1000
+"""Bits; with a few more it is no floating-point number any more, and arithmetic fails on it."""
 MOST = 500_000
 """Values in one file, those counted again that YAML names more than once."""
 
@@ -94,7 +96,7 @@ def json_of(text: str | bytes) -> Any:
 
 
 def bounded(data: Any) -> Any:
-    """The data, if it is neither too deep nor too much. Raises UntrustedError."""
+    """The data, if it is neither too deep nor too much, nor any of its numbers too long. Raises UntrustedError."""
     left, count = [(data, 0)], 0
     while left:
         item, depth = left.pop()
@@ -107,4 +109,6 @@ def bounded(data: Any) -> Any:
             left += [(v, depth + 1) for v in item.values()]
         elif isinstance(item, (list, tuple, set)):
             left += [(v, depth + 1) for v in item]
+        elif isinstance(item, int) and item.bit_length() > LONGEST_INTEGER:
+            raise UntrustedError(f"a whole number of some {item.bit_length() * 3 // 10} digits")
     return data

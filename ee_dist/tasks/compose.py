@@ -42,6 +42,7 @@ _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench
 """Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
 _SWEEP = ("-m", "--multirun")
 _RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
+_NO_CHOICE = re.compile(r"^\+{0,2}(\w+)=(true|false|nan|[-+]?inf|[-+]?[0-9][0-9_.eE+-]*)$", re.IGNORECASE)
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
 
 
@@ -74,10 +75,20 @@ def check_flags(arguments: list[str]) -> None:
     for setting in parser.parse_args(arguments).overrides:
         if not setting.lstrip("+~").partition("=")[0].strip():
             raise ConfigError(f"{setting}: which setting? they are written key=value, and --help lists them")
+        _check_choice(setting)
         if re.match(r"\+{0,2}resume=$", setting):
             raise ConfigError(
                 "resume=: which folder? name that of a run that was stopped, such as resume=logs/recover/..."
             )
+
+
+def _check_choice(setting: str) -> None:
+    """Raises ConfigError for a number or the like where a group takes a name: Hydra itself fails on it."""
+    match = _NO_CHOICE.match(setting)
+    folder = config_folder() / match.group(1) if match else None
+    if match and folder is not None and folder.is_dir():
+        names = ", ".join(sorted(p.stem for p in folder.glob("*.yaml")))
+        raise ConfigError(f"{match.group(1)}={match.group(2)}: no such choice; there are: {names}")
 
 
 def check_used(overrides: list[str], task: str) -> None:

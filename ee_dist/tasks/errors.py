@@ -26,6 +26,14 @@ __all__ = ("USER_ERRORS", "RayLostError", "abandon_evaluators", "defect", "hydra
 
 _LONGEST = 300
 """Characters of an error that nobody foresaw: some libraries put whole arrays into theirs."""
+_FILES = {
+    ".urdf": "robot=urdf robot.urdf={}",
+    ".xml": "robot=mjcf robot.file={}",
+    ".mjcf": "robot=mjcf robot.file={}",
+    ".yaml": "robot=urdf robot.drives={}",
+    ".yml": "robot=urdf robot.drives={}",
+}
+"""How a robot's file is named, by its suffix: ``robot=`` itself takes a choice."""
 USER_ERRORS = (
     ConfigError,
     DriverError,
@@ -91,6 +99,13 @@ def hydra_message(error: HydraException) -> str:
     twice = re.match(r"Multiple values for (\S+)\. ", text)
     if twice:
         return f"{twice.group(1)}: given more than once; name one, or several with -m: -m +{twice.group(1)}=1,2"
+    several = re.match(r"(?:Ambiguous value for argument|Sweep parameters) '(.*?)'(?:\n| requires|$)", text)
+    if several:
+        key, _, values = several.group(1).partition("=")
+        return (
+            f"{quoted(several.group(1))}: several values for one run; a list stands in brackets, {key}=[{values[:80]}]; "
+            "for a run with each of them add -m"
+        )
     missing = re.match(
         r"(?s)(?:In '.*?': )?Could not find '([^']+)'\s*Available options in '([^']+)':\s*(.*?)(?:\nConfig search path|$)",
         text,
@@ -98,7 +113,9 @@ def hydra_message(error: HydraException) -> str:
     if missing:
         wanted, group, options = missing.groups()
         names = sorted(options.split(), key=lambda n: (0, int(n), "") if n.isdigit() else (1, 0, n))
-        return f"{group}={wanted.split('/')[-1]}: no such choice; there are: {', '.join(names)}"
+        file = _FILES.get(Path(wanted).suffix.lower(), "") if group == "robot" else ""
+        hint = f"; a file is named by {file.format(wanted.removeprefix('robot/'))}" if file else ""
+        return f"{group}={wanted.removeprefix(f'{group}/')}: no such choice; there are: {', '.join(names)}{hint}"
     absent = re.match(r"Could not override '([^']+)'", text)
     if absent:
         return _absent(absent.group(1))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from ee_dist.recording.records import HARDWARE, RunRecord
 from ee_dist.robots.agree import agreed, changed_sources, differences
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
-from ee_dist.robots.untrusted import yaml_of
+from ee_dist.robots.untrusted import json_of, yaml_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import LogError, SensorLog
@@ -62,7 +61,7 @@ def load(config: Config) -> Measurements:
         found = [t for t in run.trials if t.source == HARDWARE]
         if not found:
             raise LogError(f"{file}: no hardware trial in it; expected a log of task=trial or task=import")
-        held = [setup_of(Excitation(**e)) for e in json.loads(run.metadata.get("trials", "[]"))]
+        held = _held(file, run)
         for t in found:
             # What an import says about a trial (a gain, a payload) comes on top of how it was held.
             setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
@@ -93,6 +92,16 @@ def load(config: Config) -> Measurements:
     )
 
 
+def _held(file: Path, run: RunRecord) -> list[Any]:
+    """How the robot was held in each trial, where the log tells it. Raises LogError for what task=trial does not write."""
+    try:
+        return [setup_of(Excitation(**e)) for e in json_of(run.metadata.get("trials", "[]"))]
+    except (TypeError, ValueError) as error:
+        raise LogError(
+            f"{file}: what it says of its trials is damaged ({str(error)[:80]}); make the trials again"
+        ) from None
+
+
 def files_of(measured: Any) -> list[Path]:
     """The recordings that ``measured`` names: one, several, or all in a folder. Raises ConfigError."""
     if not measured:
@@ -111,9 +120,17 @@ def files_of(measured: Any) -> list[Path]:
             near = nearest(path.name, [p.name for p in path.parent.glob("*.mcap")], cutoff=0.3)
             hint = f"; did you mean {' or '.join(near)}?" if near else ""
             raise ConfigError(f"measured={path}: no such file{hint}")
+        elif path.suffix.lower() != ".mcap" and _of_others(path):
+            raise ConfigError(f"measured={path}: not a recording; bring it in first: task=import measured={path}")
         else:
             found.append(path)
     return found
+
+
+def _of_others(path: Path) -> bool:
+    from ee_dist.measurements.readers import FORMATS  # slow to load, and only this mistake needs it
+
+    return path.suffix.lower() in FORMATS
 
 
 def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:

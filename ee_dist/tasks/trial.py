@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ee_dist.basics.files import write_whole
+from ee_dist.basics.names import listed
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.measured_trial import driver_of
 from ee_dist.discrepancy.search.candidates import candidate
@@ -163,8 +164,10 @@ def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypoth
 
 
 def _by_name(robot: Robot, text: str) -> Term:
-    name, _, target = text.strip().partition("@")
+    name, at, target = text.strip().partition("@")
     targets = find(name).targets(robot)
+    if at and not target and targets:
+        raise EffectError(f"hidden={text}: where? it can act on: {listed(targets)}")
     if not targets:
         raise EffectError(f"{name} cannot act on {robot.name}: it has no place for it")
     chosen = candidate(robot, name, target or targets[0])

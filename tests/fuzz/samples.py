@@ -8,7 +8,7 @@ import socket
 import sys
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -185,13 +185,15 @@ def command_line(path: Path) -> None:
             one_job.forget()
 
 
-def _config(**changes: Any) -> Config:
+@functools.cache
+def _settings() -> Config:
     composed = one_job.without_hydra(one_job.prepared(["task=compare"]))
     one_job.forget()
-    config = compose.settings(composed)[0]
-    for name, value in changes.items():
-        setattr(config, name, value)
-    return config
+    return compose.settings(composed)[0]
+
+
+def _config(**changes: Any) -> Config:
+    return replace(_settings(), **changes)
 
 
 # -- the files ---------------------------------------------------------------------------------------------------------

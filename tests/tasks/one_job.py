@@ -52,6 +52,7 @@ def prepared(arguments: list[str]) -> DictConfig:
     """What Hydra composes of a command line. Raises ConfigError and HydraException."""
     check_flags(arguments)
     overrides = OverridesParser.create().parse_overrides(arguments)
+    ConfigLoaderImpl.validate_sweep_overrides_legal(overrides, RunMode.RUN, from_shell=True)
     chosen = [o.input_line for o in overrides if o.key_or_group in GROUPS and not isinstance(o.value(), dict)]
     settings = copy.deepcopy(composed(tuple(chosen)))
     rest = [o for o in overrides if o.input_line not in chosen]

@@ -138,3 +138,21 @@ def test_a_lost_ray_is_one_line(tmp_path, victim):
     assert "kept in out: recovery.mcap.part" in line
     time.sleep(2.0)
     assert not relatives(tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("victim", "number"), [("gcs_server", signal.SIGTERM), ("raylet", signal.SIGKILL)])
+def test_a_ray_lost_while_it_starts_is_one_line_and_the_command_may_be_given_again(tmp_path, victim, number):
+    with started(tmp_path, "evaluator=ray") as process:
+        while victim not in relatives(tmp_path).values():
+            time.sleep(0.05)
+        (pid,) = [pid for pid, name in relatives(tmp_path).items() if name == victim]
+        os.kill(pid, number)
+        _, err = process.communicate(timeout=120)
+    assert process.returncode == 2
+    (line,) = err.strip().splitlines()
+    assert line.startswith("ee_dist: Ray ")
+    assert "nothing was recorded yet" in line or "resume=out" in line
+    assert "resume=out" in line or not (tmp_path / "out").exists()
+    time.sleep(2.0)
+    assert not relatives(tmp_path)
