@@ -79,8 +79,7 @@ def improve(
             last = _examined(search, current, [c for c in pool if c.name not in names], effort)
             best = last.best
             if len(current.parts) != looked and _many(search, last, len(current.parts) - own, spread):
-                cuts = travelling(problem) or [windows(problem)]
-                found = everywhere(search, current, own, pool, cuts)
+                found = everywhere(search, current, own, pool, travelling(problem))
                 looked = len(current.parts)
                 if found is not None:
                     current, looked, spread = found.current, len(found.current.parts), True
@@ -127,7 +126,8 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
     """Whether much is left although the search had its chance with few effects; or, where it is known to be ``spread`` over
     many places, anything when no single one is left that stands out."""
     best = found.best
-    if sticky(search) or (best is not None and added < FEW):
+    # Windows of a single motion say nothing about so many values.
+    if sticky(search) or not travelling(search.problem) or (best is not None and added < FEW):
         return False
     energy = float((found.base**2).sum()) if best is None else float(best.held.sum())
     enough = NEAR if spread and best is None else FAR

@@ -1,4 +1,4 @@
-"""task=workbench: a page to compare, explain, add and watch the error fall; log=RUN follows a run, log=SESSION goes on."""
+"""task=workbench: a page to compare, explain, add and watch the error fall; it follows a run (log=RUN), and goes on with a session."""
 
 from __future__ import annotations
 
