@@ -1,4 +1,4 @@
-"""task=workbench: a page to compare, explain, add and watch the error fall; it follows a run (log=RUN), and goes on with a session."""
+"""task=workbench: a page to compare, explain, add and watch the error fall, or to follow a run, or to go on with either."""
 
 from __future__ import annotations
 

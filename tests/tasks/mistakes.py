@@ -273,7 +273,10 @@ LOGS: Rows = (
     ("task=compare", "measured=: which log? name an .mcap, several as"),
     ("task=compare measured=3", "measured=3: no such file"),
     ("task=compare measured=trial.mcap task.by=free", "did you mean free_run or force_balance?"),
-    ("task=compare measured=trial.mcap robot=quadruped", "it is for task=recover, task=online, task=trial, task=import and"),
+    (
+        "task=compare measured=trial.mcap robot=quadruped",
+        "it is for task=recover, task=online, task=trial, task=import and",
+    ),
     (
         "task=compare measured=trial.mcap task.by=force_balance",
         "the log of servo_pendulum has no torques of the drives: a",
