@@ -15,7 +15,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -30,8 +30,9 @@ from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
-from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.effects.groups import members_of
@@ -46,6 +47,7 @@ from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.noise import with_noise
 
 ARM = "desk_arm_6"
+WAYS: dict[str, Callable[..., Problem]] = {"open_loop": OpenLoop, "free_run": FreeRun}
 SIZES = {"small": 0.25, "middle": 0.5, "large": 1.0}
 """Shares of the large draws: friction of 3 to 11 % of a drive's torque limit, masses off by up to 20 %, offsets of 20 mrad,
 gains off by up to 10 %, delays of up to 10 ms."""
@@ -125,8 +127,8 @@ class Bench:
             out.append(MeasuredTrial(f"{k} {record.name}", record.log, record.driver, held))
         return tuple(out)
 
-    def problem(self, trials: Sequence[MeasuredTrial]) -> OpenLoop:
-        return OpenLoop(trials, self.robot, evaluator_of(self.config))
+    def problem(self, trials: Sequence[MeasuredTrial]) -> Problem:
+        return WAYS[self.args.by](trials, self.robot, evaluator_of(self.config))
 
     def case(self, index: int) -> Case:
         rng = np.random.default_rng([self.args.seed, index])
@@ -228,6 +230,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--size", choices=tuple(SIZES), default="middle")
     parser.add_argument("--robot", default="servo_pendulum", help=f"by name or file; {ARM} is built in here")
+    parser.add_argument("--by", choices=tuple(WAYS), default="open_loop")
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", type=float, default=0.001, help="share of each channel's range")

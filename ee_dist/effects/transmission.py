@@ -119,7 +119,6 @@ def _offsets(robot: Robot, target: str) -> dict[str, Range]:
     signature="Residual torque is the same at every position, speed and direction.",
     reference="Janot, Gautier and Brunot 2019, Data set and reference models of EMPS",
     ranges=_offsets,
-    everywhere=True,
 )
 def offset_torque(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, offset_torque=d.offset_torque + values["torque_nm"]))
