@@ -74,8 +74,8 @@ def motions(robot: Robot, seconds: float) -> Motions:
     return Motions(fitted, held)
 
 
-def mess(robot: Robot, size: float, rng: np.random.Generator) -> dict[str, list[Term]]:
-    """What is wrong by joint (and, under "", at the parts)."""
+def mess(robot: Robot, size: float, rng: np.random.Generator, beyond: bool) -> dict[str, list[Term]]:
+    """What is wrong by joint (and, under "", at the parts); ``beyond``: also with what the search does not ask everywhere."""
     found: dict[str, list[Term]] = {"": []}
     for drive in robot.drives:
         limit = drive.torque_limit if np.isfinite(drive.torque_limit) else 1.0
@@ -86,6 +86,18 @@ def mess(robot: Robot, size: float, rng: np.random.Generator) -> dict[str, list[
             term("command_gain", drive.joint, change=size * float(rng.uniform(-0.1, 0.1))),
             term("command_delay", drive.joint, delay_s=size * float(rng.uniform(0.0, 0.01))),
         ]
+        if beyond:
+            found[drive.joint] += [
+                term("backlash", drive.joint, gap_rad=size * float(rng.uniform(0.0, 0.015))),
+                term("deadband", drive.joint, half_width_rad=size * float(rng.uniform(0.0, 0.006))),
+                term("load_friction", drive.joint, share=size * float(rng.uniform(0.0, 0.15))),
+                term(
+                    "stribeck_friction",
+                    drive.joint,
+                    torque_nm=size * limit * float(rng.uniform(0.0, 0.03)),
+                    speed_rad_s=0.2,
+                ),
+            ]
     for part in robot.parts[0 if robot.free_base else 1 :]:
         found[""].append(term("part_mass", part.name, change=size * float(rng.uniform(-0.2, 0.2))))
     return found
@@ -134,7 +146,7 @@ class Bench:
         rng = np.random.default_rng([self.args.seed, index])
         began = time.monotonic()
         close_evaluators()
-        wrong = mess(self.robot, self.size, rng)
+        wrong = mess(self.robot, self.size, rng, self.args.beyond)
         everywhere = tuple(t for terms in wrong.values() for t in terms)
         hidden: Hypothesis = ()
         if (index + 1) % 4:
@@ -232,6 +244,9 @@ def main() -> int:
     parser.add_argument("--robot", default="servo_pendulum", help=f"by name or file; {ARM} is built in here")
     parser.add_argument("--by", choices=tuple(WAYS), default="open_loop")
     parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument(
+        "--beyond", action="store_true", help="backlash, deadband, friction by load and Stribeck at every joint too"
+    )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", type=float, default=0.001, help="share of each channel's range")
     parser.add_argument("--seconds", type=float, default=4.0, help="length of a trial")

@@ -6,17 +6,17 @@ them where twenty small ones would be right, and is caught there. This goes the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, Cut, cross_fit
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
 from ee_dist.discrepancy.examine import Current, calm_trials
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment
+from ee_dist.discrepancy.pruning import pruned
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.refit import Refit
@@ -32,14 +32,11 @@ TWIN = 0.99
 """Correlation of two effects' marks from which the data cannot hold them apart, and the one later in the catalogue stays out."""
 FEWEST = 3
 """Effects that must be there to be fitted at once."""
-WIDTHS = (0.12, 0.3)
-"""Finite differences to begin with: each leads down another side of a ridge, and which is right shows at the end."""
+WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
+"""Finite differences to begin with: each leads down another side of a ridge, and which is right shows at the end. More of them
+where it costs little, for fewer than MANY values."""
 FEWEST_TRIED, MOST_TRIED, VALUES_TRIED = 3, 12, 120
 """Effects that are tried one by one beside all that may be a little wrong, as far as ``VALUES_TRIED`` values in sum allow."""
-AGAIN = 0.03
-"""The same where the values are nearly right already."""
-ROUNDS = 3
-"""How often terms are left out and the rest is fitted anew."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +59,24 @@ def everywhere(
         without = [cross_fit(search, [(model, current.u)], cut)[0].residual for cut in cuts]
     calm = search.among(calm_trials(search.problem, as_it_is))
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
-    found = look.kept(current)
-    if any(not c.effect.everywhere for c in current.parts[own:]):
-        # What was added so far may stand in for what is wrong everywhere: then without it, unless that is worse.
-        places = _places(current.parts)
-        bare = look.kept(Current(current.parts[:own], _values(current.u, places, range(own))))
-        if bare is not None and (found is None or bare.held < found.held + look.luck(bare.held)):
-            found = bare
+    found, places = look.kept(current), Model(current.parts).places
+    for keep in _instead(current, own):
+        other = look.kept(Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep)))
+        if other is not None and (
+            found is None or other.held < found.held + (0.0 if keep[own:] else look.luck(other.held))
+        ):
+            found = other
     return look.steps(found) if found is not None else None
+
+
+def _instead(current: Current, own: int) -> Iterator[list[int]]:
+    """Numbers of the parts to begin with, beside all of them. What was added so far may stand in for what is wrong everywhere:
+    without it; and what was found to be a little wrong everywhere for what was added last: that anew."""
+    special = [k for k, c in enumerate(current.parts) if k >= own and not c.effect.everywhere]
+    if special:
+        yield list(range(own))
+        if len(special) < len(current.parts) - own:
+            yield [*range(own), *special]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +117,8 @@ class _Look:
             return None
         model, u = Model((*base.parts, *few)), np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
         everything = self.calm.everything
-        (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=WIDTHS)
+        widths = WIDTHS if len(u) >= MANY else MORE_WIDTHS
+        (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=widths)
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
         return self._worth(fit, {}) or self._beside(model, u, fit)
 
@@ -163,7 +171,7 @@ class _Look:
     def steps(self, found: _Kept) -> Everywhere:
         """One step a kind of effect, those that matter most first; kinds that help only together are one step."""
         search, problem, kept, own = self.search, self.search.problem, found.model, self.own
-        places = _places(kept.parts)
+        places = Model(kept.parts).places
         names = {c.name for c in self.current.parts}
         gone = tuple(c.name for c in self.current.parts[own:] if c.name not in {p.name for p in kept.parts})
         # What the ladder has already is not shown as a step again.
@@ -201,7 +209,7 @@ class _Look:
 
     def _order(self, kept: Current) -> list[str]:
         """Kinds of effect that are new, by what the model would lose without them."""
-        names, places = {c.name for c in self.current.parts}, _places(kept.parts)
+        names, places = {c.name for c in self.current.parts}, Model(kept.parts).places
         new = [k for k, c in enumerate(kept.parts) if k >= self.own and c.name not in names]
         kinds = list(dict.fromkeys(kept.parts[k].effect.name for k in new))
         rests = [[k for k, c in enumerate(kept.parts) if k not in new or c.effect.name != kind] for kind in kinds]
@@ -210,55 +218,6 @@ class _Look:
         )
         costs = [float(r @ r) if np.isfinite(r).all() else np.inf for r in rows]
         return [kinds[i] for i in np.argsort(costs, kind="stable")[::-1]]
-
-
-def pruned(search: Search, fit: Fit, own: int, tried: int, newest: int = 0) -> Current:
-    """The model without the terms whose values these data do not tell from neutral, fitted anew: one after the other the term
-    that would cost least, by its value and what the others can make up for (Wald's test). The first ``own`` and the
-    ``newest`` parts stay."""
-    for _ in range(ROUNDS):
-        keep = _worth(search, fit, own, tried, newest)
-        if len(keep) == len(fit.model.parts):
-            break
-        places = _places(fit.model.parts)
-        model = Model(tuple(fit.model.parts[k] for k in keep))
-        start = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
-        (fit,) = follow_valley(search, [(model, start)], fit.mask, PRIOR, widths=(AGAIN,))
-    return Current(fit.model.parts, fit.u)
-
-
-def _worth(search: Search, fit: Fit, own: int, tried: int, newest: int) -> list[int]:
-    """Numbers of the parts to keep."""
-    problem, places = search.problem, _places(fit.model.parts)
-    count = max(1, int(fit.mask.sum()))
-    floor = float(problem.floor[fit.mask].sum())
-    pieces = PIECES * len(np.unique(problem.segment_of[fit.mask]))
-    # Noise averages out from value to value, what is above it at best from piece to piece.
-    luck = floor / count + max(0.0, fit.energy - floor) / pieces
-    kept = list(range(len(fit.model.parts)))
-    while len(kept) > own:
-        at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
-        normal = fit.slopes[:, at].T @ fit.slopes[:, at] + PRIOR * np.eye(len(at))
-        inverse, u, costs, first = np.linalg.inv(normal), fit.u[at], [], 0
-        for k in kept:
-            size = fit.model.parts[k].size
-            mine = slice(first, first + size)
-            first += size
-            spread = inverse[mine, mine]
-            cost = float(u[mine] @ np.linalg.solve(spread, u[mine])) if size else np.inf
-            stays = k < own or k >= len(fit.model.parts) - newest
-            costs.append(np.inf if stays else cost - luck * least_energy(tried, max(size, 1)))
-        cheapest = int(np.argmin(costs))
-        if costs[cheapest] > 0:
-            break
-        # What the others make up for goes into them, as far as slopes tell.
-        size = fit.model.parts[kept[cheapest]].size
-        first = sum(fit.model.parts[k].size for k in kept[:cheapest])
-        mine = slice(first, first + size)
-        moved = u - inverse[:, mine] @ np.linalg.solve(inverse[mine, mine], u[mine])
-        fit.u[at] = moved
-        kept.pop(cheapest)
-    return kept
 
 
 def _label(parts: Sequence[Candidate]) -> str:
@@ -280,7 +239,7 @@ def _apart(robot: Robot, current: Current, own: int) -> Current:
 
     parts: list[Candidate] = []
     values: list[Array] = []
-    for k, (c, place) in enumerate(zip(current.parts, _places(current.parts), strict=True)):
+    for k, (c, place) in enumerate(zip(current.parts, Model(current.parts).places, strict=True)):
         u = current.u[place]
         if k < own or not c.effect.everywhere or not _group(robot, c):
             parts.append(c)
@@ -303,7 +262,7 @@ def _distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[C
     size = np.linalg.norm(marks, axis=0)
     shows = size > 1e-3 * max(float(size.max(initial=0.0)), 1e-12)
     marks = marks / np.maximum(size, 1e-12)
-    places, kept = _places(model.parts), list(range(len(base.u)))
+    places, kept = Model(model.parts).places, list(range(len(base.u)))
     found = []
     for c, place in zip(few, places[len(base.parts) :], strict=True):
         mine = range(place.start, place.stop)
@@ -312,11 +271,6 @@ def _distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[C
             found.append(c)
             kept += mine
     return found
-
-
-def _places(parts: Sequence[Candidate]) -> list[slice]:
-    edges = np.concatenate([[0], np.cumsum([c.size for c in parts])]).astype(int)
-    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def _values(u: Array, places: Sequence[slice], chosen: Sequence[int]) -> Array:

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
-from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, ranked
+from ee_dist.discrepancy.evidence.judge import NEAR, Judged, judge, least_energy, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
@@ -32,8 +32,6 @@ CALM = 0.8
 """Share of the most predictable trial's trust from which a trial counts as calm."""
 FAR = 2.0
 """Error over the noise floor of the best quick fit from which windows of the same motions need not even be looked at."""
-NEAR = 1.1
-"""Error over the noise floor up to which windows of the same motions are evidence enough: no more than noise is left."""
 WORTH_JUDGING = 0.4
 """Share of what the best quick fit takes off that another must take off to be judged beside it, unless it is among the first
 AT_LEAST."""

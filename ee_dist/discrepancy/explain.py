@@ -20,11 +20,16 @@ from ee_dist.trials.log import Array
 
 EFFECT, NOTHING_MISSING, UNEXPLAINED = "effect", "nothing_missing", "unexplained"
 
+MADE_UP, BETTER_AS_IT_WAS = 1.3, 0.8
+"""Energy of a model as it is over that with its own values fitted anew, from which these may stand in for what is missing; and
+the share of held-out energy at which the model as it was, with one effect on top, explains more than with values fitted anew."""
+
 
 @dataclass(eq=False)
 class Explanation:
     """The outcome. ``baseline_error`` is that of the model as it is; ``refitted_error`` with its own values fitted anew
-    (the same, where it has none or they are known); ``base`` (n,) the residual of the refitted model ``before``."""
+    (the same, where it has none, they are known, or they stayed ``as_it_was``); ``base`` (n,) the residual of the model
+    ``before``, refitted or as it was."""
 
     verdict: str
     baseline_error: float
@@ -34,6 +39,7 @@ class Explanation:
     before: Hypothesis
     fixed: Hypothesis
     examined: Examined
+    as_it_was: bool = False
 
     @property
     def candidates(self) -> list[Judged]:
@@ -76,6 +82,29 @@ def begin(problem: Problem, before: Hypothesis, progress: Progress = quiet) -> t
     return search, Current(parts, fit.u)
 
 
+def as_it_was(
+    search: Search,
+    found: Examined,
+    before: Hypothesis,
+    as_it_is: Array,
+    pool: Sequence[Candidate],
+    effort: Effort,
+) -> Examined | None:
+    """What explains most on top of ``before`` with its values as they were, if that is more than was ``found`` with them
+    fitted anew. A model made on other records may be right, and all that is new one effect, such as a load, for which its
+    values would stand in when fitted to these records, whose residual was ``as_it_is`` (n,)."""
+    if search.fixed or not before or _energy(as_it_is) <= MADE_UP * _energy(found.base):
+        return None
+    kept = examine(search.on(before), Current(), pool, effort)
+    against = _energy(found.base) if found.best is None else float(found.best.held.sum())
+    better = kept.best is not None and float(kept.best.held.sum()) < BETTER_AS_IT_WAS * against
+    return kept if better else None
+
+
+def _energy(residual: Array) -> float:
+    return float(residual @ residual)
+
+
 def explain(
     problem: Problem,
     pool: Sequence[Candidate],
@@ -89,12 +118,15 @@ def explain(
         raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
     search, current = begin(problem, before, progress)
     names = {c.name for c in current.parts}
-    found = examine(search, current, [c for c in pool if c.name not in names], effort)
+    others = [c for c in pool if c.name not in names]
+    found, fixed, model = examine(search, current, others, effort), search.fixed, (*search.fixed, *current.hypothesis)
+    kept = as_it_was(search, found, before, as_it_is, others, effort)
+    if kept is not None:
+        found, fixed, model = kept, before, before
     verdict = EFFECT if found.best is not None else (UNEXPLAINED if found.left else NOTHING_MISSING)
     floor, source = problem.noise_floor()
-    fixed = search.fixed
     return Explanation(
-        verdict, error(as_it_is), error(found.base), floor, source, (*fixed, *current.hypothesis), fixed, found
+        verdict, error(as_it_is), error(found.base), floor, source, model, fixed, found, kept is not None
     )
 
 

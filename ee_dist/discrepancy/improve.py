@@ -8,27 +8,27 @@ dry friction is twice what it should be.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
-from ee_dist.discrepancy.everywhere import everywhere, pruned
-from ee_dist.discrepancy.evidence.holdout import PRIOR, WINDOWS, Cut, HeldOut, cross_fit, travelling, windows
+from ee_dist.discrepancy.everywhere import everywhere
+from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
-from ee_dist.discrepancy.evidence.judge import LUCK, WORTH, Judged, judge, least_energy
+from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, least_energy
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
-from ee_dist.discrepancy.examine import FAR, NEAR, STANDARD_EFFORT, Current, Effort, Examined, examine
-from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, begin
+from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
+from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal
+from ee_dist.discrepancy.pruning import told_only, without_useless
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, values_of
 from ee_dist.discrepancy.search.fit import fit_all, fit_one, sticky
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
 from ee_dist.discrepancy.search.slopes import WIDTHS
-from ee_dist.discrepancy.search.valley import LARGE, follow_valley
+from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
@@ -76,7 +76,12 @@ def improve(
         stopped = f"{most} effects were added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             names = {c.name for c in current.parts}
-            last = _examined(search, current, [c for c in pool if c.name not in names], effort)
+            others = [c for c in pool if c.name not in names]
+            last = _examined(search, current, others, effort)
+            if own and len(current.parts) == own:
+                kept = as_it_was(search, last, before, as_it_is, others, effort)
+                if kept is not None:
+                    last, current = kept, Current(current.parts, values_of(current.parts, before))
             best = last.best
             if len(current.parts) != looked and _many(search, last, len(current.parts) - own, spread):
                 found = everywhere(search, current, own, pool, travelling(problem))
@@ -110,8 +115,14 @@ def improve(
             rung.terms = (*search.fixed, *current.hypothesis)
             rung.added = current.hypothesis[len(current.parts) - len(best.proposal.parts) :]
             rung.alternatives = [(j.proposal, j.own) for j in last.tied[1:] if len(j.proposal.parts) == 1]
-            current, rung.dropped = _pruned(search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool))
+            current, rung.dropped = without_useless(
+                search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool)
+            )
             ladder.append(rung)
+        if spread:
+            current, gone = told_only(search, current, own)
+            if gone:
+                ladder.append(_refitted(search, current, "without what these data do not tell from neutral", gone))
     return _finish(search, current, ladder, as_it_is, stopped, last)
 
 
@@ -144,18 +155,21 @@ def _cut(problem: Problem) -> Cut:
     return next(iter(travelling(problem)), windows(problem))
 
 
-def _refitted(search: Search, current: Current) -> Rung:
+def _refitted(
+    search: Search, current: Current, name: str = "its own values fitted anew", dropped: tuple[str, ...] = ()
+) -> Rung:
     cut = _cut(search.problem)
     held = cross_fit(search, [(Model(current.parts), current.u)], cut)[0]
     terms = (*search.fixed, *current.hypothesis)
     return Rung(
-        "its own values fitted anew",
+        name,
         (),
         terms,
         float(np.sqrt(held.seen)),
         error(held.residual),
         per_segment(search.problem, held.residual),
         cut.name,
+        dropped=dropped,
     )
 
 
@@ -195,47 +209,13 @@ def _rung(search: Search, judged: Judged, ties: Sequence[str] = ()) -> Rung:
     )
 
 
-def _pruned(
-    search: Search, current: Current, own: int, added: int, cut: Cut, tried: int
-) -> tuple[Current, tuple[str, ...]]:
-    """The model without the terms that the last ones have made useless: leaving them out costs no more held-out energy
-    than luck, and less than a term must be worth."""
-    old = range(own, len(current.parts) - added)
-    if not old:
-        return current, ()
-    if len(current.u) >= LARGE:
-        (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 1, WIDTHS[-1:])
-        kept = pruned(search, fit, own, tried, added)
-        names = {c.name for c in kept.parts}
-        return kept, tuple(c.name for c in current.parts if c.name not in names)
-    problem, places = search.problem, _places(current.parts)
-    models = [(Model(current.parts), current.u)]
-    for k in old:
-        keep = np.delete(np.arange(len(current.u)), places[k])
-        models.append((Model((*current.parts[:k], *current.parts[k + 1 :])), current.u[keep]))
-    whole, *without = cross_fit(search, models, cut)
-    energy = float((whole.residual**2).sum())
-    floor = float(problem.floor.sum())
-    allowed = least_energy(tried) * max(1.0, energy / len(problem.floor))
-    if cut.name != WINDOWS:
-        allowed = max(allowed, 0.5 * WORTH * max(energy - floor, 0.0))
-    costs = [float((h.residual**2).sum()) - energy for h in without]
-    cheapest = int(np.argmin(costs))
-    if costs[cheapest] > allowed * 0.5:
-        return current, ()
-    model, start = models[1 + cheapest]
-    name = current.parts[own + cheapest].name
-    fit = fit_all(search, [(model, start)], None, WIDTHS[2:])[0]
-    return Current(model.parts, fit.u), (name,)
-
-
 def _exchanged(
     search: Search, current: Current, ladder: Sequence[Rung], own: int, pool: Sequence[Candidate], effort: Effort
 ) -> tuple[Current, Rung] | None:
     """The model with one of its effects exchanged for what was tied with it when it was added, if that is better by more
     than luck: by itself, or with what earns its place only beside the other. Two effects that mimic one another decide
     which third one can still be seen."""
-    problem, places = search.problem, _places(current.parts)
+    problem, places = search.problem, Model(current.parts).places
     where = {c.name: k for k, c in enumerate(current.parts) if k >= own}
     options: list[tuple[int, Proposal]] = []
     models = [(Model(current.parts), current.u)]
@@ -275,11 +255,6 @@ def _exchanged(
         )
         return changed, rung
     return None
-
-
-def _places(parts: Sequence[Candidate]) -> list[slice]:
-    edges = np.concatenate([[0], np.cumsum([c.size for c in parts])]).astype(int)
-    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def _finish(

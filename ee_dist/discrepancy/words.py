@@ -189,6 +189,10 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     if found.refitted_error != found.baseline_error:
         lines.append(f"Its own values fitted anew leave {problem.told(found.refitted_error)}.")
         last = found.refitted_error
+    if found.as_it_was:
+        lines.append(
+            "Its own values stay as they were: with the effect on top that explains more than fitting them anew."
+        )
     if found.verdict == NOTHING_MISSING:
         head = "Nothing is missing: no candidate takes more off the residual than luck, and no channel stands out."
         sure = (

@@ -32,6 +32,7 @@ def account(tied: list[str], explained: float = 1.0) -> Account:
         noise_floor=1.0,
         floor_source="told",
         tried=9,
+        as_it_was=False,
     )
     problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="")
     return explain_account(problem, found, None)  # type: ignore[arg-type]

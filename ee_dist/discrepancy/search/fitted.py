@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,6 +26,12 @@ class Model:
     @property
     def upper(self) -> Array:
         return np.concatenate([c.upper for c in self.parts] or [np.zeros(0)])
+
+    @property
+    def places(self) -> list[slice]:
+        """Where the values of each part are."""
+        edges = np.concatenate([[0], np.cumsum([c.size for c in self.parts])]).astype(int)
+        return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 
     def hypothesis(self, u: Array) -> Hypothesis:
         terms, at = [], 0

@@ -1,0 +1,141 @@
+"""Leaving out terms that are of no use, or no longer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, cross_fit
+from ee_dist.discrepancy.evidence.intervals import half_widths
+from ee_dist.discrepancy.evidence.judge import WORTH, least_energy
+from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.fit import fit_all
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.discrepancy.search.valley import LARGE, follow_valley
+
+AGAIN = 0.03
+"""Finite differences where the values are nearly right already."""
+ROUNDS = 3
+"""How often terms are left out and the rest is fitted anew."""
+
+
+def pruned(search: Search, fit: Fit, own: int, tried: int, newest: int = 0) -> Current:
+    """The model without the terms whose values these data do not tell from neutral, fitted anew: one after the other the term
+    that would cost least, by its value and what the others can make up for (Wald's test). The first ``own`` and the
+    ``newest`` parts stay."""
+    for _ in range(ROUNDS):
+        keep = _to_keep(search, fit, own, tried, newest)
+        if len(keep) == len(fit.model.parts):
+            break
+        places = fit.model.places
+        model = Model(tuple(fit.model.parts[k] for k in keep))
+        start = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
+        (fit,) = follow_valley(search, [(model, start)], fit.mask, PRIOR, widths=(AGAIN,))
+    return Current(fit.model.parts, fit.u)
+
+
+def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> list[int]:
+    """Numbers of the parts to keep."""
+    problem, places = search.problem, fit.model.places
+    count = max(1, int(fit.mask.sum()))
+    floor = float(problem.floor[fit.mask].sum())
+    pieces = PIECES * len(np.unique(problem.segment_of[fit.mask]))
+    # Noise averages out from value to value, what is above it at best from piece to piece.
+    luck = floor / count + max(0.0, fit.energy - floor) / pieces
+    kept = list(range(len(fit.model.parts)))
+    while len(kept) > own:
+        at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
+        normal = fit.slopes[:, at].T @ fit.slopes[:, at] + PRIOR * np.eye(len(at))
+        inverse, u, costs, first = np.linalg.inv(normal), fit.u[at], [], 0
+        for k in kept:
+            size = fit.model.parts[k].size
+            mine = slice(first, first + size)
+            first += size
+            spread = inverse[mine, mine]
+            cost = float(u[mine] @ np.linalg.solve(spread, u[mine])) if size else np.inf
+            stays = k < own or k >= len(fit.model.parts) - newest
+            costs.append(np.inf if stays else cost - luck * least_energy(tried, max(size, 1)))
+        cheapest = int(np.argmin(costs))
+        if costs[cheapest] > 0:
+            break
+        # What the others make up for goes into them, as far as slopes tell.
+        size = fit.model.parts[kept[cheapest]].size
+        first = sum(fit.model.parts[k].size for k in kept[:cheapest])
+        mine = slice(first, first + size)
+        moved = u - inverse[:, mine] @ np.linalg.solve(inverse[mine, mine], u[mine])
+        fit.u[at] = moved
+        kept.pop(cheapest)
+    return kept
+
+
+def without_useless(
+    search: Search, current: Current, own: int, added: int, cut: Cut, tried: int
+) -> tuple[Current, tuple[str, ...]]:
+    """The model without the terms that the last ones have made useless: leaving them out costs no more held-out energy
+    than luck, and less than a term must be worth."""
+    old = range(own, len(current.parts) - added)
+    if not old:
+        return current, ()
+    if len(current.u) >= LARGE:
+        return _by_slopes(search, current, own, added, cut, tried)
+    problem, places = search.problem, Model(current.parts).places
+    models = [(Model(current.parts), current.u)]
+    for k in old:
+        keep = np.delete(np.arange(len(current.u)), places[k])
+        models.append((Model((*current.parts[:k], *current.parts[k + 1 :])), current.u[keep]))
+    whole, *without = cross_fit(search, models, cut)
+    energy = float((whole.residual**2).sum())
+    allowed = _allowed(problem, energy, cut, tried)
+    costs = [float((h.residual**2).sum()) - energy for h in without]
+    cheapest = int(np.argmin(costs))
+    if costs[cheapest] > allowed * 0.5:
+        return current, ()
+    model, start = models[1 + cheapest]
+    name = current.parts[own + cheapest].name
+    fit = fit_all(search, [(model, start)], None, WIDTHS[2:])[0]
+    return Current(model.parts, fit.u), (name,)
+
+
+def _by_slopes(
+    search: Search, current: Current, own: int, added: int, cut: Cut, tried: int
+) -> tuple[Current, tuple[str, ...]]:
+    """The same where trying each term by itself would take long: all those that slopes call useless at once, unless held-out
+    data say otherwise."""
+    (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 1, WIDTHS[-1:])
+    kept = pruned(search, fit, own, tried, added)
+    names = {c.name for c in kept.parts}
+    gone = tuple(c.name for c in current.parts if c.name not in names)
+    if gone:
+        models = [(Model(m.parts), m.u) for m in (current, kept)]
+        whole, less = (float((h.residual**2).sum()) for h in cross_fit(search, models, cut))
+        if less - whole > _allowed(search.problem, whole, cut, tried):
+            return Current(fit.model.parts, fit.u), ()
+    return kept, gone
+
+
+def _allowed(problem: Problem, energy: float, cut: Cut, tried: int) -> float:
+    """Held-out energy that leaving a term out may cost."""
+    luck = least_energy(tried) * max(1.0, energy / len(problem.floor))
+    if cut.name == WINDOWS:
+        return luck
+    return max(luck, 0.5 * WORTH * max(energy - float(problem.floor.sum()), 0.0))
+
+
+def told_only(search: Search, current: Current, own: int) -> tuple[Current, tuple[str, ...]]:
+    """The model without the terms whose intervals hold neutral, and their names: one after the other, the least told first, for
+    what one of two alike leaves makes the other plain. The first ``own`` parts stay."""
+    gone: list[str] = []
+    while True:
+        (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 2, (AGAIN,))
+        half, places = half_widths(search.problem, fit), fit.model.places
+        told = [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in places]
+        some = [k for k in range(own, len(told)) if current.parts[k].size]
+        least = min(some, key=lambda k: told[k], default=None)
+        if least is None or told[least] >= 1.0:
+            return Current(fit.model.parts, fit.u), tuple(gone)
+        gone.append(current.parts[least].name)
+        keep = [k for k in range(len(told)) if k != least]
+        values = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
+        current = Current(tuple(current.parts[k] for k in keep), values)
