@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.everywhere import everywhere, pruned
+from ee_dist.discrepancy.everywhere import everywhere
 from ee_dist.discrepancy.evidence.holdout import travelling, windows
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.problem import Layout, Problem, error
+from ee_dist.discrepancy.pruning import pruned, told_only
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
@@ -140,3 +141,14 @@ def test_a_valley_is_followed_within_bounds_and_on_the_trials_asked_for(robot):
     assert fit.residual[~mask].any()
     assert error(fit.residual) < 1.1 * NOISE
     assert fit.energy == pytest.approx(float((fit.residual[mask] ** 2).sum()))
+
+
+def test_what_is_not_told_from_neutral_goes_in_the_end(robot):
+    truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2, "part_mass": 0.15}
+    problem = Curved(robot, truth)
+    parts = tuple(c for c in pool_of(robot) if c.effect.name in PLAIN)
+    start = Current(parts, np.array([truth.get(c.effect.name, 0.001) for c in parts]))
+    kept, gone = told_only(Search(problem), start, 0)
+    assert {c.effect.name for c in kept.parts} == set(truth)
+    assert {n.split("@")[0] for n in gone} == set(PLAIN) - set(truth)
+    assert told_only(Search(problem), start, len(parts))[1] == (), "the model's own terms stay"

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
 from ee_dist.discrepancy.evidence.judge import TOO_LITTLE
-from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED
+from ee_dist.discrepancy.examine import STANDARD_EFFORT
+from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED, NOTHING_LEFT, improve
 from ee_dist.discrepancy.search.candidates import parse
+from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.trials.log import Array
 
@@ -118,3 +122,36 @@ def test_what_was_fitted_to_one_motion_only_does_not_travel() -> None:
     problem.data = problem.data + Linear.shift(problem, HIDDEN[:1])
     found = improve(problem, POOL)
     assert WEAK not in {t.name for t in found.terms}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"), [(WEAK, "loss", False), ("coulomb_friction@knee_front_left", "torque_nm", True)]
+)
+def test_one_motion_is_weak_evidence_for_what_a_robot_in_order_does_not_have(
+    name: str, value: str, expected: bool
+) -> None:
+    # Each takes a fifth of what is above the noise, in every window of the only motion.
+    effect, joint = name.split("@")
+    found = improve(Linear((term(effect, joint, **{value: 0.47}),), extra=4.0), [parse(ROBOT, name)])
+    assert bool(found.terms) is expected
+    assert found.last is not None and (expected or found.last.judged[0].why_not == TOO_LITTLE)
+
+
+@pytest.mark.parametrize(("energy", "better"), [(50.0, True), (190.0, False)])
+def test_a_model_made_elsewhere_may_be_right_as_it_was(
+    monkeypatch: pytest.MonkeyPatch, energy: float, better: bool
+) -> None:
+    before, as_it_is, refitted = HIDDEN[:1], np.full(100, 2.0), np.full(100, 1.5)
+    search, seen = Search(Linear(())), []
+
+    def kept(now: Search, *_: object) -> SimpleNamespace:
+        seen.append(now.fixed)
+        return SimpleNamespace(best=SimpleNamespace(held=np.array([energy])))
+
+    monkeypatch.setattr("ee_dist.discrepancy.explain.examine", kept)
+    found = SimpleNamespace(base=refitted, best=None)
+    asked = as_it_was(search, found, before, as_it_is, POOL, STANDARD_EFFORT)  # type: ignore[arg-type]
+    assert (asked is not None) is better and seen == [before]
+    # Values that come from a calibration stay anyway, and where fitting anew did little there is nothing to choose.
+    assert as_it_was(search.on(before), found, before, as_it_is, POOL, STANDARD_EFFORT) is None  # type: ignore[arg-type]
+    assert as_it_was(search, found, before, refitted, POOL, STANDARD_EFFORT) is None  # type: ignore[arg-type]
