@@ -61,7 +61,8 @@ def everywhere(
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
     found, places = look.kept(current), Model(current.parts).places
     for keep in _instead(current, own):
-        other = look.kept(Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep)))
+        base = Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
+        other = look.kept(base, more=not keep[own:])
         if other is not None and (
             found is None or other.held < found.held + (0.0 if keep[own:] else look.luck(other.held))
         ):
@@ -107,8 +108,9 @@ class _Look:
         problem = self.search.problem
         return least_energy(len(self.pool)) * max(float(problem.floor.mean()), energy / len(problem.floor))
 
-    def kept(self, base: Current) -> _Kept | None:
-        """The base with all that is worth keeping; None where that is not worth more than the current model."""
+    def kept(self, base: Current, more: bool = True) -> _Kept | None:
+        """The base with all that is worth keeping, and (``more``), if need be, one effect beside; None where that is not worth
+        more than the current model."""
         robot = self.search.problem.robot
         base = _apart(robot, base, self.own)
         few = [c for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)]
@@ -120,7 +122,7 @@ class _Look:
         widths = WIDTHS if len(u) >= MANY else MORE_WIDTHS
         (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=widths)
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
-        return self._worth(fit, {}) or self._beside(model, u, fit)
+        return self._worth(fit, {}) or (self._beside(model, u, fit) if more else None)
 
     def _worth(self, fit: Fit, ties: Mapping[str, list[str]]) -> _Kept | None:
         """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data."""

@@ -34,6 +34,8 @@ from ee_dist.trials.log import Array
 
 FEW = 1
 """Effects that the search adds before it looks whether much is a little wrong everywhere, if the next one does not do."""
+OFTEN = 1
+"""How often all that is a little wrong everywhere is fitted anew after that."""
 EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
 MOST = 24
@@ -72,7 +74,7 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             ladder.append(_rung(search, judged))
     else:
-        exchanges, looked, spread = 0, -1, False
+        exchanges, looked, spread = 0, -1, 0
         stopped = f"{most} effects were added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             names = {c.name for c in current.parts}
@@ -83,11 +85,12 @@ def improve(
                 if kept is not None:
                     last, current = kept, Current(current.parts, values_of(current.parts, before))
             best = last.best
-            if len(current.parts) != looked and _many(search, last, len(current.parts) - own, spread):
+            again = len(current.parts) != looked and spread <= OFTEN
+            if again and _many(search, last, len(current.parts) - own, spread > 0):
                 found = everywhere(search, current, own, pool, travelling(problem))
                 looked = len(current.parts)
                 if found is not None:
-                    current, looked, spread = found.current, len(found.current.parts), True
+                    current, looked, spread = found.current, len(found.current.parts), spread + 1
                     ladder += found.rungs
                     continue
             if best is None:
@@ -120,7 +123,7 @@ def improve(
             )
             ladder.append(rung)
         if spread:
-            current, gone = told_only(search, current, own)
+            current, gone = told_only(search, current, own, _cut(problem), len(pool))
             if gone:
                 ladder.append(_refitted(search, current, "without what these data do not tell from neutral", gone))
     return _finish(search, current, ladder, as_it_is, stopped, last)

@@ -107,12 +107,17 @@ def _by_slopes(
     kept = pruned(search, fit, own, tried, added)
     names = {c.name for c in kept.parts}
     gone = tuple(c.name for c in current.parts if c.name not in names)
-    if gone:
-        models = [(Model(m.parts), m.u) for m in (current, kept)]
-        whole, less = (float((h.residual**2).sum()) for h in cross_fit(search, models, cut))
-        if less - whole > _allowed(search.problem, whole, cut, tried):
-            return Current(fit.model.parts, fit.u), ()
+    if gone and not _as_good(search, current, kept, cut, tried):
+        return Current(fit.model.parts, fit.u), ()
     return kept, gone
+
+
+def _as_good(search: Search, whole: Current, less: Current, cut: Cut, tried: int) -> bool:
+    """Whether held-out data do without what one of two models has not."""
+    a, b = (
+        float((h.residual**2).sum()) for h in cross_fit(search, [(Model(m.parts), m.u) for m in (whole, less)], cut)
+    )
+    return b - a <= _allowed(search.problem, a, cut, tried)
 
 
 def _allowed(problem: Problem, energy: float, cut: Cut, tried: int) -> float:
@@ -123,19 +128,25 @@ def _allowed(problem: Problem, energy: float, cut: Cut, tried: int) -> float:
     return max(luck, 0.5 * WORTH * max(energy - float(problem.floor.sum()), 0.0))
 
 
-def told_only(search: Search, current: Current, own: int) -> tuple[Current, tuple[str, ...]]:
+def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int) -> tuple[Current, tuple[str, ...]]:
     """The model without the terms whose intervals hold neutral, and their names: one after the other, the least told first, for
-    what one of two alike leaves makes the other plain. The first ``own`` parts stay."""
+    what one of two alike leaves makes the other plain; as many of them as held-out data allow. The first ``own`` parts stay."""
     gone: list[str] = []
+    models: list[Current] = []
     while True:
         (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 2, (AGAIN,))
+        models.append(Current(fit.model.parts, fit.u))
         half, places = half_widths(search.problem, fit), fit.model.places
         told = [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in places]
         some = [k for k in range(own, len(told)) if current.parts[k].size]
         least = min(some, key=lambda k: told[k], default=None)
         if least is None or told[least] >= 1.0:
-            return Current(fit.model.parts, fit.u), tuple(gone)
+            break
         gone.append(current.parts[least].name)
         keep = [k for k in range(len(told)) if k != least]
         values = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
         current = Current(tuple(current.parts[k] for k in keep), values)
+    # Slopes of a rugged error may mislead.
+    while gone and not _as_good(search, models[0], models[len(gone)], cut, tried):
+        gone = gone[: len(gone) // 2]
+    return models[len(gone)], tuple(gone)

@@ -148,7 +148,9 @@ def test_what_is_not_told_from_neutral_goes_in_the_end(robot):
     problem = Curved(robot, truth)
     parts = tuple(c for c in pool_of(robot) if c.effect.name in PLAIN)
     start = Current(parts, np.array([truth.get(c.effect.name, 0.001) for c in parts]))
-    kept, gone = told_only(Search(problem), start, 0)
+    kept, gone = told_only(Search(problem), start, 0, travelling(problem)[0], 20)
     assert {c.effect.name for c in kept.parts} == set(truth)
     assert {n.split("@")[0] for n in gone} == set(PLAIN) - set(truth)
-    assert told_only(Search(problem), start, len(parts))[1] == (), "the model's own terms stay"
+    assert told_only(Search(problem), start, len(parts), travelling(problem)[0], 20)[1] == (), (
+        "the model's own terms stay"
+    )
