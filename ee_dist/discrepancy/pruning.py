@@ -44,30 +44,41 @@ def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> lis
     pieces = PIECES * len(np.unique(problem.segment_of[fit.mask]))
     # Noise averages out from value to value, what is above it at best from piece to piece.
     luck = floor / count + max(0.0, fit.energy - floor) / pieces
-    kept = list(range(len(fit.model.parts)))
-    while len(kept) > own:
+    kept, units = list(range(len(fit.model.parts))), _units(fit.model, own, len(fit.model.parts) - newest)
+    while units:
         at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
         normal = fit.slopes[:, at].T @ fit.slopes[:, at] + PRIOR * np.eye(len(at))
-        inverse, u, costs, first = np.linalg.inv(normal), fit.u[at], [], 0
-        for k in kept:
-            size = fit.model.parts[k].size
-            mine = slice(first, first + size)
-            first += size
-            spread = inverse[mine, mine]
-            cost = float(u[mine] @ np.linalg.solve(spread, u[mine])) if size else np.inf
-            stays = k < own or k >= len(fit.model.parts) - newest
-            costs.append(np.inf if stays else cost - luck * least_energy(tried, max(size, 1)))
+        inverse, u = np.linalg.inv(normal), fit.u[at]
+        where = [
+            np.flatnonzero(np.isin(at, np.concatenate([np.arange(len(fit.u))[places[k]] for k in m]))) for m in units
+        ]
+        costs = [
+            float(u[mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine]))
+            - luck * least_energy(tried, len(mine))
+            for mine in where
+        ]
         cheapest = int(np.argmin(costs))
         if costs[cheapest] > 0:
             break
         # What the others make up for goes into them, as far as slopes tell.
-        size = fit.model.parts[kept[cheapest]].size
-        first = sum(fit.model.parts[k].size for k in kept[:cheapest])
-        mine = slice(first, first + size)
-        moved = u - inverse[:, mine] @ np.linalg.solve(inverse[mine, mine], u[mine])
-        fit.u[at] = moved
-        kept.pop(cheapest)
+        mine = where[cheapest]
+        fit.u[at] = u - inverse[:, mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine])
+        gone = units.pop(cheapest)
+        kept = [k for k in kept if k not in gone]
     return kept
+
+
+def _units(model: Model, first: int, end: int) -> list[list[int]]:
+    """Numbers of the parts from ``first`` to ``end`` that have values, by what stays or goes together: masses of a body's parts
+    share their marks, and some of them without the others would have to stand in for these."""
+    units: dict[str, list[int]] = {}
+    for k in range(first, end):
+        c = model.parts[k]
+        if c.size:
+            units.setdefault(c.effect.name if c.effect.family == "body" and c.effect.everywhere else c.name, []).append(
+                k
+            )
+    return list(units.values())
 
 
 def without_useless(
@@ -131,22 +142,22 @@ def _allowed(problem: Problem, energy: float, cut: Cut, tried: int) -> float:
 def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int) -> tuple[Current, tuple[str, ...]]:
     """The model without the terms whose intervals hold neutral, and their names: one after the other, the least told first, for
     what one of two alike leaves makes the other plain; as many of them as held-out data allow. The first ``own`` parts stay."""
-    gone: list[str] = []
+    gone: list[tuple[str, ...]] = []
     models: list[Current] = []
     while True:
         (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 2, (AGAIN,))
         models.append(Current(fit.model.parts, fit.u))
         half, places = half_widths(search.problem, fit), fit.model.places
         told = [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in places]
-        some = [k for k in range(own, len(told)) if current.parts[k].size]
-        least = min(some, key=lambda k: told[k], default=None)
-        if least is None or told[least] >= 1.0:
+        units = _units(fit.model, own, len(told))
+        least = min(units, key=lambda unit: max(told[k] for k in unit), default=[])
+        if not least or max(told[k] for k in least) >= 1.0:
             break
-        gone.append(current.parts[least].name)
-        keep = [k for k in range(len(told)) if k != least]
+        gone.append(tuple(current.parts[k].name for k in least))
+        keep = [k for k in range(len(told)) if k not in least]
         values = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
         current = Current(tuple(current.parts[k] for k in keep), values)
     # Slopes of a rugged error may mislead.
     while gone and not _as_good(search, models[0], models[len(gone)], cut, tried):
         gone = gone[: len(gone) // 2]
-    return models[len(gone)], tuple(gone)
+    return models[len(gone)], tuple(name for names in gone for name in names)
