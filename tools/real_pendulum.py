@@ -42,8 +42,6 @@ def run(folder: Path, page: Page) -> None:
     record = read_run(folder / "measured.mcap")
     trials = [MeasuredTrial(t.name, t.log, t.driver) for t in record.trials]
     windows = FreeRun(trials, record.robot, SerialEvaluator(MuJoCoEngine(1), 1024), windows_s=RESTART_S)
-    # Within half a second an error follows a parameter smoothly.
-    windows.rugged = False
     names = (f"free runs of {RESTART_S:g} s, mrad", "balance of forces, %")
     for name, problem in zip(names, (windows, ForceBalance(trials, record.robot)), strict=True):
         _table(name, problem, page)

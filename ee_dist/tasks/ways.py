@@ -10,9 +10,10 @@ import numpy as np
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
-from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.engines.one_joint import fits
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError, one_of
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.wiring import ONE_JOINT, evaluator_of
@@ -42,8 +43,15 @@ def open_loop(measured: Measurements, config: Config) -> OpenLoop:
 
 
 def _free_run(measured: Measurements, config: Config) -> Problem:
+    """On torques alone a simulation drifts away within a second, whatever the model: it is started anew so often."""
     robot = measured.robot
-    return FreeRun(measured.trials, robot, evaluator_of(config, ONE_JOINT if fits(robot) else ""))
+    windows_s = None if _led(robot) else RESTART_S
+    return FreeRun(measured.trials, robot, evaluator_of(config, ONE_JOINT if fits(robot) else ""), windows_s=windows_s)
+
+
+def _led(robot: Robot) -> bool:
+    """Whether controllers hold the joints to what is commanded."""
+    return any(d.command in ("position", "speed") for d in robot.drives)
 
 
 def _force_balance(measured: Measurements, config: Config) -> Problem:
@@ -54,7 +62,7 @@ WAYS: dict[str, Way] = {
     w.name: w
     for w in (
         Way("open_loop", "commands were recorded: every channel is compared on them", open_loop, moves=True),
-        Way("free_run", "joint positions were recorded: whole records are run freely", _free_run),
+        Way("free_run", "joint positions were recorded: the model runs freely from the measured state", _free_run),
         Way(
             "force_balance",
             "torques of the drives were recorded: they are set against what the motion needed, nothing is simulated",
@@ -65,6 +73,10 @@ WAYS: dict[str, Way] = {
 """All ways by name. To add one is to write a ``Problem`` and put it here."""
 
 
+def _seen(robot: Robot) -> bool:
+    return any(s.kind == "position" for s in robot.sensors)
+
+
 def way_of(measured: Measurements, by: str) -> Way:
     """The way asked for; for ``auto`` the first that the channels allow. Raises ConfigError for one that cannot be."""
     one_of("task.by", by, (AUTO, *WAYS))
@@ -73,9 +85,11 @@ def way_of(measured: Measurements, by: str) -> Way:
         torques = all(
             t.log.joints is not None and motor_torques(t.log, measured.robot) is not None for t in measured.trials
         )
-        # On torques alone a simulation drifts away within a second, whatever the model: forces are balanced at each instant.
-        led = any(d.command in ("position", "speed") for d in measured.robot.drives) or measured.robot.free_base
+        led = _led(measured.robot) or measured.robot.free_base
         by = "open_loop" if (driven and led) or not torques else "force_balance"
+        if driven and not led and _seen(measured.robot):
+            # Commanded torques are what went in, and measured ones hardly more than these: the motion is what came of them.
+            by = "free_run"
     way = WAYS[by]
     if measured.robot.free_base and not way.moves:
         raise ConfigError(f"task.by={by}: {measured.robot.name} moves about; use task.by=open_loop")

@@ -45,7 +45,7 @@ class ToPositions:
 
 
 RESTART_S = 0.5
-"""Length of the windows that remarks re-start from the measured state."""
+"""Length of windows that start anew from the measured state."""
 MEAN_ABSOLUTE, MEDIAN_ABSOLUTE = math.sqrt(2 / math.pi), 0.6745
 """Of normal noise with a standard deviation of 1."""
 BLOCKS = 6
@@ -63,8 +63,6 @@ class FreeRun(Problem):
     way = "free_run"
     families = frozenset({"body", "drive", "world"})
     switches = False
-    rugged = True
-    """Errors jump where a joint sticks or slips: fits search rather than follow a slope."""
     natural_name = "mean absolute position error"
 
     def __init__(
@@ -77,6 +75,8 @@ class FreeRun(Problem):
         effort: float = 1.0,
     ) -> None:
         self.effort = effort
+        # Over a whole record errors jump where a joint sticks or slips: fits search rather than follow a slope.
+        self.rugged = windows_s is None
         self.robot, self.measured, self.evaluator, self.every = robot, tuple(trials), evaluator, every
         columns = [k for k, s in enumerate(robot.sensors) if s.kind == "position"]
         if not columns:
