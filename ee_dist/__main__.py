@@ -10,6 +10,7 @@ if __name__ == "__main__":
     leaving.arm(unwinds=False)  # what is imported below takes a second or two, and Ctrl-C may come in it
     beginning.announce(sys.argv[1:], sys.stderr)
 
+import errno
 import multiprocessing
 import os
 from pathlib import Path
@@ -50,6 +51,7 @@ from ee_dist.tasks.help import answer
 from ee_dist.tasks.unfinished import can_go_on, finished, unfinished
 
 MISTAKE, DEFECT = 2, 1
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 STOPPED = 130
 
 
@@ -150,8 +152,9 @@ def _folder(hydra_settings: Any) -> Path:
 
 
 def _unwritten(error: OSError) -> str:
-    where = error.filename or "the output folder"
-    return f"{where}: {error.strerror or error}; choose a folder with hydra.run.dir=FOLDER"
+    where = shown(Path(error.filename)) if error.filename else "the output folder"
+    room = "make room on the disk, or " if error.errno in FULL else ""
+    return f"{where}: {error.strerror or error}; {room}choose a folder with hydra.run.dir=FOLDER"
 
 
 def main() -> int:

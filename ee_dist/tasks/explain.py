@@ -24,7 +24,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_explanation
 from ee_dist.tasks.results.tables import setting, show_account, show_explanation, typed
 from ee_dist.tasks.summary import Stopwatch, write_summary
-from ee_dist.tasks.ways import AUTO, way_of
+from ee_dist.tasks.ways import AUTO, known_way, way_of
 from ee_dist.tasks.wiring import evaluator_of
 from ee_dist.viewing.report import write_page
 
@@ -39,6 +39,9 @@ class Options:
     without: list[str] = field(default_factory=list)
     only: list[str] = field(default_factory=list)
     rerun: bool = True
+
+    def __post_init__(self) -> None:
+        known_way(self.by)
 
 
 def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> tuple[Problem, Explanation, Account]:

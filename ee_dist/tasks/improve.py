@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 from rich.console import Console
 
+from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve
 from ee_dist.discrepancy.ladder import Improvement
@@ -32,7 +33,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_improvement
 from ee_dist.tasks.results.tables import setting, show_account, show_candidates, show_ladder
 from ee_dist.tasks.summary import Stopwatch, write_summary
-from ee_dist.tasks.ways import AUTO, open_loop, way_of
+from ee_dist.tasks.ways import AUTO, known_way, open_loop, way_of
 from ee_dist.viewing.report import write_page
 
 
@@ -47,6 +48,7 @@ class Options:
     rerun: bool = True
 
     def __post_init__(self) -> None:
+        known_way(self.by)
         if self.most < 1:
             raise ConfigError(f"task.most={self.most}: must be 1 or more")
 
@@ -79,10 +81,10 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     out.mkdir(parents=True, exist_ok=True)
     write_model(path, measured.source, measured.folder, found.terms, account.words)
     if calibration is not None:
-        path.with_suffix(".calibration.yaml").write_text(
+        write_whole(
+            path.with_suffix(".calibration.yaml"),
             "# What the model beside this file leaves on an untouched robot, and the energy that the most promising effect\n"
             "# takes off it.\n" + yaml.safe_dump(calibration, sort_keys=False),
-            encoding="utf-8",
         )
     digest = hashlib.sha256(repr([(r.terms, r.error_heldout) for r in found.ladder]).encode()).hexdigest()
     write_summary(out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path)))

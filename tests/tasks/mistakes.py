@@ -272,6 +272,8 @@ LOGS: Rows = (
     ("task=compare measured=/dev/zero", "name a recording (.mcap)"),
     ("task=compare", "measured=: which log? name an .mcap, several as"),
     ("task=compare measured=3", "measured=3: no such file"),
+    ("task=compare measured=trial.mcap task.by=openloop", "did you mean open_loop?"),
+    ("task=improve measured=nowhere.mcap task.by=openloop", "did you mean open_loop?"),
     ("task=compare measured=trial.mcap task.by=free", "did you mean free_run or force_balance?"),
     (
         "task=compare measured=trial.mcap robot=quadruped",
