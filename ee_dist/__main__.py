@@ -52,7 +52,6 @@ from ee_dist.tasks.unfinished import can_go_on, finished, unfinished
 
 MISTAKE, DEFECT = 2, 1
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-STOPPED = 130
 
 
 def run(composed: DictConfig) -> None:
@@ -94,7 +93,7 @@ def run(composed: DictConfig) -> None:
     except KeyboardInterrupt as stop:
         remove_made()
         if multiprocessing.parent_process() is not None:
-            os._exit(getattr(stop, "status", STOPPED))  # one job of several side by side: the sweep says the line
+            os._exit(leaving.told(stop).status)  # one job of several side by side: the sweep says the line
         _leave(stop, out)
 
 
@@ -121,8 +120,9 @@ def _whole(out: Path) -> Path:
 def _leave(stop: KeyboardInterrupt, out: Path | None = None) -> NoReturn:
     """One line, and the end: 130 after Ctrl-C, 143 where a run was asked to end."""
     abandon_evaluators()
+    left = leaving.told(stop)
     text = _what_is_kept(out) if out else "nothing was begun"
-    leaving.leave(f"stopped ({getattr(stop, 'why', 'Ctrl-C')}); {text}", getattr(stop, "status", STOPPED))
+    leaving.leave(f"stopped ({left.why}); {text}", left.status)
 
 
 def resumed(out: Path, config: Any, options: Any, overwrite: bool) -> bool:

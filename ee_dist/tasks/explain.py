@@ -11,12 +11,12 @@ from rich.console import Console
 from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.words import Account, explain_account
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
+from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
@@ -49,11 +49,12 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     LogError, RecordingError."""
     console, watch, measured = Console(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
+    check(measured.robot, options.without, options.only)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     with SearchProgress(console, told) as progress:
         problem = way.make(measured, config)
-        pool = pool_of(problem, options.without, options.only)
+        pool = chosen(problem, options.without, options.only)
         count = len(measured.trials)
         console.print(
             f"{count} trial{'s' if count > 1 else ''} of {measured.robot.name}, {len(pool)} candidate explanations, "

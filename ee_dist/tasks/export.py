@@ -30,7 +30,7 @@ class Options:
 def run(config: Config, options: Options, out: Path) -> None:
     """Write ``config.model`` in the format ``to``. Raises ConfigError, RobotError, EffectError, EngineError."""
     watch = Stopwatch()
-    to = one_of("to", config.to or options.to, FORMATS)
+    to = one_of("to", options.to if config.to is None else config.to, FORMATS)
     if not config.model:
         raise ConfigError("model=: which model file? one that task=improve wrote, or one with 'robot' and 'effects'")
     found = read_model(config.model)

@@ -55,7 +55,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     EffectError, ConfigError.
     """
     watch, console = Stopwatch(), Console()
-    if Path(options.output).name != options.output or not options.output.endswith(".mcap"):
+    if Path(options.output).name != options.output or Path(options.output).suffix != ".mcap":
         raise ConfigError(
             f"task.output={options.output}: expected the name of a file that ends in .mcap, such as measured.mcap"
         )

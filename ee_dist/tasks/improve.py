@@ -16,7 +16,6 @@ from ee_dist.discrepancy.improve import MOST, improve
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
-from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
@@ -26,6 +25,7 @@ from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.measurements import Measurements, load
+from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
@@ -64,13 +64,14 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
                 f"task.{key}: chooses among what effect=auto may add; effect={config.effect} says it already"
             )
     way = way_of(measured, options.by)
+    check(measured.robot, options.without, options.only)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     if options.calibrate and way.name != OpenLoop.way:
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
     with SearchProgress(console, told) as progress:
         problem = way.make(measured, config)
-        pool = pool_of(problem, options.without, options.only)
+        pool = chosen(problem, options.without, options.only)
         calibration = None
         if options.calibrate:
             found, calibration = calibrated(measured, config, pool, wanted, options.most, progress)

@@ -43,7 +43,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     given = [(kind, path) for kind, path in (("urdf", config.urdf), ("mjcf", config.mjcf)) if path]
     if len(given) != 1:
         raise ConfigError("task=robot looks at one file: urdf=FILE.urdf or mjcf=FILE.xml")
-    if Path(options.output).name != options.output or not options.output.endswith(".yaml"):
+    if Path(options.output).name != options.output or Path(options.output).suffix != ".yaml":
         raise ConfigError(f"task.output={options.output}: expected the name of a file that ends in .yaml")
     kind, path = given[0][0], Path(given[0][1])
     if path.is_file() and kind_of(path) != kind:
