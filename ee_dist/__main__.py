@@ -23,7 +23,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.compose import check_flags, check_used, config_folder, handling, plain, quoted, settings
+from ee_dist.tasks.compose import check_flags, check_sweep, check_used, config_folder, handling, plain, quoted, settings
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.errors import (
     USER_ERRORS,
@@ -170,6 +170,7 @@ def main() -> int:
             print(told)
             return 0
         check_flags(sys.argv[1:])
+        check_sweep(sys.argv[1:])
         folder = config_folder()
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()
     except (*USER_ERRORS, Refused) as error:

@@ -9,6 +9,8 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from hydra._internal.utils import get_args_parser
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import ChoiceSweep, RangeSweep
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -51,6 +53,7 @@ USED_BY = {
 _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}
 """Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
 _SWEEP = ("-m", "--multirun")
+MOST_RUNS = 10_000
 _RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
 _NO_CHOICE = re.compile(r"^\+{0,2}(\w+)=(true|false|nan|[-+]?inf|[-+]?[0-9][0-9_.eE+-]*)$", re.IGNORECASE)
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
@@ -96,6 +99,21 @@ def check_flags(arguments: list[str]) -> None:
     folders = [a.partition("=")[2] for a in arguments if re.match(r"\+{0,2}hydra\.(run|sweep)\.dir=", a)]
     if len({*folders}) > 1 and any(_RESUME.match(a) for a in arguments):
         raise ConfigError(f"resume={folders[-1]}: goes on in that folder; leave out the other, {folders[0]}")
+
+
+def check_sweep(arguments: list[str]) -> None:
+    """Raises ConfigError for a sweep of more runs than anybody has time for: Hydra would write all of them down first."""
+    if not any(a in _SWEEP for a in arguments):
+        return
+    runs = 1.0
+    for override in OverridesParser.create().parse_overrides([a for a in arguments if not a.startswith("-")]):
+        value = override.value()
+        if isinstance(value, RangeSweep) and value.start is not None and value.stop is not None and value.step:
+            runs *= max(0.0, (value.stop - value.start) / value.step)
+        elif isinstance(value, ChoiceSweep):
+            runs *= len(value.list)
+    if runs > MOST_RUNS:
+        raise ConfigError(f"-m: a sweep of {runs:.3g} runs; at most {MOST_RUNS} at a time")
 
 
 def _check_choice(setting: str) -> None:

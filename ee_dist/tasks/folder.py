@@ -75,7 +75,7 @@ class NotedFolders(Callback):
 def missing(folder: Path) -> tuple[Path, ...]:
     """The folder and those above it that do not exist."""
     folder = Path(os.path.abspath(folder))
-    return tuple(p for p in (folder, *folder.parents) if not p.exists())
+    return tuple(p for p in (folder, *folder.parents) if not os.path.exists(p))
 
 
 def free_name(folder: Path) -> Path:

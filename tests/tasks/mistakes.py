@@ -484,6 +484,8 @@ WHOLE: Rows = (
     ("+scenario=8 hydra.run.dir=/dev/null/x", "choose a folder with hydra.run.dir=FOLDER"),
     ("-m +scenario=8 hydra.sweep.dir=", "hydra.sweep.dir=: which folder? a run writes into one of its"),
     ("--resume=x", "settings are written key=value, and --help lists them"),
+    ("-m +scenario=8 seed=range(0,100000000)", "a sweep of 1e+08 runs; at most 10000 at a time"),
+    ("-m +scenario=8 seed=range(0,200) noise=range(0,1,0.001)", "a sweep of 2e+05 runs"),
     ("-m +scenario=8 seed=abc,def", "expected a whole number"),
     ("hydra.run.dir=nothing/../.. +scenario=8 seed=x", "expected a whole number"),
     ("task=view log=trial.mcap --config-name=x", "Cannot find primary config 'x'. Check that it's in your config"),
