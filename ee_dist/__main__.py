@@ -10,6 +10,7 @@ if __name__ == "__main__":
     leaving.arm(unwinds=False)  # what is imported below takes a second or two, and Ctrl-C may come in it
     beginning.announce(sys.argv[1:], sys.stderr)
 
+import errno
 import multiprocessing
 import os
 from pathlib import Path
@@ -22,7 +23,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.tasks.compose import check_flags, check_used, config_folder, handling, plain, quoted, settings
+from ee_dist.tasks.compose import check_flags, check_sweep, check_used, config_folder, handling, plain, quoted, settings
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.errors import (
     USER_ERRORS,
@@ -50,7 +51,7 @@ from ee_dist.tasks.help import answer
 from ee_dist.tasks.unfinished import can_go_on, finished, unfinished
 
 MISTAKE, DEFECT = 2, 1
-STOPPED = 130
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def run(composed: DictConfig) -> None:
@@ -92,7 +93,7 @@ def run(composed: DictConfig) -> None:
     except KeyboardInterrupt as stop:
         remove_made()
         if multiprocessing.parent_process() is not None:
-            os._exit(getattr(stop, "status", STOPPED))  # one job of several side by side: the sweep says the line
+            os._exit(leaving.told(stop).status)  # one job of several side by side: the sweep says the line
         _leave(stop, out)
 
 
@@ -119,8 +120,9 @@ def _whole(out: Path) -> Path:
 def _leave(stop: KeyboardInterrupt, out: Path | None = None) -> NoReturn:
     """One line, and the end: 130 after Ctrl-C, 143 where a run was asked to end."""
     abandon_evaluators()
+    left = leaving.told(stop)
     text = _what_is_kept(out) if out else "nothing was begun"
-    leaving.leave(f"stopped ({getattr(stop, 'why', 'Ctrl-C')}); {text}", getattr(stop, "status", STOPPED))
+    leaving.leave(f"stopped ({left.why}); {text}", left.status)
 
 
 def resumed(out: Path, config: Any, options: Any, overwrite: bool) -> bool:
@@ -150,8 +152,9 @@ def _folder(hydra_settings: Any) -> Path:
 
 
 def _unwritten(error: OSError) -> str:
-    where = error.filename or "the output folder"
-    return f"{where}: {error.strerror or error}; choose a folder with hydra.run.dir=FOLDER"
+    where = shown(Path(error.filename)) if error.filename else "the output folder"
+    room = "make room on the disk, or " if error.errno in FULL else ""
+    return f"{where}: {error.strerror or error}; {room}choose a folder with hydra.run.dir=FOLDER"
 
 
 def main() -> int:
@@ -167,6 +170,7 @@ def main() -> int:
             print(told)
             return 0
         check_flags(sys.argv[1:])
+        check_sweep(sys.argv[1:])
         folder = config_folder()
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()
     except (*USER_ERRORS, Refused) as error:

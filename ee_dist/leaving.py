@@ -29,6 +29,7 @@ class Left(KeyboardInterrupt):
 
 
 _leaving = False
+_left: Left | None = None
 
 
 def arm(unwinds: bool = True) -> None:
@@ -70,12 +71,17 @@ def leave(text: str, status: int) -> NoReturn:
     os._exit(status)
 
 
+def told(stop: KeyboardInterrupt) -> Left:
+    """Why the run is to leave. Compiled libraries make a Ctrl-C out of whatever was raised while they waited."""
+    return stop if isinstance(stop, Left) else _left or Left(signal.SIGINT)
+
+
 def _unwind(number: int, frame: FrameType | None) -> None:
-    global _leaving
+    global _leaving, _left
     if _leaving:
         os._exit(128 + number)
-    _leaving = True
-    raise Left(number)
+    _leaving, _left = True, Left(number)
+    raise _left
 
 
 def _at_once(number: int, frame: FrameType | None) -> None:

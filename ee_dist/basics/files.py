@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file whole or not at all: what was there before stays until all of it is on the disk."""
+    """Write a file whole or not at all: what was there before stays until all of it is on the disk. Raises OSError that
+    names the file."""
     partial = path.with_name(path.name + ".part")
     try:
         with partial.open("wb") as file:
@@ -15,6 +17,9 @@ def write_whole(path: Path, content: str | bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)
-    except OSError:
-        partial.unlink(missing_ok=True)
+    except OSError as error:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        # What fails in writing, not in opening, knows no name.
+        error.filename = error.filename or str(path)
         raise

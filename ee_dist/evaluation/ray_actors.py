@@ -185,6 +185,9 @@ class RayEvaluator:
         """What Ray answers. Raises what a job raised, and EvaluatorError for what is Ray's own."""
         try:
             return ask(*arguments, **named)
+        except SystemError as error:
+            # What the watch raised while Ray's compiled part was waiting comes out of it as the cause of another error.
+            raise (error.__cause__ if isinstance(error.__cause__, RayLostError) else error) from None
         except RayTaskError as error:
             cause = getattr(error, "cause", None)
             raise (cause if isinstance(cause, Exception) else EvaluatorError(_last_line(error))) from None
@@ -200,7 +203,7 @@ class RayEvaluator:
         return [int(pid) for _, pid, _ in ray.get([a.who.remote() for a in self.actors])]
 
     def close(self) -> None:
-        for actor in self.actors:
+        for actor in self.actors if ray.is_initialized() else ():
             with suppress(RayError):
                 ray.kill(actor)
         self.actors = []

@@ -95,13 +95,15 @@ def when_lost(farewell: Callable[[str], None]) -> None:
 def start_ray(address: str | None, workers: int) -> None:
     """Connect to the cluster at ``address``, or start Ray on this machine. Raises EvaluatorError."""
     import ray
-    from ray._private import ray_constants
+    from ray._private import auto_init_hook, ray_constants
 
     global _guard, _address
     if ray.is_initialized():
         return
     # Ray's answer to SIGTERM is a dump of stacks; ours is a line.
     ray_constants.RAY_DISABLE_FAILURE_SIGNAL_HANDLER = True
+    # Asked for anything once it is gone, Ray would start another one by itself.
+    auto_init_hook.enable_auto_connect = False
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.CRITICAL}
     if address:
         _knock(address)

@@ -181,9 +181,8 @@ class RunWriter:
             yield
         except OSError as error:
             self.abandon()
-            raise RecordingError(
-                f"{self.part}: cannot be written ({error.strerror}); what was recorded before is kept there"
-            ) from error
+            kept = "; what was recorded before is kept there" if self._channels else ""
+            raise RecordingError(f"{self.part}: cannot be written ({error.strerror}){kept}") from error
 
     def _save(self) -> None:
         self._mcap.flush()

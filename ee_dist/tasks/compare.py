@@ -21,7 +21,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_comparison
 from ee_dist.tasks.results.tables import setting, show_account, show_comparison
 from ee_dist.tasks.summary import Stopwatch, write_summary
-from ee_dist.tasks.ways import AUTO, way_of
+from ee_dist.tasks.ways import AUTO, known_way, way_of
 from ee_dist.tasks.wiring import for_few
 from ee_dist.viewing.report import write_page
 
@@ -31,6 +31,9 @@ class Options:
     name: str = "compare"
     by: str = AUTO
     rerun: bool = True
+
+    def __post_init__(self) -> None:
+        known_way(self.by)
 
 
 def run(config: Config, options: Options, out: Path) -> tuple[Problem, Comparison, Account]:

@@ -9,6 +9,8 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from hydra._internal.utils import get_args_parser
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import ChoiceSweep, RangeSweep
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -30,17 +32,28 @@ TASKS = (
     "export",
     "workbench",
 )
-_USED_BY = {
+USED_BY = {
     "scenario": (("recover", "online"), "what task=trial hides is hidden=..."),
     "robot": (
         ("recover", "online", "trial", "import", "workbench"),
         "the others take the robot from the log or the model file",
     ),
+    "measured": (("compare", "explain", "improve", "import", "workbench"), "a run or recording to look at is log=..."),
+    "model": (("compare", "explain", "improve", "export", "workbench"), ""),
+    "effect": (("improve",), "what explain tries is task.only=[...], what a trial hides is hidden=..."),
+    "hidden": (("trial",), "what recover and online break is +scenario=..."),
+    "log": (("view", "study", "reveal", "workbench"), "what the others read is measured=..."),
+    "urdf": (("robot",), "elsewhere a robot's file is robot=urdf robot.urdf=..."),
+    "mjcf": (("robot",), "elsewhere a robot's file is robot=mjcf robot.file=..."),
+    "to": (("export",), ""),
+    "hardware": (("recover", "trial"), ""),
+    "metric": (("recover",), ""),
 }
 """Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
 _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}
 """Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
 _SWEEP = ("-m", "--multirun")
+MOST_RUNS = 10_000
 _RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
 _NO_CHOICE = re.compile(r"^\+{0,2}(\w+)=(true|false|nan|[-+]?inf|[-+]?[0-9][0-9_.eE+-]*)$", re.IGNORECASE)
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
@@ -76,10 +89,31 @@ def check_flags(arguments: list[str]) -> None:
         if not setting.lstrip("+~").partition("=")[0].strip():
             raise ConfigError(f"{setting}: which setting? they are written key=value, and --help lists them")
         _check_choice(setting)
-        if re.match(r"\+{0,2}resume=$", setting):
+        key, _, value = setting.lstrip("+").partition("=")
+        if value.startswith("~"):
+            raise ConfigError(f"{setting}: the shell puts in no home folder here; write {key}=$HOME{value[1:]}")
+        if key == "resume" and (not value or value[0] in "[{"):
             raise ConfigError(
-                "resume=: which folder? name that of a run that was stopped, such as resume=logs/recover/..."
+                f"resume={value}: which folder? name that of a run that was stopped, such as resume=logs/recover/..."
             )
+    folders = [a.partition("=")[2] for a in arguments if re.match(r"\+{0,2}hydra\.(run|sweep)\.dir=", a)]
+    if len({*folders}) > 1 and any(_RESUME.match(a) for a in arguments):
+        raise ConfigError(f"resume={folders[-1]}: goes on in that folder; leave out the other, {folders[0]}")
+
+
+def check_sweep(arguments: list[str]) -> None:
+    """Raises ConfigError for a sweep of more runs than anybody has time for: Hydra would write all of them down first."""
+    if not any(a in _SWEEP for a in arguments):
+        return
+    runs = 1.0
+    for override in OverridesParser.create().parse_overrides([a for a in arguments if not a.startswith("-")]):
+        value = override.value()
+        if isinstance(value, RangeSweep) and value.start is not None and value.stop is not None and value.step:
+            runs *= max(0.0, (value.stop - value.start) / value.step)
+        elif isinstance(value, ChoiceSweep):
+            runs *= len(value.list)
+    if runs > MOST_RUNS:
+        raise ConfigError(f"-m: a sweep of {runs:.3g} runs; at most {MOST_RUNS} at a time")
 
 
 def _check_choice(setting: str) -> None:
@@ -94,11 +128,13 @@ def _check_choice(setting: str) -> None:
 def check_used(overrides: list[str], task: str) -> None:
     """Raises ConfigError for a setting that the verb would pass over in silence."""
     for override in overrides:
-        name = override.lstrip("+").partition("=")[0].partition(".")[0]
-        verbs, instead = _USED_BY.get(name, ((task,), ""))
-        if task not in verbs:
-            having = f"{', '.join(f'task={v}' for v in verbs[:-1])} and task={verbs[-1]}"
-            raise ConfigError(f"{override}: task={task} has no use for it; it is for {having}, {instead}")
+        setting, _, value = override.lstrip("+").partition("=")
+        verbs, instead = USED_BY.get(setting.partition(".")[0], ((task,), ""))
+        if task not in verbs and value != "null":
+            *most, last = (f"task={v}" for v in verbs)
+            having = f"{', '.join(most)} and {last}" if most else last
+            hint = f", {instead}" if instead else ""
+            raise ConfigError(f"{override}: task={task} has no use for it; it is for {having}{hint}")
 
 
 def folder_name(overrides: str) -> str:
@@ -168,6 +204,7 @@ _EXPECTED = (
     (r"Value '(.*)' of type '.*' could not be converted to Integer", "a whole number"),
     (r"Value '(.*)' of type '.*' could not be converted to Float", "a number"),
     (r"Value '(.*)' is not a valid bool", "true or false"),
+    (r"Cannot convert '(?:List|Dict)Config' to string: '(.*)'", "one value, without brackets"),
     (r"Invalid value assigned: .* is not a ListConfig", "a list, such as {key}=[one,two]"),
     (r"Cannot assign \w+ to Dict", "a list of mappings, such as [{{effect: ..., target: ...}}]"),
     (r"Incompatible value 'None' for field of type", "a value, not null"),

@@ -11,12 +11,12 @@ from rich.console import Console
 from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.words import Account, explain_account
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
+from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
@@ -24,7 +24,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_explanation
 from ee_dist.tasks.results.tables import setting, show_account, show_explanation, typed
 from ee_dist.tasks.summary import Stopwatch, write_summary
-from ee_dist.tasks.ways import AUTO, way_of
+from ee_dist.tasks.ways import AUTO, known_way, way_of
 from ee_dist.tasks.wiring import evaluator_of
 from ee_dist.viewing.report import write_page
 
@@ -40,17 +40,21 @@ class Options:
     only: list[str] = field(default_factory=list)
     rerun: bool = True
 
+    def __post_init__(self) -> None:
+        known_way(self.by)
+
 
 def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> tuple[Problem, Explanation, Account]:
     """Write summary.json, report.html and explain.rrd into ``out``; ``told`` hears of the progress. Raises ConfigError,
     LogError, RecordingError."""
     console, watch, measured = Console(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
+    check(measured.robot, options.without, options.only)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     with SearchProgress(console, told) as progress:
         problem = way.make(measured, config)
-        pool = pool_of(problem, options.without, options.only)
+        pool = chosen(problem, options.without, options.only)
         count = len(measured.trials)
         console.print(
             f"{count} trial{'s' if count > 1 else ''} of {measured.robot.name}, {len(pool)} candidate explanations, "

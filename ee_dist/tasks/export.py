@@ -10,6 +10,7 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
+from ee_dist.basics.files import write_whole
 from ee_dist.effects.model_file import ModelFile, read_model
 from ee_dist.export.plan import FORMATS, NOT, Fate, fates, native_damping, needs_shim
 from ee_dist.export.python import controller_text
@@ -29,7 +30,7 @@ class Options:
 def run(config: Config, options: Options, out: Path) -> None:
     """Write ``config.model`` in the format ``to``. Raises ConfigError, RobotError, EffectError, EngineError."""
     watch = Stopwatch()
-    to = one_of("to", config.to or options.to, FORMATS)
+    to = one_of("to", options.to if config.to is None else config.to, FORMATS)
     if not config.model:
         raise ConfigError("model=: which model file? one that task=improve wrote, or one with 'robot' and 'effects'")
     found = read_model(config.model)
@@ -37,7 +38,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     files = files_of(found, model, to, told)
     out.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
-        (out / name).write_text(text, encoding="utf-8")
+        write_whole(out / name, text)
     rest = {
         "to": to,
         "robot": model.name,

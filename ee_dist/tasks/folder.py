@@ -75,7 +75,7 @@ class NotedFolders(Callback):
 def missing(folder: Path) -> tuple[Path, ...]:
     """The folder and those above it that do not exist."""
     folder = Path(os.path.abspath(folder))
-    return tuple(p for p in (folder, *folder.parents) if not p.exists())
+    return tuple(p for p in (folder, *folder.parents) if not os.path.exists(p))
 
 
 def free_name(folder: Path) -> Path:
@@ -104,7 +104,7 @@ def claimed(folder: Path, settings: Mapping[str, str], overwrite: bool) -> Itera
         found = held(folder)
         if found and not overwrite:
             raise ConfigError(HELD.format(key="hydra.run.dir", folder=shown(folder), content=_listed(found)))
-        before = _placed(folder / SETTINGS, settings)
+        _place(folder / SETTINGS, settings, before)
         yield
     except BaseException:
         if set(held(folder)) <= ({*found, SETTINGS} if before else set(found)):
@@ -166,8 +166,9 @@ def _locked(folder: Path) -> int:
             ) from None
         # Its last owner may have removed it after we opened it: then it locks nothing.
         if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):
-            os.ftruncate(handle, 0)
-            os.write(handle, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
+            with suppress(OSError):  # on a full disk it locks without a name
+                os.ftruncate(handle, 0)
+                os.write(handle, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
             return handle
         os.close(handle)
 
@@ -185,15 +186,13 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _placed(folder: Path, texts: Mapping[str, str]) -> dict[Path, bytes | None]:
-    """Write files, and say what was there before."""
+def _place(folder: Path, texts: Mapping[str, str], before: dict[Path, bytes | None]) -> None:
+    """Write files, and note what was there ``before``."""
     folder.mkdir(exist_ok=True)
-    before: dict[Path, bytes | None] = {}
     for name, text in texts.items():
         path = folder / name
         before[path] = path.read_bytes() if path.is_file() else None
         write_whole(path, text)
-    return before
 
 
 def _restore(before: Mapping[Path, bytes | None]) -> None:

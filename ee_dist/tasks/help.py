@@ -36,17 +36,20 @@ class Verb:
 
 _RUN = ("engine", "evaluator")
 _MODEL = ("measured", "model", "seed", "plugins", "ray.address")
+_HARDWARE = tuple(
+    f"hardware.{key}" for key in ("address", "begin_s", "timeout_s", "range_share", "speed", "acceleration", "torque")
+)
 VERBS = {
     "recover": Verb(
         "the loop: break, diagnose, repair",
         "+scenario=8",
         ("scenario", "budget", "metric", "robot", *_RUN),
-        ("seed", "noise", "plugins", "ray.address"),
+        ("seed", "noise", "plugins", "ray.address", *_HARDWARE),
     ),
     "online": Verb(
         "evolution on the body alone",
         "task=online +scenario=3",
-        ("scenario", "budget", *_RUN),
+        ("scenario", "budget", "robot", *_RUN),
         ("seed", "plugins", "ray.address"),
     ),
     "study": Verb("table and figures of many runs", "task=study log=logs/recover", (), ("log",)),
@@ -54,7 +57,7 @@ VERBS = {
         "robot trials, the hidden effect sealed",
         "task=trial +hidden=random",
         ("robot", "engine"),
-        ("hidden", "seed", "noise", "plugins"),
+        ("hidden", "seed", "noise", "plugins", *_HARDWARE),
     ),
     "import": Verb(
         "your logs as a recording",
@@ -63,16 +66,12 @@ VERBS = {
         ("measured",),
     ),
     "robot": Verb("what a robot's file says and lacks", "task=robot urdf=FILE", (), ("urdf", "mjcf")),
-    "compare": Verb(
-        "how far a model is off, and where", "task=compare measured=LOG model=MODEL", ("robot", *_RUN), _MODEL
-    ),
-    "explain": Verb(
-        "which missing effect explains it", "task=explain measured=LOG model=MODEL", ("robot", *_RUN), _MODEL
-    ),
+    "compare": Verb("how far a model is off, and where", "task=compare measured=LOG model=MODEL", _RUN, _MODEL),
+    "explain": Verb("which missing effect explains it", "task=explain measured=LOG model=MODEL", _RUN, _MODEL),
     "improve": Verb(
         "add what earns its place to the model",
         "task=improve measured=LOG effect=auto",
-        ("robot", *_RUN),
+        _RUN,
         (*_MODEL, "effect"),
     ),
     "export": Verb("the model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),

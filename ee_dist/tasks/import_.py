@@ -16,6 +16,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from ee_dist.basics.files import write_whole
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
@@ -54,7 +55,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     EffectError, ConfigError.
     """
     watch, console = Stopwatch(), Console()
-    if Path(options.output).name != options.output or not options.output.endswith(".mcap"):
+    if Path(options.output).name != options.output or Path(options.output).suffix != ".mcap":
         raise ConfigError(
             f"task.output={options.output}: expected the name of a file that ends in .mcap, such as measured.mcap"
         )
@@ -84,7 +85,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     with RunWriter(out / options.output, robot, metadata) as writer:
         for record, _ in found:
             writer.trial(record)
-    (out / "report.txt").write_text(text + "\n", encoding="utf-8")
+    write_whole(out / "report.txt", text + "\n")
     rest = summary_of(reports, notes, options.output)
     if proposal is not None:
         rest["mapping"] = MAPPING
@@ -139,7 +140,7 @@ def written(proposal: Proposal, config: Config, files: list[Path], out: Path, co
     out.mkdir(parents=True, exist_ok=True)
     names = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
     path = out / MAPPING
-    path.write_text(as_yaml(proposal, robot_source(config), names), encoding="utf-8")
+    write_whole(path, as_yaml(proposal, robot_source(config), names))
     console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
     if proposal.questions:
         more = f" (and {len(proposal.questions) - 1} more)" if len(proposal.questions) > 1 else ""

@@ -10,12 +10,12 @@ from typing import Any
 import yaml
 from rich.console import Console
 
+from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
-from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
@@ -25,6 +25,7 @@ from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.measurements import Measurements, load
+from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
@@ -32,7 +33,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_improvement
 from ee_dist.tasks.results.tables import setting, show_account, show_candidates, show_ladder
 from ee_dist.tasks.summary import Stopwatch, write_summary
-from ee_dist.tasks.ways import AUTO, open_loop, way_of
+from ee_dist.tasks.ways import AUTO, known_way, open_loop, way_of
 from ee_dist.viewing.report import write_page
 
 
@@ -47,6 +48,7 @@ class Options:
     rerun: bool = True
 
     def __post_init__(self) -> None:
+        known_way(self.by)
         if self.most < 1:
             raise ConfigError(f"task.most={self.most}: must be 1 or more")
 
@@ -62,13 +64,14 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
                 f"task.{key}: chooses among what effect=auto may add; effect={config.effect} says it already"
             )
     way = way_of(measured, options.by)
+    check(measured.robot, options.without, options.only)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     if options.calibrate and way.name != OpenLoop.way:
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
     with SearchProgress(console, told) as progress:
         problem = way.make(measured, config)
-        pool = pool_of(problem, options.without, options.only)
+        pool = chosen(problem, options.without, options.only)
         calibration = None
         if options.calibrate:
             found, calibration = calibrated(measured, config, pool, wanted, options.most, progress)
@@ -79,10 +82,10 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     out.mkdir(parents=True, exist_ok=True)
     write_model(path, measured.source, measured.folder, found.terms, account.words)
     if calibration is not None:
-        path.with_suffix(".calibration.yaml").write_text(
+        write_whole(
+            path.with_suffix(".calibration.yaml"),
             "# What the model beside this file leaves on an untouched robot, and the energy that the most promising effect\n"
             "# takes off it.\n" + yaml.safe_dump(calibration, sort_keys=False),
-            encoding="utf-8",
         )
     digest = hashlib.sha256(repr([(r.terms, r.error_heldout) for r in found.ladder]).encode()).hexdigest()
     write_summary(out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path)))

@@ -52,6 +52,8 @@ class Measurements:
 
 def load(config: Config) -> Measurements:
     """The files of ``config.measured`` and the model of ``config.model``. Raises ConfigError, LogError, RecordingError."""
+    if config.model == "":
+        raise ConfigError("model=: which model file? leave it out for the robot as it is described")
     files = files_of(config.measured)
     runs = [read_run(f) for f in files]
     robot = runs[0].robot
@@ -124,6 +126,10 @@ def files_of(measured: Any) -> list[Path]:
             raise ConfigError(f"measured={path}: not a recording; bring it in first: task=import measured={path}")
         else:
             found.append(path)
+    twice = [p for k, p in enumerate(found) if p.resolve() in [q.resolve() for q in found[:k]]]
+    if twice:
+        # What is held out would be what was fitted.
+        raise ConfigError(f"measured={twice[0]}: the same log twice; name each once")
     return found
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from ee_dist.basics.files import write_whole
 from ee_dist.engines.drivers import Commands
 from ee_dist.recording.records import HARDWARE, RunRecord, TrialRecord
 from ee_dist.robots.describe import kind_of, read_body
@@ -42,7 +43,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     given = [(kind, path) for kind, path in (("urdf", config.urdf), ("mjcf", config.mjcf)) if path]
     if len(given) != 1:
         raise ConfigError("task=robot looks at one file: urdf=FILE.urdf or mjcf=FILE.xml")
-    if Path(options.output).name != options.output or not options.output.endswith(".yaml"):
+    if Path(options.output).name != options.output or Path(options.output).suffix != ".yaml":
         raise ConfigError(f"task.output={options.output}: expected the name of a file that ends in .yaml")
     kind, path = given[0][0], Path(given[0][1])
     if path.is_file() and kind_of(path) != kind:
@@ -51,8 +52,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         )
     found = starter(read_body(kind, path), kind, source_from(path, out), str(path))
     out.mkdir(parents=True, exist_ok=True)
-    (out / options.output).write_text(text_of(found), encoding="utf-8")
-    write_rrd(scene(found.robot), out / "robot.rrd")
+    write_whole(out / options.output, text_of(found))
     robot = found.robot
     rest = {
         "robot": robot.name,
@@ -65,6 +65,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "description": options.output,
     }
     write_summary(out, "robot", config, options, watch, digest_of((robot, found.text)), rest)
+    write_rrd(scene(robot), out / "robot.rrd")
     tell(Console(), found, out / options.output)
 
 

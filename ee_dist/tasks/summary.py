@@ -38,8 +38,12 @@ def config_digest(config: Config, options: Any) -> str:
     """Of the settings that decide the result: not of where and how it is computed."""
     tree = OmegaConf.create(config_yaml(config, options))
     assert isinstance(tree, DictConfig)
-    for key in ("evaluator", "ray", "plugins", "hardware"):
+    for key in ("evaluator", "ray", "plugins"):
         tree.pop(key, None)
+    if tree.hardware.address is None:
+        tree.pop("hardware")
+    for key in ("address", "timeout_s", "begin_s", "torque"):  # these end a trial or not, and alter none
+        tree.get("hardware", {}).pop(key, None)
     tree.engine.pop("threads", None)
     return hashlib.sha256(OmegaConf.to_yaml(tree, sort_keys=True).encode()).hexdigest()
 

@@ -77,9 +77,14 @@ def _seen(robot: Robot) -> bool:
     return any(s.kind == "position" for s in robot.sensors)
 
 
+def known_way(by: str) -> None:
+    """Raises ConfigError where there is no such way: to be said before logs are read."""
+    one_of("task.by", by, (AUTO, *WAYS))
+
+
 def way_of(measured: Measurements, by: str) -> Way:
     """The way asked for; for ``auto`` the first that the channels allow. Raises ConfigError for one that cannot be."""
-    one_of("task.by", by, (AUTO, *WAYS))
+    known_way(by)
     if by == AUTO:
         driven = all(np.isfinite(t.log.commands).all(axis=1).any() for t in measured.trials)
         torques = all(

@@ -121,6 +121,9 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
                 engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address
             )
             leaving.arm()  # Ray has put handlers of its own in place
+            # The last to be registered is the first to be called: before Ray's own end, which begins with a nap.
+            atexit.unregister(_leave)
+            atexit.register(_leave)
         inner = JournaledEvaluator(RecentEvaluator(inner) if settings.recent else inner)
         _kept[key] = CachedEvaluator(inner) if settings.cache else inner
     evaluator = _kept[key]

@@ -65,6 +65,25 @@ def test_who_found_out_by_itself_is_not_interrupted(watching):
     assert watch.why == "the raylet" and not said
 
 
+def test_what_interrupts_rays_compiled_part_is_told_as_itself(monkeypatch):
+    """It makes a SystemError of an error that came in from a signal, and a Ctrl-C of whatever leaves a run."""
+    from ee_dist import leaving
+    from ee_dist.evaluation.ray_actors import RayEvaluator
+    from ee_dist.evaluation.ray_session import RayLostError
+
+    def wait() -> None:
+        raise SystemError("returned a result with an exception set") from RayLostError("the raylet is gone")
+
+    with pytest.raises(RayLostError, match="the raylet is gone"):
+        RayEvaluator._said(None, wait)
+    for name in ("_leaving", "_left"):
+        monkeypatch.setattr(leaving, name, getattr(leaving, name))
+    with pytest.raises(leaving.Left):
+        leaving._unwind(signal.SIGTERM, None)
+    told = leaving.told(KeyboardInterrupt())
+    assert (told.status, told.why) == (143, "asked to end")
+
+
 def test_one_answer_that_did_not_come_is_no_loss(watching):
     watch, _ = watching([None, "no answer", None])
     time.sleep(0.3)

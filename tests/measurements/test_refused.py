@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
 from ee_dist.measurements.mapping import mapping_of, read_mapping
+from ee_dist.measurements.readers import Options, read
 from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
@@ -32,6 +34,15 @@ GOOD: dict[str, Any] = {
     "sensors": {"position": {"column": "q", "unit": "rad"}, "speed": {"column": "w", "unit": "rad/s"}},
     "commands": {"servo": {"column": "g", "unit": "rad"}},
 }
+
+
+@pytest.mark.parametrize("name", ["run.csv", "set/meta/info.json"])
+def test_a_pipe_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    pipe = tmp_path / name
+    pipe.parent.mkdir(parents=True, exist_ok=True)
+    os.mkfifo(pipe)
+    with pytest.raises(MeasurementError, match="not an ordinary file"):
+        read(tmp_path / name.partition("/")[0], Options(kind="lerobot" if "/" in name else None))
 
 
 def q(**changes: Any) -> dict[str, Any]:

@@ -5,6 +5,23 @@ from __future__ import annotations
 Rows = tuple[tuple[str, str], ...]
 
 COMPOSITION: Rows = (
+    ("task=online +scenario=3 hardware.address=127.0.0.1:1", "it is for task=recover and task=trial"),
+    ("task=online +scenario=3 metric=distance", "it is for task=recover"),
+    (
+        "task=compare measured=trial.mcap +hidden=random",
+        "it is for task=trial, what recover and online break is +scenario",
+    ),
+    ("task=compare measured=trial.mcap log=trial.mcap", "what the others read is measured=..."),
+    ("task=explain measured=trial.mcap effect=coulomb_friction@servo", "what explain tries is task.only=[...]"),
+    ("task=view log=trial.mcap measured=trial.mcap", "a run or recording to look at is log=..."),
+    ("task=robot urdf=arm.urdf model=model.yaml", "it is for task=compare, task=explain, task=improve, task=export"),
+    ("task=trial robot=servo_pendulum urdf=arm.urdf", "elsewhere a robot's file is robot=urdf robot.urdf=..."),
+    ("task=trial robot=mjcf mjcf=arm.xml", "elsewhere a robot's file is robot=mjcf robot.file=..."),
+    ("task=compare measured=trial.mcap to=mjcf", "it is for task=export"),
+    ("task=compare measured=~/trial.mcap", "write measured=$HOME/trial.mcap"),
+    ("+scenario=8 resume=[a]", "name that of a run that was stopped"),
+    ("+scenario=8 resume=nothing hydra.run.dir=other", "leave out the other, other"),
+    ("task=compare measured=trial.mcap model=[model.yaml]", "expected one value, without brackets"),
     ("+scenario=14", "there are: 1, 2, 3, 4"),
     ("+scenario=-1", "there are: 1, 2, 3, 4"),
     ("+scenario=8 budget=papr", "there are: paper, quick"),
@@ -43,7 +60,7 @@ COMPOSITION: Rows = (
     ("+scenario=8 budget=1e3", "budget=1e3: no such choice; there are: paper, quick"),
     ("+scenario=8 budget=fast", "there are: paper, quick"),
     ("task=trial robot=arm.urdf", "a file is named by robot=urdf robot.urdf=arm.urdf"),
-    ("task=trial robot=urdf urdf=arm.urdf", "robot=urdf needs robot.urdf=FILE.urdf"),
+    ("task=trial robot=urdf urdf=arm.urdf", "elsewhere a robot's file is robot=urdf robot.urdf=..."),
     ("task=compare measured=trial.mcap,trial.mcap", "a list stands in brackets, measured=[trial.mcap,trial.mcap]"),
     ("task=trial robot=servo_pendulum +hidden=viscous_friction,coulomb_friction", "with each of them add -m"),
     (
@@ -236,6 +253,7 @@ MODELS: Rows = (
     ("task=export model=heavy.json", "there are: robot, effects"),
     ("task=export model=t.csv", "t.csv: a model file is a mapping with 'robot' and 'effects'"),
     ("task=export", "model=: which model file? one that task=improve wrote, or one"),
+    ("task=export model=model.yaml to=", "there are: mjcf, urdf, yaml, python"),
     ("task=export model=model.yaml to=sdf", "did you mean urdf?"),
     ("task=compare measured=trial.mcap model=effect.yaml", "did you mean viscous_friction or coulomb_friction or"),
     ("task=improve measured=trial.mcap model=bounds.yaml effect=auto", "lies outside [0, inf]"),
@@ -271,7 +289,20 @@ LOGS: Rows = (
     ("task=compare measured=nothing", "other formats come in with task=import"),
     ("task=compare measured=/dev/zero", "name a recording (.mcap)"),
     ("task=compare", "measured=: which log? name an .mcap, several as"),
+    ("task=compare measured=[trial.mcap,trial.mcap]", "measured=trial.mcap: the same log twice; name each once"),
+    ("task=compare measured=[trial.mcap,./trial.mcap]", "the same log twice"),
+    ("task=compare measured=trial.mcap model=", "model=: which model file?"),
+    (
+        "task=explain measured=trial.mcap task.only=[payload] task.without=[payload]",
+        "nothing is left to try",
+    ),
+    (
+        "task=explain measured=trial.mcap task.only=[coulomb_friction@]",
+        "where? coulomb_friction is everywhere",
+    ),
     ("task=compare measured=3", "measured=3: no such file"),
+    ("task=compare measured=trial.mcap task.by=openloop", "did you mean open_loop?"),
+    ("task=improve measured=nowhere.mcap task.by=openloop", "did you mean open_loop?"),
     ("task=compare measured=trial.mcap task.by=free", "did you mean free_run or force_balance?"),
     (
         "task=compare measured=trial.mcap robot=quadruped",
@@ -328,6 +359,10 @@ IMPORTS: Rows = (
     (
         "task=import measured=t.csv task.mapping=good.map task.output=x.txt",
         "expected the name of a file that ends in .mcap, such as",
+    ),
+    (
+        "task=import measured=t.csv task.mapping=good.map task.output=.mcap",
+        "expected the name of a file that ends in .mcap",
     ),
     ("task=import measured=t.csv task.mapping=unit.map", "did you mean rad or mrad or rad/s?"),
     ("task=import measured=t.csv task.mapping=metres.map", "expected one of angle: rad, mrad, deg, turn"),
@@ -449,6 +484,8 @@ WHOLE: Rows = (
     ("+scenario=8 hydra.run.dir=/dev/null/x", "choose a folder with hydra.run.dir=FOLDER"),
     ("-m +scenario=8 hydra.sweep.dir=", "hydra.sweep.dir=: which folder? a run writes into one of its"),
     ("--resume=x", "settings are written key=value, and --help lists them"),
+    ("-m +scenario=8 seed=range(0,100000000)", "a sweep of 1e+08 runs; at most 10000 at a time"),
+    ("-m +scenario=8 seed=range(0,200) noise=range(0,1,0.001)", "a sweep of 2e+05 runs"),
     ("-m +scenario=8 seed=abc,def", "expected a whole number"),
     ("hydra.run.dir=nothing/../.. +scenario=8 seed=x", "expected a whole number"),
     ("task=view log=trial.mcap --config-name=x", "Cannot find primary config 'x'. Check that it's in your config"),

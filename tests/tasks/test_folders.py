@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import resource
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from ee_dist.evaluation.journal import Journal
 from ee_dist.recording.reader import read_run
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.folder import LOCK, claimed, free_name, missing
+from ee_dist.tasks.wiring import close_evaluators
 
 FAST = ("evaluator=serial", "engine=mujoco", "budget.compensating_trials=1")
 
@@ -133,6 +139,52 @@ def test_a_full_disk_is_one_line_and_what_was_whole_stays(tmp_path, tiny, limit,
     run = read_run(tmp_path / "out" / min(kept - {"unfinished"}))
     assert len(run.trials) >= 2
     assert run.complete == ("summary.json" in kept)
+
+
+@contextlib.contextmanager
+def disk_of(length: int) -> Iterator[None]:
+    """No file grows beyond so many bytes, in this process."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (length, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize(("length", "file"), [(5000, "out/robot.xml"), (2000, "out/config/hydra.yaml")])
+def test_a_full_disk_leaves_no_half_of_a_file(cli, tmp_path, length, file):
+    model = tmp_path / "model.yaml"
+    model.write_text("robot: quadruped\neffects: []\n")
+    with disk_of(length):
+        outcome = cli("task=export", f"model={model}", "hydra.run.dir=out")
+    assert outcome.status == 2
+    (line,) = outcome.err.strip().splitlines()
+    assert line.endswith(f"{file}: File too large; make room on the disk, or choose a folder with hydra.run.dir=FOLDER")
+    assert not list(outcome.folder.iterdir())
+
+
+def test_a_disk_that_fills_up_in_the_search_is_one_line_and_the_run_goes_on_later(cli, tmp_path, tiny, monkeypatch):
+    """What was simulated is noted in a file of its own, whose errors are the system's."""
+    ask = ("+scenario=8", *FAST, *tiny, "budget.generations=1")
+    real, calls = Journal.note, iter(range(1000))
+
+    def note(self: Journal, found: Any) -> None:
+        if next(calls) == 1:
+            raise OSError(
+                errno.ENOSPC, "No space left on device", str(tmp_path / "out" / "unfinished" / "simulated.bin")
+            )
+        real(self, found)
+
+    monkeypatch.setattr(Journal, "note", note)
+    outcome = cli(*ask, f"hydra.run.dir={tmp_path}/out")
+    assert outcome.status == 2
+    (line,) = outcome.err.strip().splitlines()
+    assert "simulated.bin: No space left on device; make room on the disk, or " in line
+    assert line.endswith(f"; go on with the same command and resume={tmp_path}/out")
+    close_evaluators()
+    assert cli(*ask, f"resume={tmp_path}/out").status == 0
+    assert read_run(tmp_path / "out" / "recovery.mcap").complete
 
 
 def test_a_read_only_folder_is_one_line(cli, tmp_path):

@@ -11,7 +11,7 @@ from ee_dist.effects import term
 from ee_dist.engines.contract import EngineError
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.robots.servo_pendulum import servo_pendulum
-from ee_dist.tasks.compose import TASKS, config_folder, task_module
+from ee_dist.tasks.compose import TASKS, USED_BY, config_folder, task_module
 from ee_dist.tasks.config import known_settings
 from ee_dist.tasks.help import VERBS, options_with, settings_in
 from ee_dist.tasks.summary import package_version
@@ -48,6 +48,12 @@ def test_a_verb_tells_each_of_its_settings_with_default_and_meaning(cli, name):
     for group in VERBS[name].groups:
         assert f"{group}=" in outcome.out
     assert all(name in known_settings() for name in VERBS[name].shared)
+
+
+@pytest.mark.parametrize("name", USED_BY)
+def test_a_verb_is_refused_just_those_settings_that_its_help_does_not_have(name):
+    having = {v for v, verb in VERBS.items() if name in (*verb.groups, *(s.partition(".")[0] for s in verb.shared))}
+    assert having == set(USED_BY[name][0])
 
 
 def test_every_setting_of_every_choice_has_a_meaning():

@@ -125,6 +125,24 @@ def test_no_process_of_ray_outlives_its_run(tmp_path, moment, number):
 
 
 @pytest.mark.slow
+def test_nothing_of_ray_is_left_by_a_run_that_reaches_its_end(tmp_path):
+    temporary = tmp_path / "t"
+    temporary.mkdir()
+    less = (
+        "budget.population=8", "budget.generations=1", "budget.diagnosis_population=8", "budget.diagnosis_generations=1",
+        "budget.crossovers=2", "budget.steps=80", "budget.compensating_trials=1", "evaluator=ray", "hydra.run.dir=out",
+    )  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-m", "ee_dist", "+scenario=8", "engine=mujoco", "budget=quick", *less],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+        env={**os.environ, "LEAVING": str(tmp_path), "TMPDIR": str(temporary)},
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not relatives(tmp_path)
+    assert not list(temporary.iterdir()), "asked for its end twice, Ray starts another one"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("victim", ["raylet", "gcs_server", "ray::Dashboard"])
 def test_a_lost_ray_is_one_line(tmp_path, victim):
     with started(tmp_path, "evaluator=ray") as process:

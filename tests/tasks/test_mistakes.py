@@ -63,6 +63,7 @@ def test_one_line_and_a_status(files, monkeypatch, line, said):
 HOSTILE = (
     (["task=trial", "+hidden=" + "[" * 3000 + "]" * 3000], "nested too deep"),
     (["task=trial", "+hidden=" + "x" * 5000], "no effect named 'xxx"),
+    (["+scenario=8", "seed=-1", "hydra.run.dir=" + "n" * 300], "File name too long; choose a folder"),
     ([], "which scenario? add one, such as +scenario=8"),
 )
 

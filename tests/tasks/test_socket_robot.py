@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -27,55 +28,91 @@ FAST = (
 )  # fmt: skip
 
 
+@dataclass
+class Plugged:
+    address: str
+    done: list[int] = field(default_factory=list)
+    """Numbers of the trials that it finished; known once its process has ended."""
+
+
 @contextlib.contextmanager
-def plugged_in(*arguments: str) -> Iterator[str]:
-    """Its address."""
-    command = [sys.executable, str(ROBOT), "--port", "0", "--engine", "mujoco", *arguments]
+def plugged_in(*arguments: str, again: Plugged | None = None) -> Iterator[Plugged]:
+    """``again``: at the same address as that one."""
+    port = again.address.rpartition(":")[2] if again else "0"
+    command = [sys.executable, str(ROBOT), "--port", port, "--engine", "mujoco", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        robot = Plugged(process.stdout.readline().split()[-1])
         try:
-            assert process.stdout is not None
-            yield process.stdout.readline().split()[-1]
+            yield robot
         finally:
             process.kill()
+            robot.done += [int(line.split()[1]) for line in process.stdout if line.endswith("done\n")]
 
 
-def test_recovery_on_it_with_the_plug_pulled_and_a_resume_ends_as_the_simulated_one_does(cli, tiny, tmp_path):
+def result_digest(folder: Path) -> str:
+    return str(json.loads((folder / "summary.json").read_text())["result_digest"])
+
+
+def test_recovery_on_it_with_the_plug_pulled_and_a_resume_ends_as_the_undisturbed_one_does(cli, tiny, tmp_path):
     base = ("+scenario=8", *tiny, *FAST)
     simulated = cli(*base, f"hydra.run.dir={tmp_path}/simulated")
     assert simulated.status == 0, simulated.err
-    out = tmp_path / "own"
-    with plugged_in("--unplug", "1:30") as address:
-        stopped = cli(*base, f"hardware.address={address}", f"hydra.run.dir={out}")
+    out, whole = tmp_path / "own", tmp_path / "whole"
+    with plugged_in() as undisturbed:
+        ask = (*base, f"hardware.address={undisturbed.address}")
+        assert cli(*ask, f"hydra.run.dir={whole}").status == 0
+    assert undisturbed.done == [0, 1, 2]
+    with plugged_in("--unplug", "1:30", again=undisturbed) as before:
+        stopped = cli(*ask, f"hydra.run.dir={out}")
     assert stopped.status == 2
     (line,) = stopped.err.strip().splitlines()
-    assert f"trial 2, step 30 of 80: hardware.address={address}: the robot does not answer any more" in line
+    assert f"trial 2, step 30 of 80: hardware.address={before.address}: the robot does not answer any more" in line
     assert "go on with the same command and resume=" in line
     (aborted,) = read_logs(out / "aborted_changed_0000_1.mcap")
     assert len(aborted.log) == 30
-    gone = cli(*base, f"hardware.address={address}", f"resume={out}")
+    gone = cli(*ask, f"resume={out}")
     assert gone.status == 2
     assert "no robot answers there" in gone.err
-    with plugged_in() as address:
-        resumed = cli(*base, f"hardware.address={address}", f"resume={out}")
+    with plugged_in(again=undisturbed) as after:
+        careless = cli(*ask, "hardware.speed=3", f"resume={out}")
+        resumed = cli(*ask, f"resume={out}")
+    assert careless.status == 2
+    assert "the run there has other settings (hardware.speed=" in careless.err
     assert resumed.status == 0, resumed.err
-    digests = {json.loads((tmp_path / n / "summary.json").read_text())["result_digest"] for n in ("simulated", "own")}
-    assert len(digests) == 1
-    complete = read_logs(out / "recovery.mcap")
-    assert aborted.log.sensors.tobytes() == complete[1].log.head(30).sensors.tobytes()
+    assert (before.done, after.done) == ([0], [1, 2]), "a finished trial was asked for again"
+    assert len({result_digest(f) for f in (tmp_path / "simulated", whole, out)}) == 1
+    assert (out / "recovery.mcap").read_bytes() == (whole / "recovery.mcap").read_bytes()
+    assert aborted.log.sensors.tobytes() == read_logs(out / "recovery.mcap")[1].log.head(30).sensors.tobytes()
     assert (out / "aborted_changed_0000_1.mcap").exists()
 
 
-def test_trials_of_it_are_recorded_and_nothing_is_sealed_that_nobody_knows(cli, tmp_path):
-    asked = ("task=trial", "engine=mujoco", "task.excitations=['sway:seconds=0.5,amplitude=0.1']")
-    with plugged_in("--robot", "quadruped_lab", "--scenario", "none") as address:
-        outcome = cli(*asked, f"hardware.address={address}", f"hydra.run.dir={tmp_path}/out")
-        refused = cli("task=trial", "+hidden=drag", f"hardware.address={address}")
+def test_trials_of_it_with_the_plug_pulled_and_a_resume_are_recorded_as_the_undisturbed_ones_are(cli, tmp_path):
+    asked = ("task=trial", "engine=mujoco", "task.excitations=['sway:seconds=0.5,amplitude=0.1']", "task.repeats=2")
+    robot, out, whole = ("--robot", "quadruped_lab", "--scenario", "none"), tmp_path / "own", tmp_path / "whole"
+    with plugged_in(*robot) as undisturbed:
+        ask = (*asked, f"hardware.address={undisturbed.address}")
+        outcome = cli(*ask, f"hydra.run.dir={whole}")
+        refused = cli("task=trial", "+hidden=drag", f"hardware.address={undisturbed.address}")
     assert outcome.status == 0, outcome.err
-    (record,) = read_logs(tmp_path / "out" / "trial.mcap")
-    assert len(record.log) == 50
-    assert not (tmp_path / "out" / "sealed.json").exists()
+    assert [len(r.log) for r in read_logs(whole / "trial.mcap")] == [50, 50]
+    assert not (whole / "sealed.json").exists(), "nobody knows what it hides"
     assert refused.status == 2
     assert "leave out hidden" in refused.err
+    with plugged_in(*robot, "--unplug", "1:20", again=undisturbed) as before:
+        stopped = cli(*ask, f"hydra.run.dir={out}")
+    assert stopped.status == 2
+    (line,) = stopped.err.strip().splitlines()
+    assert "trial 2, step 20 of 50" in line
+    assert "go on with the same command and resume=" in line
+    (aborted,) = read_logs(next(out.glob("aborted_*.mcap")))
+    with plugged_in(*robot, again=undisturbed) as after:
+        resumed = cli(*ask, f"resume={out}")
+    assert resumed.status == 0, resumed.err
+    assert (undisturbed.done, before.done, after.done) == ([0, 1], [0], [1])
+    assert result_digest(out) == result_digest(whole)
+    assert (out / "trial.mcap").read_bytes() == (whole / "trial.mcap").read_bytes()
+    assert aborted.log.sensors.tobytes() == read_logs(out / "trial.mcap")[1].log.head(20).sensors.tobytes()
 
 
 class Dummy:

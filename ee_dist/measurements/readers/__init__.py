@@ -70,6 +70,12 @@ def read(path: str | Path, options: Options = Options()) -> tuple[Recorded, ...]
         raise MeasurementError(
             f"{file}: unknown format {quoted(options.kind or file.suffix)}; expected {', '.join(FORMATS)}"
         )
+    odd = [
+        p for p in (file, *(file.rglob("*") if file.is_dir() else ())) if p.exists() and not (p.is_file() or p.is_dir())
+    ]
+    if odd:
+        # A pipe would be waited for, and a device has no end.
+        raise MeasurementError(f"{odd[0]}: not an ordinary file; expected a recording")
     try:
         if file.is_file() and file.stat().st_size == 0:
             raise MeasurementError(f"{file}: the file is empty")

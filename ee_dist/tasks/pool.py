@@ -1,0 +1,35 @@
+"""What a search is to try, as it was asked for on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import Candidate, candidates
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.robots.model import Robot
+from ee_dist.tasks.config import ConfigError
+
+
+def check(robot: Robot, without: Sequence[str], only: Sequence[str]) -> None:
+    """To be asked before workers are started. Raises EffectError for names that do not exist, and ConfigError where nothing
+    is left to try."""
+    for key, names in (("without", without), ("only", only)):
+        for name in names:
+            if name.endswith("@"):
+                raise ConfigError(f"task.{key}=[{name}]: where? {name[:-1]} is everywhere it can act")
+    if (without or only) and not candidates(robot, without, only or None):
+        raise _nothing(robot, without, only)
+
+
+def chosen(problem: Problem, without: Sequence[str], only: Sequence[str]) -> list[Candidate]:
+    """Candidates at all places and groups, less those left out. Raises ConfigError where this way of comparing has none."""
+    found = pool_of(problem, without, only)
+    if (without or only) and not found:
+        raise _nothing(problem.robot, without, only)
+    return found
+
+
+def _nothing(robot: Robot, without: Sequence[str], only: Sequence[str]) -> ConfigError:
+    said = " and ".join(f"task.{k}=[{','.join(v)}]" for k, v in (("only", only), ("without", without)) if v)
+    return ConfigError(f"{said}: nothing is left to try on {robot.name}; name an effect that can act on it")
