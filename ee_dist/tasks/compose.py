@@ -38,6 +38,7 @@ _USED_BY = {
     ),
 }
 """Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
+_OPENS = re.compile(r"^\+{0,2}(measured|log)=(?!null$)")
 _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}
 """Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
 _SWEEP = ("-m", "--multirun")
@@ -99,6 +100,12 @@ def check_used(overrides: list[str], task: str) -> None:
         if task not in verbs:
             having = f"{', '.join(f'task={v}' for v in verbs[:-1])} and task={verbs[-1]}"
             raise ConfigError(f"{override}: task={task} has no use for it; it is for {having}, {instead}")
+        opened = next((o for o in overrides if _OPENS.match(o)), None) if task == "workbench" else None
+        if name == "robot" and opened is not None:
+            raise ConfigError(
+                f"{override}: of no use beside {opened}, which names the robot (with a model file, model= does); "
+                "robot= is for files that are dropped on the page"
+            )
 
 
 def folder_name(overrides: str) -> str:

@@ -72,7 +72,10 @@ class Intake:
         """What task=import would take the columns for. Raises MeasurementError, RobotError, ConfigError."""
         self.path = path
         config = self._config(robot)
-        found = proposal_for([path], robot_of(robot, None, None)[0], import_.hints_of(options_of(answers)))
+        chosen = config.robot
+        found = proposal_for(
+            [path], robot_of(chosen.name, chosen.urdf, chosen.drives)[0], import_.hints_of(options_of(answers))
+        )
         text = as_yaml(found, import_.robot_source(config), path.name)
         return Proposed(tuple(rows(found)), tuple(found.questions), tuple(found.notes), text)
 
@@ -83,7 +86,8 @@ class Intake:
         folder = fresh(self.session.folder / TAKEN_IN)
         folder.mkdir(parents=True)
         options = options_of(answers)
-        words = ["task=import", setting("measured", self.path), f"robot={robot}"]
+        config = replace(self._config(robot), measured=str(self.path))
+        words = ["task=import", setting("measured", self.path), *_named(config.robot)]
         if mapping is not None:
             file = folder / "mapping_used.yaml"
             file.write_text(mapping, encoding="utf-8")
@@ -91,7 +95,6 @@ class Intake:
             words.append(setting("task.mapping", file))
         else:
             words += [f"task.{k}={v}" for k, v in _said(answers).items()]
-        config = replace(self._config(robot), measured=str(self.path))
         with contextlib.redirect_stdout(io.StringIO()):
             import_.run(config, options, folder)
         self._open(folder / options.output, [command(words)])
@@ -119,7 +122,16 @@ class Intake:
         self.session.begin()
 
     def _config(self, robot: str) -> Config:
-        return replace(self.session.config, robot=RobotConfig(name=robot), model=None)
+        """With a robot by name; that of the command line has its files with it."""
+        own = self.session.config.robot
+        return replace(self.session.config, robot=own if robot == own.name else RobotConfig(name=robot), model=None)
+
+
+def _named(robot: RobotConfig) -> list[str]:
+    """The words of a command line that name it."""
+    source = "robot.file" if robot.name == "mjcf" else "robot.urdf"
+    files = {source: robot.urdf, "robot.drives": robot.drives}
+    return [f"robot={robot.name}", *(setting(k, f) for k, f in files.items() if f is not None)]
 
 
 def _said(answers: Answers) -> dict[str, Any]:
