@@ -46,7 +46,7 @@ VERBS = {
     "online": Verb(
         "evolution on the body alone",
         "task=online +scenario=3",
-        ("scenario", "budget", *_RUN),
+        ("scenario", "budget", "robot", *_RUN),
         ("seed", "plugins", "ray.address"),
     ),
     "study": Verb("table and figures of many runs", "task=study log=logs/recover", (), ("log",)),
@@ -63,16 +63,12 @@ VERBS = {
         ("measured",),
     ),
     "robot": Verb("what a robot's file says and lacks", "task=robot urdf=FILE", (), ("urdf", "mjcf")),
-    "compare": Verb(
-        "how far a model is off, and where", "task=compare measured=LOG model=MODEL", ("robot", *_RUN), _MODEL
-    ),
-    "explain": Verb(
-        "which missing effect explains it", "task=explain measured=LOG model=MODEL", ("robot", *_RUN), _MODEL
-    ),
+    "compare": Verb("how far a model is off, and where", "task=compare measured=LOG model=MODEL", _RUN, _MODEL),
+    "explain": Verb("which missing effect explains it", "task=explain measured=LOG model=MODEL", _RUN, _MODEL),
     "improve": Verb(
         "add what earns its place to the model",
         "task=improve measured=LOG effect=auto",
-        ("robot", *_RUN),
+        _RUN,
         (*_MODEL, "effect"),
     ),
     "export": Verb("the model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),

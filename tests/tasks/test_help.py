@@ -11,8 +11,8 @@ from ee_dist.effects import term
 from ee_dist.engines.contract import EngineError
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.robots.servo_pendulum import servo_pendulum
-from ee_dist.tasks.compose import TASKS, config_folder, task_module
-from ee_dist.tasks.config import known_settings
+from ee_dist.tasks.compose import TASKS, check_used, config_folder, task_module
+from ee_dist.tasks.config import ConfigError, known_settings
 from ee_dist.tasks.help import VERBS, options_with, settings_in
 from ee_dist.tasks.summary import package_version
 
@@ -48,6 +48,17 @@ def test_a_verb_tells_each_of_its_settings_with_default_and_meaning(cli, name):
     for group in VERBS[name].groups:
         assert f"{group}=" in outcome.out
     assert all(name in known_settings() for name in VERBS[name].shared)
+
+
+@pytest.mark.parametrize(("group", "chosen"), [("robot", "robot=quadruped"), ("scenario", "+scenario=8")])
+def test_no_verb_offers_what_it_refuses(group, chosen):
+    for name, verb in VERBS.items():
+        try:
+            check_used([chosen], name)
+        except ConfigError:
+            assert group not in verb.groups, name
+        else:
+            assert group in verb.groups, name
 
 
 def test_every_setting_of_every_choice_has_a_meaning():
