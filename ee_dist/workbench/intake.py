@@ -1,4 +1,7 @@
-"""How a log comes onto the bench: a recording, a file of another program by task=import, or the story by task=trial."""
+"""How a log comes onto the bench: a recording, a file of another program by task=import, or the story by task=trial.
+
+What reads other programs' files is loaded when there is one: a page that is opened with a recording does not wait for it.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,15 @@ import io
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ee_dist.measurements.proposal.files import proposal_for
-from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.robots.describe import robot_of
-from ee_dist.tasks import import_, trial
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, RobotConfig
 from ee_dist.tasks.results.tables import command, setting
 from ee_dist.workbench.session import Session, fresh
+
+if TYPE_CHECKING:
+    from ee_dist.tasks.import_ import Options
 
 DROPPED, TAKEN_IN, STORY = "dropped", "import", "trial"
 PLANS = {
@@ -70,6 +73,10 @@ class Intake:
 
     def propose(self, path: Path, robot: str, answers: Answers) -> Proposed:
         """What task=import would take the columns for. Raises MeasurementError, RobotError, ConfigError."""
+        from ee_dist.measurements.proposal.files import proposal_for
+        from ee_dist.measurements.proposal.write import as_yaml, rows
+        from ee_dist.tasks import import_
+
         self.path = path
         config = self._config(robot)
         chosen = config.robot
@@ -81,6 +88,8 @@ class Intake:
 
     def take_in(self, robot: str, answers: Answers, mapping: str | None) -> None:
         """Import what was dropped, by the answers or by a mapping's text, and open it. Raises as task=import does."""
+        from ee_dist.tasks import import_
+
         if self.path is None:
             raise ConfigError("drop a file first")
         folder = fresh(self.session.folder / TAKEN_IN)
@@ -101,6 +110,8 @@ class Intake:
 
     def story(self, robot: str) -> None:
         """Trials of a simulated robot whose hidden effect is sealed, as task=trial makes them."""
+        from ee_dist.tasks import trial
+
         folder = fresh(self.session.folder / STORY)
         folder.mkdir(parents=True)
         config = replace(
@@ -147,8 +158,10 @@ def _said(answers: Answers) -> dict[str, Any]:
     return found
 
 
-def options_of(answers: Answers) -> import_.Options:
+def options_of(answers: Answers) -> Options:
     """Raises ConfigError where a gain is no number."""
+    from ee_dist.tasks.import_ import Options
+
     said = _said(answers)
     gains = None
     if "gains" in said:
@@ -157,4 +170,4 @@ def options_of(answers: Answers) -> import_.Options:
         except ValueError:
             raise ConfigError(f"motor gains: expected numbers, not {answers.gains!r}") from None
     joints = said["joints"].strip("[]").split(",") if "joints" in said else None
-    return import_.Options(joints=joints, gains=gains, unit=said.get("unit"), rate_hz=said.get("rate_hz"))
+    return Options(joints=joints, gains=gains, unit=said.get("unit"), rate_hz=said.get("rate_hz"))
