@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, RobotConfig
-from ee_dist.tasks.results.tables import command, setting
+from ee_dist.tasks.results.commands import command, setting
 from ee_dist.workbench.session import Session, fresh
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from ee_dist.effects.model_file import read_model
 from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.errors import defect
-from ee_dist.tasks.results.tables import command, setting
+from ee_dist.tasks.results.commands import command, setting
 from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
 from ee_dist.workbench import saved
 from ee_dist.workbench.guard import Guard, is_loopback

@@ -19,11 +19,11 @@ from ee_dist.discrepancy.problem import Series, error
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import Hypothesis
-from ee_dist.tasks.config import Config, EvaluatorConfig
+from ee_dist.tasks.config import AUTO, Config, EvaluatorConfig
 from ee_dist.tasks.errors import USER_ERRORS, defect
 from ee_dist.tasks.measurements import Measurements, load
-from ee_dist.tasks.results.tables import command, setting
-from ee_dist.tasks.ways import AUTO, way_of
+from ee_dist.tasks.results.commands import command, setting
+from ee_dist.tasks.ways import way_of
 from ee_dist.trials.log import Array
 from ee_dist.workbench import commands, saved, verbs
 from ee_dist.workbench.bench import Bench, Step, bench_of

@@ -11,10 +11,10 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account, added, named, plain, told
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
+from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.glossary import TERMS
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, step_name
 from ee_dist.tasks.results.story import Link
-from ee_dist.tasks.results.tables import command
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
 from ee_dist.viewing.report import Page, Section, Table

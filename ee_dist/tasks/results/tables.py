@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account, named, percent, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import step_name, worst_trials
 
 TIED_STANDING = "tied with the best"
@@ -96,18 +96,6 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
         console.print(line, highlight=False, markup=False)
     if following:
         console.print(f"Next: {command(following)}", highlight=False, markup=False, soft_wrap=True)
-
-
-def command(words: Sequence[str]) -> str:
-    """A command line of ours that a shell takes as it is, whatever is in its paths."""
-    return shlex.join(["python", "-m", "ee_dist", *words])
-
-
-def setting(key: str, value: str | os.PathLike[str]) -> str:
-    """``key=value`` as Hydra reads it, quoted where it must be."""
-    text = os.path.relpath(value) if os.path.exists(value) else str(value)
-    safe = all(ch.isalnum() or ch in "/._-@:" for ch in text)
-    return f"{key}={text}" if safe else f"{key}='{text}'"
 
 
 def typed(terms: Hypothesis) -> str:
