@@ -8,7 +8,7 @@ from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, added, plain, told
+from ee_dist.discrepancy.words import Account, added, phrase, plain
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
 from ee_dist.tasks.results.commands import command
@@ -142,7 +142,7 @@ def _page(
     links: Sequence[Link],
 ) -> Page:
     count, model = len(problem.trials), measured.model
-    believed = "; ".join(told(t) for t in model) or "the robot as described"
+    believed = phrase(model, problem.robot) or "the robot as described"
     return Page(
         f"{verb}: {plain(problem.robot.name)}",
         f"{count} trial{'s' if count > 1 else ''} of {', '.join(p.name for p in measured.files)}; model: {believed}; "

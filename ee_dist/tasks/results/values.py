@@ -13,6 +13,9 @@ from ee_dist.discrepancy.words import plain, quantity
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.model import Robot
 
+FINE = 1e-4
+"""Share of a value below which its interval is told as it is: nobody reads seven digits."""
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -52,7 +55,7 @@ def within(p: ParameterReport) -> str:
         return f"{p.value:.3g} ({p.flag})" if p.flag else f"{p.value:.3g}"
     if half <= 0:
         return f"{p.value:.4g}"
-    # Two digits of the interval; a value that its interval holds many times over needs no more than it has.
-    digits = 1 - math.floor(math.log10(half))
-    shown = f"{p.value:.{max(digits, 0)}f} ± {half:.{max(digits, 0)}f}"
+    digits = max(1 - math.floor(math.log10(half)), 0)  # two of the interval
+    fine = half < FINE * abs(p.value)
+    shown = f"{p.value:.4g} ± {half:.1g}" if fine else f"{p.value:.{digits}f} ± {half:.{digits}f}"
     return f"{shown} ({p.flag})" if p.flag else shown
