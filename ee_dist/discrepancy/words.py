@@ -354,7 +354,7 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         sure = f"How sure: {_count(tried, 'explanation')} {_were(tried)} tried, and none earns its place."
     else:
         new = added(found)
-        phrases = by_effect(new, robot)
+        phrases = by_effect(tuple(new), robot)
         what = _listed([text for text, _ in phrases]) if new else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {last.held_out}"
