@@ -47,11 +47,11 @@ from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
+from ee_dist.tasks.config import AUTO, Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.improve import calibrated
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.trial import one_trial
-from ee_dist.tasks.ways import AUTO, WAYS, way_of
+from ee_dist.tasks.ways import WAYS, way_of
 from ee_dist.tasks.wiring import close_evaluators, engine_maker
 from ee_dist.trials.excitation import STANDARD, Excitation
 from ee_dist.trials.noise import with_noise

@@ -81,6 +81,7 @@ def _all(bench: Bench, person: Person, out: Path) -> None:
             for view in VIEWS:
                 person.open(view)
                 time.sleep(SETTLED_S)
+                person.evaluate("scrollTo(0, 0)")
                 over = person.evaluate("document.documentElement.scrollWidth - innerWidth")
                 person.evaluate("scrollTo(0, 0)")
                 name = f"{view.lower()}_{width}{'_dark' if dark else ''}.png"

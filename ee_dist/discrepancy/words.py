@@ -27,6 +27,8 @@ TWINS = 2
 """Others that a headline names beside the one that was found,"""
 FEW = 4
 """and the line below it, where there are more."""
+MANY = 3
+"""Places of one effect from which their values are told as a range: each has its line in a table."""
 MOSTLY = 0.97
 """Share of what is above the noise from which nobody asks for the rest."""
 CLOSE = 1.1
@@ -126,6 +128,30 @@ def told_all(terms: Hypothesis, robot: Robot | None = None) -> str:
         each = "; ".join(f"{plain(t.target)} {', '.join(_value(t, k, v, robot) for k, v in t.values)}" for t in terms)
         return f"{plain(terms[0].effect)}, each joint by itself ({of}{each})"
     return "; ".join(told(t, robot) for t in terms)
+
+
+def by_effect(terms: Hypothesis, robot: Robot | None = None) -> list[tuple[str, Hypothesis]]:
+    """Terms in phrases: what acts at one place or two, then in a phrase for each effect what is at many."""
+    own = {e: tuple(t for t in terms if t.effect == e) for e in dict.fromkeys(t.effect for t in terms)}
+    few = [(told(t, robot), (t,)) for t in terms if len(own[t.effect]) < MANY]
+    return few + [(_range_of(mine, robot), mine) for mine in own.values() if len(mine) >= MANY]
+
+
+def phrase(terms: Hypothesis, robot: Robot | None = None) -> str:
+    """Terms in one sentence."""
+    return "; ".join(text for text, _ in by_effect(terms, robot))
+
+
+def _range_of(terms: Hypothesis, robot: Robot | None) -> str:
+    """``coulomb friction at 3 joints (torque 0.15 to 0.26 N.m)``."""
+    joints = robot is not None and all(t.target in robot.motor_names for t in terms)
+    where = "joints" if joints else "parts" if CATALOGUE[terms[0].effect].family == "body" else "places"
+    shown = []
+    for key, _ in terms[0].values:
+        low, high = (f(dict(t.values)[key] for t in terms) for f in (min, max))
+        shown.append(f"{quantity(terms[0], key, robot)} {low:.3g} to {_value(terms[0], key, high, robot)}".strip())
+    values = f" ({', '.join(shown)})" if shown else ""
+    return f"{plain(terms[0].effect)} at {len(terms)} {where}{values}"
 
 
 def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover]) -> Account:
@@ -308,10 +334,10 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
     steps = [r for r in found.ladder if r.added]
     lines = []
     if len(steps) > 1:
-        lines.append("Added, in this order: " + "; ".join(told_all(r.added, robot) for r in steps) + ".")
+        lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
     lines += [tie_text(placed(r.name), r.tied_with) for r in steps if r.tied_with]
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for r in steps for d in r.dropped]
-    lines.append("The model: " + ("; ".join(told(t, robot) for t in found.terms) or "the robot as described") + ".")
+    lines.append("The model: " + (phrase(found.terms, robot) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
     settled = found.verdict in (EXPLAINED, NOTHING_MISSING)
@@ -328,12 +354,13 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         sure = f"How sure: {_count(tried, 'explanation')} {_were(tried)} tried, and none earns its place."
     else:
         new = added(found)
-        what = _listed([told(t, robot) for t in new]) if new else "nothing; the model's own values were fitted anew"
+        phrases = by_effect(tuple(new), robot)
+        what = _listed([text for text, _ in phrases]) if new else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {last.held_out}"
         head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {last.held_out}{_rest(found.explained, settled)}"
-        sure += f"{_ranges(found, new, robot)}{_told_from(steps)}."
+        sure += f"{_ranges(found, [t for _, mine in phrases[:NAMED] if len(mine) == 1 for t in mine], robot)}{_told_from(steps)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     return Account(head, error, sure, tuple(lines), settled, advice)
 
@@ -349,9 +376,9 @@ def _listed(names: Sequence[str]) -> str:
     return "; ".join(names[:NAMED]) + more
 
 
-def _ranges(found: Improvement, new: Sequence[Term], robot: Robot) -> str:
+def _ranges(found: Improvement, named_: Sequence[Term], robot: Robot) -> str:
     """The 95 % intervals of the values that a headline names."""
-    told_of: dict[str, list[str]] = {t.name: [] for t in new[:NAMED]}
+    told_of: dict[str, list[str]] = {t.name: [] for t in named_}
     for p in found.parameters:
         term = found.terms[p.term]
         if term.name in told_of:
@@ -359,7 +386,7 @@ def _ranges(found: Improvement, new: Sequence[Term], robot: Robot) -> str:
             sure = not p.flag and np.isfinite(p.high - p.low)
             told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
     out = [
-        (f"{placed(name)}: " if len(told_of) > 1 else "") + ", ".join(values)
+        (f"{placed(name)}: " if len(added(found)) > 1 else "") + ", ".join(values)
         for name, values in told_of.items()
         if values
     ]

@@ -13,15 +13,16 @@ from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import Account, compare_account
-from ee_dist.tasks.config import Config
+from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load
+from ee_dist.tasks.results.commands import asked
 from ee_dist.tasks.results.pages import compare_page
 from ee_dist.tasks.results.scenes import compare_scene
 from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_comparison
-from ee_dist.tasks.results.tables import setting, show_account, show_comparison
+from ee_dist.tasks.results.tables import show_account, show_comparison
 from ee_dist.tasks.summary import Stopwatch, write_summary
-from ee_dist.tasks.ways import AUTO, known_way, way_of
+from ee_dist.tasks.ways import known_way, way_of
 from ee_dist.tasks.wiring import for_few
 from ee_dist.viewing.report import write_page
 
@@ -52,8 +53,7 @@ def run(config: Config, options: Options, out: Path) -> tuple[Problem, Compariso
     out.mkdir(parents=True, exist_ok=True)
     summary = {**of_comparison(problem, found, account, measured.model, left), "remarks": remarks}
     write_summary(out, "compare", config, options, watch, digest, summary)
-    model = [setting("model", config.model)] if config.model else []
-    following = [] if account.good else ["task=explain", setting("measured", measured.files[0]), *model]
+    following = [] if account.good else asked("explain", config, options.by)
     story = links(out, measured.files, config.model)
     page = compare_page(problem, measured, found, account, residual, remarks, following, story)
     write_page(page, out / "report.html")

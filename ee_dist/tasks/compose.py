@@ -50,6 +50,7 @@ USED_BY = {
     "metric": (("recover",), ""),
 }
 """Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
+_OPENS = re.compile(r"^\+{0,2}(measured|log)=(?!null$)")
 _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}
 """Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
 _SWEEP = ("-m", "--multirun")
@@ -128,13 +129,19 @@ def _check_choice(setting: str) -> None:
 def check_used(overrides: list[str], task: str) -> None:
     """Raises ConfigError for a setting that the verb would pass over in silence."""
     for override in overrides:
-        setting, _, value = override.lstrip("+").partition("=")
-        verbs, instead = USED_BY.get(setting.partition(".")[0], ((task,), ""))
+        name, _, value = override.lstrip("+").partition("=")
+        verbs, instead = USED_BY.get(name.partition(".")[0], ((task,), ""))
         if task not in verbs and value != "null":
             *most, last = (f"task={v}" for v in verbs)
             having = f"{', '.join(most)} and {last}" if most else last
             hint = f", {instead}" if instead else ""
             raise ConfigError(f"{override}: task={task} has no use for it; it is for {having}{hint}")
+        opened = next((o for o in overrides if _OPENS.match(o)), None) if task == "workbench" else None
+        if name.partition(".")[0] == "robot" and opened is not None:
+            raise ConfigError(
+                f"{override}: of no use beside {opened}, which names the robot (with a model file, model= does); "
+                "robot= is for files that are dropped on the page"
+            )
 
 
 def folder_name(overrides: str) -> str:

@@ -15,6 +15,8 @@ from ee_dist.trials.hardware import Limits
 
 ENGINES = ("pybullet", "mujoco")
 EVALUATORS = ("auto", "ray", "serial")
+AUTO = "auto"
+"""task.by: the way of comparing is chosen by what was measured."""
 SMALL_STEPS = 1_000_000
 """Robot-steps that the repair passes of a run ask for, below which Ray takes longer to start (5 s) than it saves."""
 

@@ -14,17 +14,18 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.words import Account, explain_account
 from ee_dist.robots.describe import BUILT_IN
-from ee_dist.tasks.config import Config
+from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
+from ee_dist.tasks.results.commands import asked, setting
 from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
 from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_explanation
-from ee_dist.tasks.results.tables import setting, show_account, show_explanation, typed
+from ee_dist.tasks.results.tables import show_account, show_explanation, typed
 from ee_dist.tasks.summary import Stopwatch, write_summary
-from ee_dist.tasks.ways import AUTO, known_way, way_of
+from ee_dist.tasks.ways import known_way, way_of
 from ee_dist.tasks.wiring import evaluator_of
 from ee_dist.viewing.report import write_page
 
@@ -72,9 +73,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead))
     following = []
     if found.verdict == EFFECT:
-        model = [setting("model", config.model)] if config.model else []
         effect = setting("effect", typed(found.best.terms) if found.best else "auto")
-        following = ["task=improve", setting("measured", measured.files[0]), *model, effect]
+        following = asked("improve", config, options.by, effect)
     story = links(out, measured.files, config.model)
     write_page(explain_page(problem, measured, found, account, following, story), out / "report.html")
     if options.rerun:

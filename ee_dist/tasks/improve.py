@@ -23,17 +23,18 @@ from ee_dist.discrepancy.ways.open_loop.unmodelled import to_entries
 from ee_dist.discrepancy.words import Account, improve_account
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.config import AUTO, Config, ConfigError
 from ee_dist.tasks.measurements import Measurements, load
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
+from ee_dist.tasks.results.commands import asked
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
 from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_improvement
-from ee_dist.tasks.results.tables import setting, show_account, show_candidates, show_ladder
+from ee_dist.tasks.results.tables import show_account, show_candidates, show_ladder
 from ee_dist.tasks.summary import Stopwatch, write_summary
-from ee_dist.tasks.ways import AUTO, known_way, open_loop, way_of
+from ee_dist.tasks.ways import known_way, open_loop, way_of
 from ee_dist.viewing.report import write_page
 
 
@@ -89,7 +90,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         )
     digest = hashlib.sha256(repr([(r.terms, r.error_heldout) for r in found.ladder]).encode()).hexdigest()
     write_summary(out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path)))
-    following = ["task=compare", setting("measured", measured.files[0]), setting("model", path)]
+    following = asked("compare", replace(config, model=str(path)), options.by)
     story = links(out, measured.files, config.model)
     write_page(improve_page(problem, measured, found, account, following, story), out / "report.html")
     if options.rerun:

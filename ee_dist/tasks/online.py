@@ -16,7 +16,8 @@ from ee_dist.evaluation.jobs import Evaluator, Job, Travel
 from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recovery.repair import network
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig
+from ee_dist.tasks.config import BudgetConfig, Config, ConfigError, ScenarioConfig
+from ee_dist.tasks.results.commands import command, simulated
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.wiring import build_robot, evaluator_of
 from ee_dist.viewing.report import Page, Section, write_page
@@ -68,6 +69,14 @@ def run(config: Config, options: Options, out: Path) -> None:
     console.print(f"Scenario {config.scenario.number}: {config.scenario.title}. Seed {config.seed}.", highlight=False)
     console.print(f"  {os.path.relpath(out / 'report.html')}", highlight=False, soft_wrap=True)
     console.print(head, highlight=False)
+    console.print(f"Next: {_following(config, config.scenario)}", highlight=False, soft_wrap=True)
+
+
+def _following(config: Config, scenario: ScenarioConfig) -> str:
+    """The loop with a model, on the same body at the same budget."""
+    usual = BudgetConfig()
+    budget = [] if config.budget.name == usual.name else [f"budget={config.budget.name}"]
+    return command([f"+scenario={scenario.number}", f"seed={config.seed}", *budget, *simulated(config)])
 
 
 def _evolve(
@@ -101,7 +110,7 @@ def _page(config: Config, scenario: ScenarioConfig, before: Curve, after: Curve,
         f"scenario {scenario.number} ({scenario.title}); seed {config.seed}, budget {config.budget.name}, {config.engine.name}",
         head,
         first=["Every evaluation is a trial on the body: that is what the loop with a model saves."],
-        following=f"python -m ee_dist +scenario={scenario.number} seed={config.seed}",
+        following=_following(config, scenario),
         proof=Section("Best distance over the trials on the body", shown, figure),
         foot="ee_dist. Evolution on the body alone, without a model: the paper's Fig. 1.",
     )

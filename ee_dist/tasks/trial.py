@@ -27,6 +27,7 @@ from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.results.commands import asked, command
 from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.seal import FILE, sealed
 from ee_dist.tasks.summary import Stopwatch, package_version, write_summary
@@ -125,9 +126,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     files = [("log", path), ("rerun", scene), *([] if body else [("truth", out / FILE)])]
     for label, file in files:
         console.print(f"  {label:<10}{os.path.relpath(file)}", highlight=False, soft_wrap=True)
-    console.print(
-        f"Next: python -m ee_dist task=explain measured={os.path.relpath(path)}", highlight=False, soft_wrap=True
-    )
+    following = command(asked("explain", replace(config, measured=str(path))))
+    console.print(f"Next: {following}", highlight=False, markup=False, soft_wrap=True)
 
 
 def one_trial(

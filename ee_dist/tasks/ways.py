@@ -14,11 +14,9 @@ from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.engines.one_joint import fits
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import Config, ConfigError, one_of
+from ee_dist.tasks.config import AUTO, Config, ConfigError, one_of
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.wiring import ONE_JOINT, evaluator_of
-
-AUTO = "auto"
 
 
 @dataclass(frozen=True)

@@ -207,6 +207,29 @@ def ladder(
     return figure
 
 
+def values(title: str, at: Sequence[tuple[str, float, float]], neutral: float) -> go.Figure:
+    """One quantity at each of its places, (place, value, half of its interval), beside the value at which it does nothing."""
+    figure = go.Figure()
+    known = [half if np.isfinite(half) else 0.0 for _, _, half in at]
+    figure.add_scatter(
+        x=[value for _, value, _ in at],
+        y=[place for place, _, _ in at],
+        mode="markers",
+        marker={"size": 9, "color": IMPROVED},
+        error_x={"type": "data", "array": known, "color": IMPROVED, "thickness": 2, "width": 5},
+        hovertemplate="%{y}: %{x:.4g} ± %{error_x.array:.2g}<extra></extra>",
+    )
+    figure.add_vline(x=neutral, line={"color": "#8899aa", "width": 1})
+    styled(figure, 78 + 24 * len(at))
+    figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ", type="category")
+    figure.update_layout(
+        title={"text": title, "font": {"size": 12}, "x": 0.02, "y": 0.97},
+        hovermode="closest",
+        margin={"l": 20, "r": 14, "t": 30, "b": 30},
+    )
+    return figure
+
+
 def cloud(title: str, part: Cloud) -> go.Figure:
     """One channel's residuals against one thing, with their means over each stretch of its range; dashed, the mark that the
     effect promises: what the improved model predicts there less what the model does, whatever was measured."""

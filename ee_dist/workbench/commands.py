@@ -11,8 +11,8 @@ from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import write_model
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import Measurements
-from ee_dist.tasks.results.tables import command, setting
-from ee_dist.tasks.ways import AUTO
+from ee_dist.tasks.results.commands import asked as words
+from ee_dist.tasks.results.commands import command
 
 CALIBRATION = ".calibration.yaml"
 
@@ -36,22 +36,4 @@ def asked(config: Config, measured: Measurements, model: Path | str | None) -> C
 
 def line(task: str, config: Config, by: str, *more: str) -> str:
     """The command line of a verb, as a shell takes it."""
-    files = config.measured if isinstance(config.measured, list) else [config.measured]
-    named = setting("measured", files[0]) if len(files) == 1 else _several(files)
-    words = [f"task={task}", named]
-    if config.model is not None:
-        words.append(setting("model", config.model))
-    words += more
-    if by != AUTO:
-        words.append(f"task.by={by}")
-    if config.engine.name != Config().engine.name:
-        words.append(f"engine={config.engine.name}")
-    if config.evaluator.name != Config().evaluator.name:
-        words.append(f"evaluator={config.evaluator.name}")
-    if config.plugins:
-        words.append(_several(config.plugins, "plugins"))
-    return command(words)
-
-
-def _several(files: Sequence[str], key: str = "measured") -> str:
-    return f"{key}=[{','.join(setting('x', f).removeprefix('x=') for f in files)}]"
+    return command(words(task, config, by, *more))

@@ -1,4 +1,7 @@
-"""How a log comes onto the bench: a recording, a file of another program by task=import, or the story by task=trial."""
+"""How a log comes onto the bench: a recording, a file of another program by task=import, or the story by task=trial.
+
+What reads other programs' files is loaded when there is one: a page that is opened with a recording does not wait for it.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,15 @@ import io
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ee_dist.measurements.proposal.files import proposal_for
-from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.robots.describe import robot_of
-from ee_dist.tasks import import_, trial
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, RobotConfig
-from ee_dist.tasks.results.tables import command, setting
+from ee_dist.tasks.results.commands import command, setting
 from ee_dist.workbench.session import Session, fresh
+
+if TYPE_CHECKING:
+    from ee_dist.tasks.import_ import Options
 
 DROPPED, TAKEN_IN, STORY = "dropped", "import", "trial"
 PLANS = {
@@ -70,20 +73,30 @@ class Intake:
 
     def propose(self, path: Path, robot: str, answers: Answers) -> Proposed:
         """What task=import would take the columns for. Raises MeasurementError, RobotError, ConfigError."""
+        from ee_dist.measurements.proposal.files import proposal_for
+        from ee_dist.measurements.proposal.write import as_yaml, rows
+        from ee_dist.tasks import import_
+
         self.path = path
         config = self._config(robot)
-        found = proposal_for([path], robot_of(robot, None, None)[0], import_.hints_of(options_of(answers)))
+        chosen = config.robot
+        found = proposal_for(
+            [path], robot_of(chosen.name, chosen.urdf, chosen.drives)[0], import_.hints_of(options_of(answers))
+        )
         text = as_yaml(found, import_.robot_source(config), path.name)
         return Proposed(tuple(rows(found)), tuple(found.questions), tuple(found.notes), text)
 
     def take_in(self, robot: str, answers: Answers, mapping: str | None) -> None:
         """Import what was dropped, by the answers or by a mapping's text, and open it. Raises as task=import does."""
+        from ee_dist.tasks import import_
+
         if self.path is None:
             raise ConfigError("drop a file first")
         folder = fresh(self.session.folder / TAKEN_IN)
         folder.mkdir(parents=True)
         options = options_of(answers)
-        words = ["task=import", setting("measured", self.path), f"robot={robot}"]
+        config = replace(self._config(robot), measured=str(self.path))
+        words = ["task=import", setting("measured", self.path), *_named(config.robot)]
         if mapping is not None:
             file = folder / "mapping_used.yaml"
             file.write_text(mapping, encoding="utf-8")
@@ -91,13 +104,14 @@ class Intake:
             words.append(setting("task.mapping", file))
         else:
             words += [f"task.{k}={v}" for k, v in _said(answers).items()]
-        config = replace(self._config(robot), measured=str(self.path))
         with contextlib.redirect_stdout(io.StringIO()):
             import_.run(config, options, folder)
         self._open(folder / options.output, [command(words)])
 
     def story(self, robot: str) -> None:
         """Trials of a simulated robot whose hidden effect is sealed, as task=trial makes them."""
+        from ee_dist.tasks import trial
+
         folder = fresh(self.session.folder / STORY)
         folder.mkdir(parents=True)
         config = replace(
@@ -119,7 +133,16 @@ class Intake:
         self.session.begin()
 
     def _config(self, robot: str) -> Config:
-        return replace(self.session.config, robot=RobotConfig(name=robot), model=None)
+        """With a robot by name; that of the command line has its files with it."""
+        own = self.session.config.robot
+        return replace(self.session.config, robot=own if robot == own.name else RobotConfig(name=robot), model=None)
+
+
+def _named(robot: RobotConfig) -> list[str]:
+    """The words of a command line that name it."""
+    source = "robot.file" if robot.name == "mjcf" else "robot.urdf"
+    files = {source: robot.urdf, "robot.drives": robot.drives}
+    return [f"robot={robot.name}", *(setting(k, f) for k, f in files.items() if f is not None)]
 
 
 def _said(answers: Answers) -> dict[str, Any]:
@@ -135,8 +158,10 @@ def _said(answers: Answers) -> dict[str, Any]:
     return found
 
 
-def options_of(answers: Answers) -> import_.Options:
+def options_of(answers: Answers) -> Options:
     """Raises ConfigError where a gain is no number."""
+    from ee_dist.tasks.import_ import Options
+
     said = _said(answers)
     gains = None
     if "gains" in said:
@@ -145,4 +170,4 @@ def options_of(answers: Answers) -> import_.Options:
         except ValueError:
             raise ConfigError(f"motor gains: expected numbers, not {answers.gains!r}") from None
     joints = said["joints"].strip("[]").split(",") if "joints" in said else None
-    return import_.Options(joints=joints, gains=gains, unit=said.get("unit"), rate_hz=said.get("rate_hz"))
+    return Options(joints=joints, gains=gains, unit=said.get("unit"), rate_hz=said.get("rate_hz"))

@@ -21,9 +21,10 @@ from nicegui import ui
 from rich.console import Console
 
 from ee_dist.effects.model_file import read_model
+from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.errors import defect
-from ee_dist.tasks.results.tables import command, setting
+from ee_dist.tasks.results.commands import command, setting
 from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
 from ee_dist.workbench import saved
 from ee_dist.workbench.guard import Guard, is_loopback
@@ -69,8 +70,11 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
         show_recovery(log, out)
     elif config.measured:
         session.load(config.measured, config.model)
-    elif config.model:
-        read_model(config.model)  # A wrong one is said now, not when a log is dropped.
+    else:
+        # Wrong ones are said now, not when a log is dropped.
+        robot_of(config.robot.name, config.robot.urdf, config.robot.drives)
+        if config.model:
+            read_model(config.model)
     sock = bound(host, port)
     token = "" if is_loopback(host) else secrets.token_urlsafe(24)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)

@@ -19,12 +19,11 @@ from ee_dist.discrepancy.problem import Series, error
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import Hypothesis
-from ee_dist.tasks import export
-from ee_dist.tasks.config import Config, EvaluatorConfig
+from ee_dist.tasks.config import AUTO, Config, EvaluatorConfig
 from ee_dist.tasks.errors import USER_ERRORS, defect
 from ee_dist.tasks.measurements import Measurements, load
-from ee_dist.tasks.results.tables import command, setting
-from ee_dist.tasks.ways import AUTO, way_of
+from ee_dist.tasks.results.commands import command, setting
+from ee_dist.tasks.ways import way_of
 from ee_dist.trials.log import Array
 from ee_dist.workbench import commands, saved, verbs
 from ee_dist.workbench.bench import Bench, Step, bench_of
@@ -331,6 +330,8 @@ class Session:
 
     def export(self, to: str) -> Path:
         """The model for other simulators, by task=export. Raises what it raises."""
+        from ee_dist.tasks import export  # only here: what writes for other programs takes long to load
+
         config = replace(self._asked(self.bench.terms), to=to)
         if config.model is None:
             path = self.folder / MODEL_FILE

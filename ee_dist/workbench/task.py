@@ -6,9 +6,9 @@ import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 
-from ee_dist.tasks.config import Config, ConfigError, one_of, within
+from ee_dist.tasks.config import AUTO, Config, ConfigError, one_of, within
 from ee_dist.tasks.unfinished import note_nothing
-from ee_dist.tasks.ways import AUTO, WAYS
+from ee_dist.tasks.ways import WAYS
 
 TOOLKIT = "nicegui"
 

@@ -10,9 +10,19 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.words import Account, compare_account, explain_account, improve_account, told, told_all
+from ee_dist.discrepancy.words import (
+    Account,
+    compare_account,
+    explain_account,
+    improve_account,
+    phrase,
+    plain,
+    told,
+    told_all,
+)
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
+from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.improve import effects_of
 from ee_dist.tasks.results.tables import typed
@@ -69,6 +79,18 @@ def test_one_effect_at_several_joints_is_told_with_each_of_its_values() -> None:
     both = [term("stribeck_friction", j, torque_nm=v, speed_rad_s=0.5) for j, v in (("a", 0.1), ("b", 0.2))]
     said = "stribeck friction, each joint by itself (torque, speed: a 0.1 N.m, 0.5 rad/s; b 0.2 N.m, 0.5 rad/s)"
     assert told_all(tuple(both)) == said
+
+
+def test_many_values_are_told_by_kind_and_what_stands_alone_comes_first() -> None:
+    robot = quadruped()
+    (a, b, c), parts = robot.motor_names[:3], [p.name for p in robot.parts[:3]]
+    dry = [term("coulomb_friction", j, torque_nm=v) for j, v in zip((a, b, c), (0.1, 0.25, 0.2), strict=True)]
+    mass = [term("part_mass", j, change=v) for j, v in zip(parts, (-0.1, 0.05, 0.0), strict=True)]
+    alone = [term("load_friction", b, share=0.3), *(term("zero_offset", j, offset_rad=0.01) for j in (a, c))]
+    assert phrase((*mass, *dry, *alone), robot) == (
+        f"load friction at {plain(b)} (share 0.3); zero offset at {plain(a)} (offset 0.01 rad); zero offset at {plain(c)} "
+        "(offset 0.01 rad); part mass at 3 parts (change -0.1 to 0.05); coulomb friction at 3 joints (torque 0.1 to 0.25 N.m)"
+    )
 
 
 def test_a_value_that_is_called_by_its_unit_has_no_other_name() -> None:

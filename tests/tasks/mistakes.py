@@ -273,6 +273,11 @@ WORKBENCH: Rows = (
         "task=workbench log=trial.mcap measured=trial.mcap",
         "log= follows a recovery, measured= compares a model with a log",
     ),
+    (
+        "task=workbench measured=trial.mcap robot=linear_stage",
+        "robot=linear_stage: of no use beside measured=trial.mcap, which names the robot",
+    ),
+    ("task=workbench robot=urdf", "robot=urdf needs robot.urdf=FILE.urdf"),
 )
 """The page."""
 

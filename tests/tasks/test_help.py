@@ -11,8 +11,8 @@ from ee_dist.effects import term
 from ee_dist.engines.contract import EngineError
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.robots.servo_pendulum import servo_pendulum
-from ee_dist.tasks.compose import TASKS, USED_BY, config_folder, task_module
-from ee_dist.tasks.config import known_settings
+from ee_dist.tasks.compose import TASKS, USED_BY, check_used, config_folder, task_module
+from ee_dist.tasks.config import ConfigError, known_settings
 from ee_dist.tasks.help import VERBS, options_with, settings_in
 from ee_dist.tasks.summary import package_version
 
@@ -54,6 +54,17 @@ def test_a_verb_tells_each_of_its_settings_with_default_and_meaning(cli, name):
 def test_a_verb_is_refused_just_those_settings_that_its_help_does_not_have(name):
     having = {v for v, verb in VERBS.items() if name in (*verb.groups, *(s.partition(".")[0] for s in verb.shared))}
     assert having == set(USED_BY[name][0])
+
+
+@pytest.mark.parametrize(("group", "chosen"), [("robot", "robot=quadruped"), ("scenario", "+scenario=8")])
+def test_no_verb_offers_what_it_refuses(group, chosen):
+    for name, verb in VERBS.items():
+        try:
+            check_used([chosen], name)
+        except ConfigError:
+            assert group not in verb.groups, name
+        else:
+            assert group in verb.groups, name
 
 
 def test_every_setting_of_every_choice_has_a_meaning():

@@ -109,7 +109,8 @@ def test_every_verb_by_every_way(cli, imported, by):
     compared = json.loads((found / "summary.json").read_text())
     assert compared["way"] == by and compared["error"] > 1.5 * compared["noise_floor"]
     assert (found / "compare.rrd").is_file() and (found / "report.html").stat().st_size > 100_000
-    assert "task=explain" in said.out.strip().splitlines()[-1]
+    last = said.out.strip().splitlines()[-1]
+    assert "task=explain" in last and way in last, "the same way again"
     first = told_alike(found, said)
     assert compared["left"] and first[0].startswith("The model is off, most of all at ")
 

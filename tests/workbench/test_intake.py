@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ee_dist.tasks.config import Config, ConfigError, EngineConfig
+from ee_dist.robots.describe import robot_of
+from ee_dist.tasks.config import Config, ConfigError, EngineConfig, RobotConfig
 from ee_dist.workbench.intake import Answers, Intake, options_of
 from ee_dist.workbench.session import Session
 
@@ -54,3 +56,26 @@ def test_a_run_is_followed_while_it_grows(recording, tmp_path):
     assert not followed.look() and "looking again" in followed.note
     shutil.copy(recording, part)
     assert followed.look() and len(followed.run.trials) == 1 and not followed.look()
+
+
+def test_a_csv_of_a_robot_from_a_file(tmp_path):
+    """The robot of the command line is offered with its files, and named by the command that does it again."""
+    examples = Path(__file__).parents[2] / "docs" / "examples"
+    own = RobotConfig("urdf", drives=str(examples / "arm.yaml"))
+    intake = Intake(Session(Config(robot=own, engine=EngineConfig("mujoco")), "auto", tmp_path / "bench"))
+    path = intake.place_for("reach.csv")
+    t = np.arange(0.0, 1.0, 0.01)
+    joints = robot_of("urdf", None, own.drives)[0].motor_names
+    columns = [
+        f"{kind}_{j}_{unit}"
+        for kind, unit in (("position", "rad"), ("torque", "nm"), ("command", "rad"))
+        for j in joints
+    ]
+    swings = [0.2 * np.sin(2 * t + k) for k in range(len(columns))]
+    np.savetxt(path, np.stack([t, *swings], axis=1), delimiter=",", header=",".join(["time_s", *columns]), comments="")
+    found = intake.propose(path, "urdf", Answers())
+    intake.take_in("urdf", Answers(), found.text)
+    session = intake.session
+    assert session.measured.robot.motor_names == joints
+    assert "robot=urdf robot.drives=" in session.commands[0] and "arm.yaml" in session.commands[0]
+    session.close()

@@ -29,6 +29,10 @@ except BrowserError as error:
     pytest.skip(str(error), allow_module_level=True)
 
 NUMBER = "parseFloat(document.querySelector('.number').innerText)"
+UNCOVERED = """(() => {
+  const e = [...document.querySelectorAll("input[aria-label^='Add an effect']")].find((e) => e.offsetParent);
+  scrollTo(0, 0); const r = e.getBoundingClientRect();
+  return e.contains(document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2)); })()"""
 FOUND = "document.body.innerText.includes('Ranked, with 95 % intervals')"
 
 
@@ -107,6 +111,9 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
             person.waits_for("measured")
             person.wait("document.querySelectorAll('.js-plotly-plot .main-svg').length > 4")
             assert person.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+            # The curves stay in sight beside the sliders, and cover nothing before the page is scrolled.
+            person.open("Add")
+            person.wait(UNCOVERED)
             assert person.complaints() == ()
             assert person.asked_outside(bench.address) == []
         assert refused(bench.address) == 200

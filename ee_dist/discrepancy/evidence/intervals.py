@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit  # scipy.stats, which calls them, takes a second to load
 
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.fitted import Fit
@@ -71,7 +71,7 @@ def half_widths(problem: Problem, fit: Fit, level: float = LEVEL) -> Array:
     weak = np.diag(normal) < 1e-9
     inverse = np.linalg.pinv(normal + np.diag(np.where(weak, 1e-9, 0.0)))
     excess = max(1.0, fit.energy / max(1, int(fit.mask.sum()) - len(fit.u)))
-    by_noise = np.sqrt(np.maximum(np.diag(inverse), 0.0) * excess) * norm.ppf(0.5 + level / 2)
+    by_noise = np.sqrt(np.maximum(np.diag(inverse), 0.0) * excess) * ndtri(0.5 + level / 2)
     piece = problem.trial_of if len(problem.trials) >= FEW else problem.segment_of
     piece = np.unique(piece[fit.mask], return_inverse=True)[1]
     count = int(piece.max()) + 1
@@ -80,5 +80,5 @@ def half_widths(problem: Problem, fit: Fit, level: float = LEVEL) -> Array:
     pull = fit.slopes * fit.residual[fit.mask][:, None]
     scores = np.stack([np.bincount(piece, weights=column, minlength=count) for column in pull.T], axis=1)
     spread = inverse @ (scores.T @ scores) @ inverse * count / (count - 1)
-    by_pieces = np.sqrt(np.maximum(np.diag(spread), 0.0)) * t.ppf(0.5 + level / 2, count - 1)
+    by_pieces = np.sqrt(np.maximum(np.diag(spread), 0.0)) * stdtrit(count - 1, 0.5 + level / 2)
     return np.where(weak, np.inf, np.maximum(by_noise, by_pieces))

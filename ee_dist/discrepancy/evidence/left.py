@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri  # scipy.stats, which calls them, takes a second to load
 
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.trials.log import Array
@@ -82,4 +82,4 @@ def _rarity(total: float, each: float, count: float) -> float:
     """How rare a sum of ``count`` squares of noise of mean ``each`` is: the normal deviate that is as rare."""
     if each <= 0 or count < 1:
         return math.inf
-    return float(norm.isf(chi2.sf(total / each, count)))
+    return -float(ndtri(chdtrc(count, total / each)))

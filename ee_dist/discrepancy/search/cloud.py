@@ -18,10 +18,6 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.trials.log import Array
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    import cma
-
 POPULATION = 14
 SIGMA = 0.15
 """Size of the first cloud, as a share of each parameter's bounds."""
@@ -117,6 +113,8 @@ def _begin(model: Model, u: Array, seed: int, index: int, sigma: float) -> _Run:
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        import cma  # only here: with scipy.stats, which it brings, it takes a second to load
+
         start = np.clip((u - low) / room, 0.02, 0.98)
         # One dimension is too few for the strategy; a second one that does nothing costs nothing.
         padded = start if len(start) > 1 else np.array([start[0], 0.5])

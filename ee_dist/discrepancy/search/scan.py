@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.refit import Refit
@@ -66,6 +65,8 @@ def _points(screened: Screened, index: int) -> list[Array]:
     else:
         lead = screened.starts[0] if screened.starts else c.upper * 0.3
         points += [np.clip(lead * f, c.lower, c.upper) for f in (0.5, 1.5, 2.5)]
+        from scipy.stats import qmc  # only here: it takes a second to load
+
         spread = qmc.Sobol(c.size, seed=np.random.default_rng([index, c.size])).random(16)[:SCATTERED]
         points += [c.lower + p * (c.upper - c.lower) for p in spread]
     return [np.clip(u, c.lower, c.upper) for u in points]

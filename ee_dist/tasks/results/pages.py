@@ -8,16 +8,17 @@ from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, added, named, plain, told
+from ee_dist.discrepancy.words import Account, added, phrase, plain
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
+from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.glossary import TERMS
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, step_name
 from ee_dist.tasks.results.story import Link
-from ee_dist.tasks.results.tables import command
+from ee_dist.tasks.results.values import kinds_of
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
-from ee_dist.viewing.report import Page, Section, Table
+from ee_dist.viewing.report import Page, Section
 
 
 def compare_page(
@@ -116,13 +117,7 @@ def improve_page(
         )
         caption = f"Error of each model on {last.held_out}. Everything is fitted anew at each step."
         page.sections.append(Section("The ladder", caption, figure))
-    rows = [
-        [named(found.terms[p.term]), plain(p.name), f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}", p.flag]
-        for p in found.parameters
-    ]
-    if rows:
-        table = Table(["effect", "parameter", "value", "95 % interval", "note"], rows, (2, 3))
-        page.sections.append(Section(f"The {IMPROVED}", "Its effects, with the interval of each value.", None, table))
+    _add(page, parts.values_section(kinds_of(found.terms, found.parameters, problem.robot)))
     page.sections.append(parts.browser_section(overlays, models))
     _add(page, parts.signature_section(problem, found.base, after, tuple(added(found))))
     page.sections.append(parts.heat_section(problem, found.base, after))
@@ -147,7 +142,7 @@ def _page(
     links: Sequence[Link],
 ) -> Page:
     count, model = len(problem.trials), measured.model
-    believed = "; ".join(told(t) for t in model) or "the robot as described"
+    believed = phrase(model, problem.robot) or "the robot as described"
     return Page(
         f"{verb}: {plain(problem.robot.name)}",
         f"{count} trial{'s' if count > 1 else ''} of {', '.join(p.name for p in measured.files)}; model: {believed}; "

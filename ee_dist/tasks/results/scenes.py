@@ -15,9 +15,10 @@ from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
 from ee_dist.discrepancy.words import Account, above, placed, told_all
 from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, trial_name, unit_of, worst_trials
 from ee_dist.tasks.results.labels import drawn as in_unit
-from ee_dist.tasks.results.tables import TIED_STANDING, command, standing
+from ee_dist.tasks.results.tables import TIED_STANDING, standing
 from ee_dist.trials.log import SensorLog
 from ee_dist.viewing import finding as drawn
 from ee_dist.viewing.finding_scene import write_compare_rrd, write_explain_rrd, write_improve_rrd

@@ -14,6 +14,7 @@ from ee_dist.discrepancy.words import above, percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, trial_name, worst_trials
 from ee_dist.tasks.results.tables import standing
+from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
 from ee_dist.viewing.curves import MOST as POINTS
@@ -90,6 +91,27 @@ def browser_section(overlays: Sequence[Overlay], models: Models) -> Section:
     if found.left_out:
         caption += f" The {found.left_out} with the least error had no room here."
     return Section("Measured and predicted, every channel and trial", caption, browser=found)
+
+
+def values_section(kinds: Sequence[Kind]) -> Section | None:
+    """What the improved model has, by kind of effect; with figures where an effect acts at several places."""
+    if not kinds:
+        return None
+    rows = [
+        [kind.effect, kind.quantity, place, f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}", kind.unit, p.flag]
+        for kind in kinds
+        for place, p in kind.at
+    ]
+    table = Table(["effect", "quantity", "where", "value", "95 % interval", "unit", "note"], rows, (3, 4))
+    drawn_ = [
+        figures.values(k.name, [(place, p.value, (p.high - p.low) / 2) for place, p in k.at], k.neutral)
+        for k in kinds
+        if len(k.at) > 1
+    ]
+    caption = "Its effects, with the 95 % interval of each value."
+    if drawn_:
+        caption += " Drawn is what acts at several places: a dot is a value, its line the interval; the grey line is no effect."
+    return Section(f"The {IMPROVED}", caption, table=table, figures=drawn_)
 
 
 def heat_section(problem: Problem, residual: Array, after: Array | None = None) -> Section:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ee_dist.tasks.outcome import RESTORED
-from ee_dist.tasks.results.tables import command, setting
+from ee_dist.tasks.results.commands import command, setting
 from ee_dist.viewing.report import Page, Section, Table
 from ee_dist.viewing.study_figures import METRICS, distances, dominants
 

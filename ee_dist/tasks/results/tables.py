@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,9 +14,11 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, named, percent, plain, told_all
+from ee_dist.discrepancy.words import Account, percent, phrase, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import step_name, worst_trials
+from ee_dist.tasks.results.values import kinds_of, within
 
 TIED_STANDING = "tied with the best"
 Column = tuple[str, bool]
@@ -70,18 +71,18 @@ def standing(c: Judged, best: Judged) -> str:
 
 def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
     rows = [
-        (told_all(r.added, problem.robot) or step_name(r), problem.told(r.error_fit), problem.told(r.error_heldout))
+        (phrase(r.added, problem.robot) or step_name(r), problem.told(r.error_fit), problem.told(r.error_heldout))
         for r in found.ladder
     ]
     table = _table(f"The ladder: {problem.natural_name}", (("step", False), ("fitted", True), ("held out", True)), rows)
     table.add_section()
     table.add_row("noise floor", "", problem.told(found.noise_floor))
     console.print(table)
-    for p in found.parameters:
+    kinds = kinds_of(found.terms, found.parameters, problem.robot)
+    if kinds:
+        at = [(k.name, "; ".join(f"{place} {within(p)}" for place, p in k.at)) for k in kinds]
         console.print(
-            f"  {named(found.terms[p.term])}: {p.name} = {p.value:.4g}, 95 % [{p.low:.4g}, {p.high:.4g}] {p.flag}",
-            highlight=False,
-            markup=False,
+            _table("Its values, with 95 % intervals", (("effect", False), ("where, and how much", False)), at)
         )
 
 
@@ -96,18 +97,6 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
         console.print(line, highlight=False, markup=False)
     if following:
         console.print(f"Next: {command(following)}", highlight=False, markup=False, soft_wrap=True)
-
-
-def command(words: Sequence[str]) -> str:
-    """A command line of ours that a shell takes as it is, whatever is in its paths."""
-    return shlex.join(["python", "-m", "ee_dist", *words])
-
-
-def setting(key: str, value: str | os.PathLike[str]) -> str:
-    """``key=value`` as Hydra reads it, quoted where it must be."""
-    text = os.path.relpath(value) if os.path.exists(value) else str(value)
-    safe = all(ch.isalnum() or ch in "/._-@:" for ch in text)
-    return f"{key}={text}" if safe else f"{key}='{text}'"
 
 
 def typed(terms: Hypothesis) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from nicegui import events, ui
@@ -28,7 +29,8 @@ class StartView(View):
             quiet(
                 "A recording (.mcap), or a file of another program (CSV, Parquet, JSON, bags, MATLAB, ...): columns are guessed."
             )
-            self.robot = ui.select(list(BUILT_IN), value=self._robot(), label="robot (not needed for a recording)").props(
+            self.robot = ui.select(self._robots(), value=self.session.config.robot.name,
+                                   label="robot (not needed for a recording)").props(
                 "dense outlined"
             ).style("min-width:260px").mark("robot-name")  # fmt: skip
             ui.upload(
@@ -68,9 +70,11 @@ class StartView(View):
                     )
             self.busy = quiet()
 
-    def _robot(self) -> str:
-        name = self.session.config.robot.name
-        return name if name in BUILT_IN else next(iter(BUILT_IN))
+    def _robots(self) -> dict[str, str]:
+        """Those that are built in, and the one that the command line names."""
+        own = self.session.config.robot
+        file = own.drives or own.urdf
+        return {**{n: n for n in BUILT_IN}, own.name: own.name if file is None else f"{own.name}: {Path(file).name}"}
 
     async def _dropped(self, event: events.UploadEventArguments) -> None:
         path = self.intake.place_for(event.file.name)

@@ -1,0 +1,49 @@
+"""Command lines of ours, as a shell takes them: what to type next, and what does again what was done."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Sequence
+
+from ee_dist.tasks.config import AUTO, Config
+
+
+def command(words: Sequence[str]) -> str:
+    """A command line of ours that a shell takes as it is, whatever is in its paths."""
+    return shlex.join(["python", "-m", "ee_dist", *words])
+
+
+def setting(key: str, value: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
+    """``key=value``, or ``key=[one,two]`` of several, as Hydra reads it, quoted where it must be."""
+    if isinstance(value, str | os.PathLike):
+        return f"{key}={_quoted(value)}"
+    return f"{key}={_quoted(value[0])}" if len(value) == 1 else f"{key}=[{','.join(map(_quoted, value))}]"
+
+
+def _quoted(value: str | os.PathLike[str]) -> str:
+    text = os.path.relpath(value) if os.path.exists(value) else str(value)
+    return text if all(ch.isalnum() or ch in "/._-@:" for ch in text) else f"'{text}'"
+
+
+def asked(task: str, config: Config, by: str = AUTO, *more: str) -> list[str]:
+    """The words that ask for a verb on the measurements and the model of ``config``, with all of its settings that decide
+    what comes out."""
+    words = [f"task={task}", setting("measured", config.measured)]
+    if config.model is not None:
+        words.append(setting("model", config.model))
+    words += more
+    if by != AUTO:
+        words.append(f"task.by={by}")
+    return [*words, *simulated(config)]
+
+
+def simulated(config: Config) -> list[str]:
+    """The words for what simulates, where it is not what every run has, and for effects of one's own."""
+    usual = Config()
+    words = [] if config.engine.name == usual.engine.name else [f"engine={config.engine.name}"]
+    if config.evaluator.name != usual.evaluator.name:
+        words.append(f"evaluator={config.evaluator.name}")
+    if config.plugins:
+        words.append(f"plugins=[{','.join(map(_quoted, config.plugins))}]")
+    return words

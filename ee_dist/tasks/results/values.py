@@ -1,0 +1,61 @@
+"""The values that a fit found, an effect's beside each other: many small ones are read by kind, not in a list."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.intervals import ParameterReport
+from ee_dist.discrepancy.words import plain, quantity
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
+from ee_dist.robots.model import Robot
+
+FINE = 1e-4
+"""Share of a value below which its interval is told as it is: nobody reads seven digits."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One quantity of one effect at each of its places, in one unit (empty where it has none). ``neutral``: where it does
+    nothing."""
+
+    effect: str
+    quantity: str
+    unit: str
+    neutral: float
+    at: tuple[tuple[str, ParameterReport], ...]
+
+    @property
+    def name(self) -> str:
+        """``coulomb friction, torque (N.m)``."""
+        of = f", {self.quantity}" if self.quantity else ""
+        return f"{self.effect}{of}{f' ({self.unit})' if self.unit else ''}"
+
+
+def kinds_of(terms: Hypothesis, reports: Sequence[ParameterReport], robot: Robot) -> list[Kind]:
+    """Every value in its kind, in the order in which the kinds are met."""
+    found: dict[tuple[str, str, str, float], list[tuple[str, ParameterReport]]] = {}
+    for p in reports:
+        term = terms[p.term]
+        effect = CATALOGUE[term.effect]
+        unit = effect.unit(p.name, robot, term.target)
+        shown = "" if unit in ("1", "channel") else unit
+        key = (plain(term.effect), quantity(term, p.name, robot), shown, effect.neutral_values()[p.name])
+        found.setdefault(key, []).append((plain(term.target), p))
+    return [Kind(*key, tuple(at)) for key, at in found.items()]
+
+
+def within(p: ParameterReport) -> str:
+    """``0.2032 ± 0.0031``, with as many digits as the interval leaves, and what is wrong with it."""
+    half = (p.high - p.low) / 2
+    if not np.isfinite(half):
+        return f"{p.value:.3g} ({p.flag})" if p.flag else f"{p.value:.3g}"
+    if half <= 0:
+        return f"{p.value:.4g}"
+    digits = max(1 - math.floor(math.log10(half)), 0)  # two of the interval
+    fine = half < FINE * abs(p.value)
+    shown = f"{p.value:.4g} ± {half:.1g}" if fine else f"{p.value:.{digits}f} ± {half:.{digits}f}"
+    return f"{shown} ({p.flag})" if p.flag else shown

@@ -1,0 +1,33 @@
+"""The command to type next does what was done with the same engine, way and effects of one's own, whatever is in its paths."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+from hydra.core.override_parser.overrides_parser import OverridesParser
+
+from ee_dist.tasks.config import AUTO, Config, EngineConfig
+from ee_dist.tasks.results.commands import asked, command
+
+NAMES = ("plain.mcap", "with a space/a#b.mcap", "ünï,code=[1].mcap")
+
+
+def read(line: str) -> dict[str, object]:
+    """What a shell and Hydra make of it."""
+    words = shlex.split(line)
+    assert words[:3] == ["python", "-m", "ee_dist"]
+    return {o.key_or_group: o.value() for o in OverridesParser.create().parse_overrides(words[3:])}
+
+
+@pytest.mark.parametrize("measured", [*NAMES, list(NAMES)])
+def test_files_come_through_a_shell(measured):
+    config = Config(measured=measured, model="a b.yaml", plugins=["my effects.py"], engine=EngineConfig("mujoco"))
+    assert read(command(asked("explain", config, "free_run"))) == {
+        "task": "explain", "measured": measured, "model": "a b.yaml", "task.by": "free_run", "engine": "mujoco",
+        "plugins": ["my effects.py"],
+    }  # fmt: skip
+
+
+def test_what_every_run_has_is_left_out():
+    assert asked("compare", Config(measured="a.mcap"), AUTO) == ["task=compare", "measured=a.mcap"]

@@ -1,0 +1,58 @@
+"""What a fit found is read by kind of effect, each value with as many digits as its interval leaves."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from ee_dist.discrepancy.evidence.intervals import NEUTRAL, NOT_DETERMINED, ParameterReport
+from ee_dist.effects.catalogue import term
+from ee_dist.robots.linear_stage import linear_stage
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.tasks.results.sections import values_section
+from ee_dist.tasks.results.values import kinds_of, within
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "flag", "said"),
+    [
+        (0.20316, 0.0027, "", "0.2032 ± 0.0027"),
+        (203.47, 3.44, "", "203.5 ± 3.4"),
+        (12345.6, 321.0, "", "12346 ± 321"),
+        (0.0071, 0.106, NEUTRAL, f"0.01 ± 0.11 ({NEUTRAL})"),
+        (0.5, math.inf, NOT_DETERMINED, f"0.5 ({NOT_DETERMINED})"),
+        (0.25, 0.0, "", "0.25"),
+        (0.1234567, 1.234e-7, "", "0.1235 ± 1e-07"),
+    ],
+)
+def test_digits_are_those_that_the_interval_leaves(value, half, flag, said):
+    assert within(ParameterReport(0, "x", value, value - half, value + half, flag)) == said
+
+
+def test_values_stand_beside_those_of_their_kind():
+    terms = (
+        term("coulomb_friction", "servo", torque_nm=0.1),
+        term("zero_offset", "servo", offset_rad=0.01),
+        term("coulomb_friction", "other", torque_nm=0.2),
+    )
+    reports = [ParameterReport(k, n, v, v - 0.01, v + 0.01, "") for k, n, v in (
+        (0, "torque_nm", 0.1), (1, "offset_rad", 0.01), (2, "torque_nm", 0.2))]  # fmt: skip
+    dry, zero = kinds_of(terms, reports, servo_pendulum())
+    assert (dry.name, [place for place, _ in dry.at]) == ("coulomb friction, torque (N.m)", ["servo", "other"])
+    assert (zero.name, len(zero.at)) == ("zero offset, offset (rad)", 1)
+    section = values_section([dry, zero])
+    assert section.figures[0].data[0].y == ("servo", "other") and len(section.figures) == 1, (
+        "what stands alone is no figure"
+    )
+    assert [row[2:5] for row in section.table.rows] == [
+        ["servo", "0.1", "0.09 to 0.11"], ["other", "0.2", "0.19 to 0.21"], ["servo", "0.01", "0 to 0.02"],
+    ]  # fmt: skip
+
+
+def test_units_are_those_of_a_slide():
+    found = kinds_of(
+        (term("coulomb_friction", "carriage", torque_nm=20.0),), [ParameterReport(0, "torque_nm", 20, 19, 21, "")],
+        linear_stage(),
+    )  # fmt: skip
+    assert found[0].name == "coulomb friction, force (N)"
