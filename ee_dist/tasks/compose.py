@@ -24,6 +24,7 @@ TASKS = (
     "compare",
     "explain",
     "improve",
+    "plan",
     "reveal",
     "import",
     "robot",
