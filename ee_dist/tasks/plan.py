@@ -101,6 +101,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     names = [name for name, _ in found.explanations[:MOST_TIED]]
     with SearchProgress(console) as progress:
         way = way_of(measured, found.way)
+        progress("weighing the measurements", 0.0)
         problem = way.make(measured, found.config)
         tied = [terms for _, terms in found.explanations[:MOST_TIED]]
         if way.name == OpenLoop.way:
