@@ -98,6 +98,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     wanted = motions(robot, options, config.seed)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
+    suspects = [parse(robot, text) for text in options.suspects]
     names = [name for name, _ in found.explanations[:MOST_TIED]]
     with SearchProgress(console) as progress:
         way = way_of(measured, found.way)
@@ -110,8 +111,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
         else:
             # Its values were not fitted to what commands alone make of the robot.
             rivals, left = [Contender(h) for h in tied], 1.0
-        for text in options.suspects:
-            chosen = parse(robot, text)
+        for chosen in suspects:
             names.append(f"{names[0]} and {chosen.name}")
             rivals.append(Contender((*rivals[0].hypothesis, *suspected(chosen, SUSPECTED))))
         evaluator = evaluator_of(found.config)
