@@ -189,8 +189,11 @@ def main() -> int:
     for case in run(bench):
         cases.append(case)
         told = ["told" if case.told(a) else f"{len(a)} left" for a in (case.after_planned, *case.after_random)]
-        print(f"{case.index:4d} {len(cases):3d}/{args.cases}  {case.truth:<30.30} {len(case.before)} tied -> planned {told[0]:<7} "
-              f"random {', '.join(told[1:]):<7}  {case.planned} ({case.expected:.1f}) {case.seconds:.0f} s", flush=True)  # fmt: skip
+        print(
+            f"{case.index:4d} {len(cases):3d}/{args.cases}  {case.truth:<30.30} {len(case.before)} tied -> planned {told[0]:<7}"
+            f" random {', '.join(told[1:]):<7}  {case.planned} ({case.expected:.1f}) {case.seconds:.0f} s",
+            flush=True,
+        )
     found = report(cases, args)
     if args.json:
         settings = {k: v for k, v in vars(args).items() if k != "json"}

@@ -47,6 +47,9 @@ def test_the_motion_that_tells_them_apart_goes_first_whatever_the_order(evaluato
     for trials in ((small, large), (large, small)):
         found = ranked(2, trials)
         assert found.best.excitation == LARGE and found.enough and not found.alike
+    assert predicted(ROBOT, pair, (LARGE,), SerialEvaluator(MuJoCoEngine(1))) == [large], (
+        "to the last bit, whatever is beside it"
+    )
     shown = parting(ROBOT, [HEAVY, LAZY], (0, 1), LARGE, evaluator)
     at = (shown.times_s >= shown.from_s) & (shown.times_s <= shown.to_s)
     gap = np.abs(shown.curves[0] - shown.curves[1])

@@ -40,7 +40,7 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     before, _ = run("task=explain", f"measured={first}", SUSPECTS, "task.rerun=false", *QUICK)
     assert set(tied(before)) == {"part_mass@arm", "command_gain@servo"}
 
-    plan, outcome = run("task=plan", f"task.explained={before}", "task.seconds=2", "evaluator=serial")
+    plan, outcome = run("task=plan", f"task.explained={before}", "task.seconds=2", "task.draws=1", "evaluator=serial")
     found = json.loads((plan / "summary.json").read_text())
     assert found["engine"] == "mujoco", "as the run that it goes on from"
     assert found["enough"] and found["best"]["enough"] and not found["alike"]
@@ -63,7 +63,7 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     after, _ = run("task=explain", both, SUSPECTS, "task.rerun=false", *QUICK)
     assert tied(after) == ["part_mass@arm"]
 
-    # A run that tells it needs no plan, unless a suspicion is named; the same settings give the same plan.
+    # A run that tells it needs no plan, unless a suspicion is named.
     outcome = cli("task=plan", f"task.explained={after}")
     assert outcome.status == 2 and "nothing is tied with part_mass@arm" in outcome.err
     few = (
@@ -73,9 +73,8 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
         "task.draws=1",
         "evaluator=serial",
     )
-    asked = [run("task=plan", "task.suspects=[backlash@servo]", *few)[0] for _ in range(2)]
-    one, other = (json.loads((folder / "summary.json").read_text()) for folder in asked)
-    assert one["result_digest"] == other["result_digest"]
+    asked, _ = run("task=plan", "task.suspects=[backlash@servo]", *few)
+    one = json.loads((asked / "summary.json").read_text())
     assert [e["name"] for e in one["explanations"]] == ["part_mass@arm", "part_mass@arm and backlash@servo"]
     assert parse(one["command"][-1].split('"')[1]).kind == "multisine"
 
