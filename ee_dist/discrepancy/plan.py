@@ -1,4 +1,11 @@
-"""What to record next: which excitation would tell tied explanations apart best, predicted by simulating each of them on it."""
+"""What to record next: which trial would tell tied explanations apart best, predicted by simulating each of them on it.
+
+A prediction is compared as the verdict will compare it: on the channels and scales of the open-loop way, weighed by the
+noise and by the spread of equally good models. Explanations whose values are not settled could come nearer to one
+another once they are fitted to the new trial too: what their values make up for, within what was measured already, is no
+difference (designs that discriminate between models: Atkinson and Fedorov 1975; Buzzi-Ferraris and Forzatti 1983). And a
+difference counts as far as a bootstrap over windows of time would hold it to be more than chance.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +15,15 @@ from itertools import combinations
 
 import numpy as np
 
-from ee_dist.discrepancy.measured_trial import driver_of, setup_of
-from ee_dist.discrepancy.ways.open_loop.prediction import ToSensors, clean, report
-from ee_dist.discrepancy.ways.open_loop.scale import channel_scale
+from ee_dist.discrepancy.evidence.holdout import bootstrap
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
+from ee_dist.discrepancy.search.search import Progress, quiet
+from ee_dist.discrepancy.ways.open_loop.prediction import clean
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop, soften
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Rollout
-from ee_dist.engines.drivers import Commands, Network
-from ee_dist.evaluation.jobs import Evaluator, Job
+from ee_dist.engines.drivers import Commands
+from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array
@@ -35,51 +44,219 @@ LIBRARY = (
 
 ENOUGH = 4.0
 """Standard deviations from which a trial is expected to tell two explanations apart."""
+TOGETHER = 400_000
+"""Robot-steps that are simulated between two words on the progress."""
+FARTHEST = 0.5
+"""How far, as a share of its range, a value may move to make up for a difference: slopes hold no farther."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """An explanation: ``hypothesis`` is all that the model then has. ``nearby``: the same with one of its P free values moved
+    by ``step`` each (P,) shares of its range; ``known`` (P, P): what measurements say of these values, as the Hessian of
+    half their squared error."""
+
+    hypothesis: Hypothesis
+    nearby: tuple[Hypothesis, ...] = ()
+    step: tuple[float, ...] = ()
+    known: Array | None = None
 
 
 @dataclass(frozen=True)
 class PlannedTrial:
-    """``separation``: predicted distance of the two most similar explanations on this trial, in standard deviations of
-    its noise (all channels and rows together). Below ENOUGH the trial would not tell them apart either."""
+    """``separations``: predicted distance of each pair of explanations on this trial, in the order of ``combinations``, in
+    standard deviations of what the model cannot know; ``separation``: that of the pair that decides (see ``ranked``), the
+    two most similar. Below ENOUGH the trial would not tell them apart."""
 
     excitation: Excitation
     separation: float
+    separations: tuple[float, ...] = ()
 
 
 def next_trials(
     robot: Robot, tied: Sequence[Hypothesis], evaluator: Evaluator, library: Sequence[Excitation] = LIBRARY
 ) -> list[PlannedTrial]:
-    """Excitations by how well they separate the hypotheses, the best first."""
+    """Excitations by how well they separate the hypotheses for their length, the best first."""
     if len(tied) < 2:
         return []
-    loose = [apply(robot, h) for h in tied]
-    scale = channel_scale(robot, [])
+    found = predicted(robot, [Contender(h) for h in tied], library, evaluator)
+    return sorted(found, key=lambda p: -p.separation / np.sqrt(p.excitation.seconds))
+
+
+def predicted(
+    robot: Robot,
+    contenders: Sequence[Contender],
+    excitations: Sequence[Excitation],
+    evaluator: Evaluator,
+    left: float = 1.0,
+    windows: int = 0,
+    progress: Progress = quiet,
+) -> list[PlannedTrial]:
+    """How far apart the contenders, the best first, are on each excitation, in the order given.
+
+    ``left``: mean square of what the best leaves of the measurements, in units of noise, from 1: with it, differences count
+    for less. ``windows``: how many windows were measured already, in which the contenders say the same.
+    """
+    out: list[PlannedTrial] = []
+    models = 8 + sum(1 + len(c.nearby) for c in contenders)
+    size = max(1, int(TOGETHER // (models * max((e.steps(robot) for e in excitations), default=1))))
+    for k in range(0, len(excitations), size):
+        some = excitations[k : k + size]
+        out += _predicted(robot, contenders, some, evaluator, left, windows)
+        progress("trying motions", min(1.0, (k + size) / len(excitations)))
+    return out
+
+
+def _predicted(
+    robot: Robot,
+    contenders: Sequence[Contender],
+    excitations: Sequence[Excitation],
+    evaluator: Evaluator,
+    left: float,
+    windows: int,
+) -> list[PlannedTrial]:
+    best = contenders[0].hypothesis
+    ahead = ahead_of(robot, best, excitations, evaluator)
+    usable = [k for k, t in enumerate(ahead) if t.log.finite]
+    none = tuple(0.0 for _ in combinations(contenders, 2))
+    out = [PlannedTrial(e, 0.0, none) for e in excitations]
+    if not usable:
+        return out
+    problem = OpenLoop([ahead[k] for k in usable], robot, evaluator, before=best)
+    asked = [h for c in contenders for h in (c.hypothesis, *c.nearby)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        rows = np.stack([problem.smooth(r) for r in problem.residuals(asked)])
+    for place, k in enumerate(usable):
+        part = problem.slices[place]
+        segment = problem.segment_of[part] - int(problem.segment_of[part].min())
+        gaps = [
+            _apart(a, b, segment, left, windows) for a, b in combinations(_with_slopes(contenders, rows[:, part]), 2)
+        ]
+        out[k] = PlannedTrial(excitations[k], min(gaps, default=0.0), tuple(gaps))
+    return out
+
+
+def ahead_of(
+    robot: Robot, best: Hypothesis, excitations: Sequence[Excitation], evaluator: Evaluator
+) -> list[MeasuredTrial]:
+    """Trials that were not made yet, as one explanation predicts them."""
+    model = apply(robot, best)
     jobs, drivers = [], []
-    models_of: list[list[Robot]] = []
-    for excitation in library:
-        driver = driver_of(excitation, robot)
+    for e in excitations:
+        held, driver = apply(model, setup_of(e)), driver_of(e, robot)
         drivers.append(driver)
-        held = setup_of(excitation)
-        models_of.append([apply(m, held) for m in loose])
-        jobs += [Job(_rollout(m, driver, excitation.steps(robot)), ToSensors()) for m in models_of[-1]]
-    found = evaluator.evaluate(jobs)
-    out = []
-    for k, (excitation, driver) in enumerate(zip(library, drivers, strict=True)):
-        models = models_of[k]
-        logs = found[k * len(models) : (k + 1) * len(models)]
-        if isinstance(driver, Commands):
-            logs = [report(m, true) for m, true in zip(models, logs, strict=True)]
-        gaps = [_distance(a, b, scale.scale) for a, b in combinations(logs, 2)]
-        out.append(PlannedTrial(excitation, float(min(gaps)) if np.isfinite(gaps).all() else 0.0))
-    return sorted(out, key=lambda p: -p.separation / np.sqrt(p.excitation.seconds))
+        # Sensors act on a network in their loop, and on planned commands not at all.
+        jobs.append(
+            Job(Rollout(clean(held) if isinstance(driver, Commands) else held, driver, e.steps(robot), 0), Whole())
+        )
+    logs = evaluator.evaluate(jobs)
+    return [
+        MeasuredTrial(str(e), log, driver, setup_of(e))
+        for e, log, driver in zip(excitations, logs, drivers, strict=True)
+    ]
 
 
-def _rollout(model: Robot, driver: Commands | Network, steps: int) -> Rollout:
-    if isinstance(driver, Network):
-        return Rollout(model, driver, steps, seed=0)
-    return Rollout(clean(model), Commands(np.ascontiguousarray(driver.values[:, list(model.wiring.source)])), steps)
+Sloped = tuple[Array, Array, Array]
+"""What an explanation predicts of a trial (n,), the slopes of that (n, P), and what is known of the values (P, P)."""
 
 
-def _distance(a: Array, b: Array, scale: Array) -> float:
-    """In standard deviations; one channel and row counts at most as 6, so that a divergence late in a gait is no evidence."""
-    return float(np.sqrt((np.minimum(np.abs(a - b) / scale, 6.0) ** 2).sum()))
+def _with_slopes(contenders: Sequence[Contender], rows: Array) -> list[Sloped]:
+    out, at = [], 0
+    for c in contenders:
+        here, near = rows[at], rows[at + 1 : at + 1 + len(c.nearby)]
+        at += 1 + len(c.nearby)
+        columns = [
+            (r - here) / h if np.isfinite(r).all() else np.zeros_like(here) for r, h in zip(near, c.step, strict=True)
+        ]
+        slopes = np.stack(columns, axis=1) if columns else np.zeros((len(here), 0))
+        out.append((here, slopes, np.zeros((0, 0)) if c.known is None else c.known))
+    return out
+
+
+def _apart(one: Sloped, other: Sloped, segment: Array, left: float, windows: int) -> float:
+    """Standard deviations between two explanations once the values of both have come as near as measurements let them."""
+    gap = one[0] - other[0]
+    if not np.isfinite(gap).all():
+        return 0.0
+    slopes = np.concatenate([one[1], -other[1]], axis=1)
+    p, q = one[1].shape[1], other[1].shape[1]
+    if p + q:
+        held = np.zeros((p + q, p + q))
+        held[:p, :p], held[p:, p:] = one[2], other[2]
+        normal = slopes.T @ slopes + held
+        normal += 1e-9 * max(float(np.trace(normal)), 1e-9) * np.eye(p + q)
+        gap = gap + slopes @ np.clip(np.linalg.solve(normal, -slopes.T @ gap), -FARTHEST, FARTHEST)
+    energies = np.bincount(segment, weights=soften(gap) ** 2)
+    low, _ = bootstrap(np.concatenate([energies, np.zeros(windows)]), seed=1)
+    return float(np.sqrt(max(low, 0.0) / max(left, 1.0)))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """``trials``: the best first. ``alike``: pairs of explanations (by number) that none of them tells apart. ``enough``: whether
+    the first tells all others apart; ``closest``: the pair that is most similar on it, of those that decide."""
+
+    trials: tuple[PlannedTrial, ...]
+    alike: tuple[tuple[int, int], ...]
+    enough: bool
+    closest: tuple[int, int]
+
+    @property
+    def best(self) -> PlannedTrial:
+        return self.trials[0]
+
+
+def ranked(count: int, trials: Sequence[PlannedTrial]) -> Plan:
+    """Trials of ``count`` explanations by the separation of the two most similar ones, among the pairs that any of the trials
+    can tell apart: twins that no motion separates decide nothing. Where there are only twins, by theirs."""
+    pairs = list(combinations(range(count), 2))
+    reach = np.max([t.separations for t in trials], axis=0)
+    told = np.flatnonzero(reach >= ENOUGH)
+    deciding = told if len(told) else np.arange(len(pairs))
+    scored = [
+        PlannedTrial(t.excitation, float(np.min(np.array(t.separations)[deciding])), t.separations) for t in trials
+    ]
+    # Of trials that separate as well the gentler one.
+    ordered = sorted(scored, key=lambda t: (-round(t.separation, 6), t.excitation.amplitude))
+    alike = tuple(p for k, p in enumerate(pairs) if reach[k] < ENOUGH)
+    closest = pairs[min(deciding, key=lambda k: ordered[0].separations[k])]
+    return Plan(tuple(ordered), alike, bool(len(told)) and ordered[0].separation >= ENOUGH, closest)
+
+
+@dataclass(frozen=True, eq=False)
+class Parting:
+    """Where two explanations part most on a trial: ``channel`` (by number), ``from_s`` to ``to_s``, and what every
+    explanation predicts there: ``curves`` (contenders, T) at ``times_s`` (T,)."""
+
+    channel: int
+    from_s: float
+    to_s: float
+    times_s: Array
+    curves: Array
+
+
+def parting(
+    robot: Robot,
+    explanations: Sequence[Hypothesis],
+    pair: tuple[int, int],
+    excitation: Excitation,
+    evaluator: Evaluator,
+) -> Parting:
+    """Where ``pair`` of the explanations part most on a trial."""
+    ahead = ahead_of(robot, explanations[0], [excitation], evaluator)
+    problem = OpenLoop(ahead, robot, evaluator, before=explanations[0])
+    one, other = (problem.smooth(problem.residuals([explanations[k]])[0]) for k in pair)
+    width, layout = len(problem.channels), problem.layout
+    readings = np.where(layout.reading & (layout.channel_of < len(robot.sensors)), (one - other) ** 2, 0.0)
+    cell = np.bincount(layout.segment_of * width + layout.channel_of, weights=readings)
+    segment, channel = divmod(int(np.argmax(cell)), width)
+    mine = (layout.segment_of == segment) & layout.reading
+    series = [next(s for s in problem.series(h) if s.channel == channel) for h in explanations]
+    half = problem.block * robot.time_step_s / 2
+    return Parting(
+        channel,
+        float(layout.time_s[mine].min()) - half,
+        float(layout.time_s[mine].max()) + half,
+        series[0].times_s,
+        np.stack([s.predicted for s in series]),
+    )

@@ -38,6 +38,7 @@ NOTHING_ELSE = "Nothing else is left above the noise."
 CONTENT = (
     "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
 )
+PLANNED = "task=plan finds the trial that tells them apart within limits of yours, and writes its commands."
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
 
@@ -257,8 +258,10 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         where = f", on the {e.fixture}" if robot.free_base else ""
         advice = (
             f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
-            f"(predicted distance {ahead.separation:.0f} standard deviations)."
+            f"(predicted distance {ahead.separation:.0f} standard deviations). {PLANNED}"
         )
+    elif best is not None and best.tied_with:
+        advice = PLANNED
     good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
     return Account(head, error, sure, tuple(lines), good, advice)
 

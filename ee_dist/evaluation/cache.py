@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
 from typing import Any
+
+import numpy as np
 
 from ee_dist.evaluation.jobs import Evaluator, Job
 
+MOST_BYTES = 512 * 2**20
+"""Bytes of results that are kept. Numbers take none to speak of; what is kept of logs of minutes does, and the oldest goes."""
+
 
 class CachedEvaluator:
-    """Simulates each key once. Equal jobs within one call are one simulation too."""
+    """Simulates each key once, as long as its result is kept. Equal jobs within one call are one simulation always. ``most``:
+    bytes of arrays that are kept; what went is simulated again, with the same result."""
 
-    def __init__(self, inner: Evaluator) -> None:
-        self.inner = inner
+    def __init__(self, inner: Evaluator, most: int = MOST_BYTES) -> None:
+        self.inner, self.most = inner, most
         self.counts = inner.counts
         self._known: dict[str, Any] = {}
+        self._held = 0
 
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
         keys = [job.key for job in jobs]
@@ -24,14 +32,37 @@ class CachedEvaluator:
                 fresh.setdefault(key, job)
         before = self.counts.copy()
         if fresh:
-            self._known.update(zip(fresh, self.inner.evaluate(list(fresh.values())), strict=True))
+            found = dict(zip(fresh, self.inner.evaluate(list(fresh.values())), strict=True))
+            self._known.update(found)
+            self._held += sum(map(size_of, found.values()))
         self.counts.asked = before.asked + len(jobs)
         self.counts.asked_steps = before.asked_steps + sum(j.rollout.steps for j in jobs)
-        return [self._known[key] for key in keys]
+        results = [self._known[key] for key in keys]
+        self._forget()
+        return results
+
+    def _forget(self) -> None:
+        """The oldest results that take room, until the rest fits."""
+        if self._held <= self.most:
+            return
+        for key in [k for k, v in self._known.items() if size_of(v)]:
+            self._held -= size_of(self._known.pop(key))
+            if self._held <= self.most:
+                return
 
     def close(self) -> None:
         self._known.clear()
+        self._held = 0
         self.inner.close()
+
+
+def size_of(result: Any) -> int:
+    """Bytes of the arrays in a result: one, or the fields of a record."""
+    if isinstance(result, np.ndarray):
+        return result.nbytes
+    if is_dataclass(result) and not isinstance(result, type):
+        return sum(v.nbytes for f in fields(result) if isinstance(v := getattr(result, f.name), np.ndarray))
+    return 0
 
 
 def with_cache(evaluator: Evaluator, enabled: bool) -> Evaluator:

@@ -8,8 +8,8 @@ from typing import Any
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.jobs import Counts, Job
 
-MOST_AT_ONCE = 4_000_000
-"""Robot-steps whose logs are in memory together, about a GB: long rollouts go in smaller chunks, with the same results."""
+MOST_AT_ONCE = 1_500_000
+"""Robot-steps whose logs are in memory together, some hundred MB: long rollouts go in smaller chunks, with the same results."""
 
 
 def run_jobs(engine: Engine, jobs: Sequence[Job], chunk: int) -> list[Any]:

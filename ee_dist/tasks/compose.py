@@ -26,6 +26,7 @@ TASKS = (
     "compare",
     "explain",
     "improve",
+    "plan",
     "reveal",
     "import",
     "robot",

@@ -54,6 +54,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     with SearchProgress(console, told) as progress:
+        progress("weighing the measurements", 0.0)
         problem = way.make(measured, config)
         pool = chosen(problem, options.without, options.only)
         count = len(measured.trials)

@@ -74,6 +74,12 @@ VERBS = {
         _RUN,
         (*_MODEL, "effect"),
     ),
+    "plan": Verb(
+        "a trial that tells apart what is tied",
+        "task=plan task.explained=FOLDER",
+        _RUN,
+        ("measured", "model", "seed", "plugins", "ray.address"),
+    ),
     "export": Verb("the model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),
     "reveal": Verb("open the seal, score what was found", "task=reveal log=TRIAL", (), ("log",)),
     "view": Verb("open a run in rerun", "task=view log=RUN", (), ("log",)),
@@ -97,8 +103,7 @@ def overview() -> str:
     """All verbs, an example of each, and where to read on: one screen."""
     wide = max(len(v.example) for v in VERBS.values()) + 2
     lines = [
-        "ee_dist: robots that find out what is wrong with themselves, and models that",
-        "learn which physical effect they miss.",
+        "ee_dist: what is wrong with a robot, and which effect its model misses.",
         "",
         f"{PROGRAM} ...",
     ]

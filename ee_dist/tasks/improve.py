@@ -71,6 +71,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     if options.calibrate and way.name != OpenLoop.way:
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
     with SearchProgress(console, told) as progress:
+        progress("weighing the measurements", 0.0)
         problem = way.make(measured, config)
         pool = chosen(problem, options.without, options.only)
         calibration = None

@@ -9,13 +9,19 @@ from rich.status import Status
 
 from ee_dist.discrepancy.search.search import Progress, quiet
 
+EVERY_S = 15.0
+"""Where there is no terminal, a stage says so often how far it is."""
+
 
 class SearchProgress:
-    """A live line on a terminal; elsewhere a plain line whenever another stage begins. ``told``: who else is told."""
+    """A live line on a terminal; elsewhere a plain line whenever another stage begins, and while it goes on for long, the
+    first as soon as it is known that it will. ``told``: who else is told."""
 
     def __init__(self, console: Console, told: Progress = quiet) -> None:
-        self.console, self.stage, self.told = console, "", told
-        self.began = self.stage_began = time.monotonic()
+        self.console, self.stage, self.told, self.share = console, "", told, 0.0
+        self.began = self.stage_began = self.said = self.heard = time.monotonic()
+        self.short = True
+        """Whether nothing was said yet of how long this stage takes."""
         self.status: Status | None = console.status("starting") if console.is_terminal else None
 
     def __enter__(self) -> SearchProgress:
@@ -30,13 +36,17 @@ class SearchProgress:
     def __call__(self, what: str, share: float) -> None:
         now = time.monotonic()
         self.told(what, share)
-        if what != self.stage:
-            self.stage, self.stage_began = what, now
-            if self.status is None:
-                self.console.print(f"{now - self.began:6.0f} s  {what}", style="dim", highlight=False)
+        another = what != self.stage
+        if another or share <= self.share:
+            # It, or the same one once more, began when the last word of what came before was said.
+            self.stage_began, self.short = self.heard, True
+        self.stage, self.share, self.heard = what, share, now
+        left = (now - self.stage_began) * (1 - share) / share if share > 0 else 0.0
+        ahead = f"{what} {share:.0%}, about {left:.0f} s left of this stage"
         if self.status:
-            spent = now - self.stage_began
-            left = spent * (1 - share) / share if share > 0 else 0.0
-            self.status.update(
-                f"{what} {share:.0%}, about {left:.0f} s left of this stage, {now - self.began:.0f} s so far"
-            )
+            self.status.update(f"{ahead}, {now - self.began:.0f} s so far")
+            return
+        long = left >= EVERY_S and (self.short or now - self.said >= EVERY_S)
+        if another or long:
+            self.said, self.short = now, not long
+            self.console.print(f"{now - self.began:6.0f} s  {ahead if long else what}", style="dim", highlight=False)

@@ -14,8 +14,8 @@ from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.effects.groups import members_of
 from ee_dist.recording.reader import read_run
 from ee_dist.robots.model import Robot
-from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.explained import summary_of
 from ee_dist.tasks.seal import FILE, opened
 from ee_dist.tasks.summary import Stopwatch, hypothesis_list, write_summary
 
@@ -54,7 +54,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     digest = record.metadata.get("seal") if record else None
     hidden, _ = opened(folder / FILE, digest)
     found = (
-        score(_summary(Path(options.explained)), hidden, record.robot if record else None)
+        score(summary_of(Path(options.explained)), hidden, record.robot if record else None)
         if options.explained
         else None
     )
@@ -152,14 +152,3 @@ def _pairs(hidden: Hypothesis) -> tuple[tuple[str, str], ...]:
 def _pair(name: str) -> tuple[str, str]:
     effect, _, target = name.partition("@")
     return effect, target
-
-
-def _summary(path: Path) -> Mapping[str, Any]:
-    file = path / "summary.json" if path.is_dir() else path
-    try:
-        found = json_of(text_of(file, 2**28))
-    except (OSError, UntrustedError):
-        found = None
-    if not isinstance(found, dict):
-        raise ConfigError(f"task.explained={path}: no summary.json of explain or improve there")
-    return found

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from ee_dist.discrepancy.ways.open_loop.prediction import ToSensors
 from ee_dist.effects import apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Network, weight_count
@@ -156,6 +157,19 @@ def test_cache_simulates_each_key_once_and_gives_the_same():
     assert cached.counts.asked_steps == 24 * STEPS
     plain.close()
     cached.close()
+
+
+def test_a_cache_keeps_as_many_bytes_as_it_may_and_gives_the_same():
+    """What is kept of logs of minutes would fill any memory; what went is simulated again, to the same bits."""
+    plain, work = SerialEvaluator(PyBulletEngine()), [Job(j.rollout, ToSensors()) for j in jobs(4)]
+    expected = plain.evaluate(work)
+    small = CachedEvaluator(SerialEvaluator(PyBulletEngine()), most=2 * expected[0].nbytes)
+    for _ in range(2):
+        assert all(np.array_equal(a, b) for a, b in zip(small.evaluate(work), expected, strict=True))
+        assert small._held == 2 * expected[0].nbytes
+    assert small.counts.simulated == 4 + 2, "the two that were kept are not simulated again"
+    small.close()
+    plain.close()
 
 
 def test_cache_tells_apart_what_is_physically_different():

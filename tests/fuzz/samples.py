@@ -43,7 +43,7 @@ from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.serial import robot_to_dict
-from ee_dist.tasks import compose, measurements, reveal, study
+from ee_dist.tasks import compose, explained, measurements, reveal, study
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.results.story import _asked
 from ee_dist.tasks.seal import opened, sealed
@@ -123,7 +123,7 @@ def summary(path: Path) -> None:
     """As task=study, task=reveal and a resume look at it."""
     finished(path.parent, _config(), None)
     hidden = (from_dict({"effect": "motor_weak", "target": "knee_front_left", "loss": 0.5}),)
-    reveal.score(reveal._summary(path), hidden, quadruped())
+    reveal.score(explained.summary_of(path), hidden, quadruped())
 
 
 def studied(path: Path) -> None:

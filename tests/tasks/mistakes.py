@@ -498,4 +498,45 @@ WHOLE: Rows = (
 )
 """Mistakes that Hydra itself meets: told by the whole program."""
 
-TABLE: Rows = (*COMPOSITION, *VALUES, *TRIALS, *ROBOTS, *MODELS, *WORKBENCH, *LOGS, *IMPORTS, *PLUGINS)
+PLANS: Rows = (
+    ("task=plan", "task.explained=: which run? name the folder of a finished explain or improve"),
+    ("task=plan task.explained=nowhere", "task.explained=nowhere: no such folder"),
+    ("task=plan task.explained=nothing", "task.explained=nothing: no summary.json of explain or improve there"),
+    (
+        "task=plan task.explained=compared",
+        "a run of task=compare, which names no explanations; expected explain or improve",
+    ),
+    ("task=plan task.explained=tied", "no settings of its run there; say measured=LOG"),
+    ("task=plan task.explained=odd measured=trial.mcap", "its summary is not as task=explain writes it"),
+    (
+        "task=plan task.explained=settled measured=trial.mcap",
+        "its verdict is that nothing is missing, so that nothing is tied",
+    ),
+    (
+        "task=plan task.explained=alone measured=trial.mcap",
+        "nothing is tied with backlash@servo: no further trial is needed",
+    ),
+    ("task=plan task.explained=elbow measured=trial.mcap", "backlash@elbow does not fit the robot of the log"),
+    ("task=plan task.explained=tied measured=nowhere.mcap", "measured=nowhere.mcap: no such file"),
+    (
+        "task=plan task.explained=tied measured=trial.mcap task.seconds=0.2",
+        "50 rows of servo_pendulum; at least 60 are needed",
+    ),
+    (
+        "task=plan task.explained=tied measured=trial.mcap task.kinds=[steps] task.speed=1e-9",
+        "within these limits nothing moves",
+    ),
+    (
+        "task=plan task.explained=tied measured=trial.mcap task.suspects=[backlash@elbow]",
+        "cannot act on 'elbow' of servo_pendulum",
+    ),
+    ("task=plan task.explained=tied task.seconds=-1", "task.seconds=-1: must be from 0.1 to 600 s"),
+    ("task=plan task.explained=tied task.amplitude=3", "must be a share of half the range"),
+    ("task=plan task.explained=tied task.speed=0", "task.speed=0: must be more than 0"),
+    ("task=plan task.explained=tied task.kinds=[gait]", "the commands of a gait come out of a network's loop"),
+    ("task=plan task.explained=tied task.kinds=[multisin]", "did you mean multisine"),
+    ("task=plan task.explained=tied task.fixtures=[]", "name at least one of stand and floor"),
+)
+"""What to record next."""
+
+TABLE: Rows = (*COMPOSITION, *VALUES, *TRIALS, *ROBOTS, *MODELS, *WORKBENCH, *LOGS, *PLANS, *IMPORTS, *PLUGINS)

@@ -8,7 +8,9 @@ from rich.console import Console
 
 from ee_dist.effects.catalogue import Term
 from ee_dist.recording.records import DIAGNOSIS, POLISHED, PRUNED, REPAIR, GenerationRecord, HypothesisRecord
+from ee_dist.tasks import progress_line
 from ee_dist.tasks.progress import PassProgress, starting
+from ee_dist.tasks.progress_line import SearchProgress
 
 
 def test_a_finished_run_has_nothing_left_to_wait_for() -> None:
@@ -49,3 +51,24 @@ def test_a_diagnosis_is_over_when_it_is_polished_and_told() -> None:
         assert progress.done == progress.total
     assert "diagnosis pass 1: error 0.25000 (evolved: 0.50000)" in out.getvalue()
     assert "believes: part lost at upper rear left" in out.getvalue()
+
+
+def test_a_long_stage_says_from_its_first_word_how_long_it_will_take(monkeypatch) -> None:
+    """Where there is no terminal too, and not more often than one reads; a short one says its name alone."""
+    now = 0.0
+    monkeypatch.setattr(progress_line.time, "monotonic", lambda: now)
+    out = io.StringIO()
+    with SearchProgress(Console(file=out, width=100)) as progress:
+        for at, what, share in ((1.0, "weighing", 0.0), (6.0, "screening", 0.05), (8.0, "screening", 0.07),
+                                (56.0, "screening", 0.5), (106.0, "screening", 1.0), (107.0, "scanning", 0.5),
+                                (127.0, "fitting", 0.2), (207.0, "fitting", 1.0), (217.0, "fitting", 0.1)):  # fmt: skip
+            now = at
+            progress(what, share)
+    assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [
+        "1 s weighing",
+        "6 s screening 5%, about 95 s left of this stage",
+        "56 s screening 50%, about 55 s left of this stage",
+        "107 s scanning",
+        "127 s fitting 20%, about 80 s left of this stage",
+        "217 s fitting 10%, about 90 s left of this stage",
+    ]

@@ -74,6 +74,26 @@ def mjcf(**changes: str) -> str:
     return MJCF.format(**({"mass": "1", "kind": "hinge", "joint": "turn"} | changes))
 
 
+def runs() -> dict[str, dict[str, Any]]:
+    """Summaries of finished runs by their folders, as far as a later verb looks into them."""
+    told = {"task": "explain", "way": "open_loop", "engine": "mujoco", "model_terms": []}
+
+    def tied(target: str) -> list[dict[str, Any]]:
+        terms = [{"effect": e, "target": target, "values": {}} for e in ("backlash", "deadband")]
+        names = [f"{t['effect']}@{target}" for t in terms]
+        return [{"name": n, "terms": [t], "earned": True, "tied_with": [m for m in names if m != n]}
+                for n, t in zip(names, terms, strict=True)]  # fmt: skip
+
+    return {
+        "compared": {"task": "compare"},
+        "odd": {"task": "explain", "verdict": "effect"},
+        "settled": told | {"verdict": "nothing_missing", "candidates": []},
+        "alone": told | {"verdict": "effect", "candidates": [tied("servo")[0] | {"tied_with": []}]},
+        "tied": told | {"verdict": "effect", "candidates": tied("servo")},
+        "elbow": told | {"verdict": "effect", "candidates": tied("elbow")},
+    }
+
+
 def servo_log(rows: int = 60) -> SensorLog:
     robot, _ = load_robot("servo_pendulum")
     t = np.arange(rows) * robot.time_step_s
@@ -217,6 +237,9 @@ def write(folder: Path) -> None:
     os.mkfifo(folder / "pipe.yaml")
     (folder / "folder.yaml").mkdir()
     (folder / "nothing").mkdir()
+    for name, summary in runs().items():
+        (folder / name).mkdir()
+        (folder / name / "summary.json").write_text(json.dumps(summary))
     robot, _ = load_robot("servo_pendulum")
     log = servo_log()
     for name, driver in (("trial", Commands(log.commands)), ("weights", Network((0.0,)))):

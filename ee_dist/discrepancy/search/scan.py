@@ -14,7 +14,7 @@ import numpy as np
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.screen import Screened
-from ee_dist.discrepancy.search.search import BATCH, Search
+from ee_dist.discrepancy.search.search import Search
 from ee_dist.trials.log import Array
 
 LADDER = (0.03, 0.08, 0.18, 0.32, 0.48, 0.66, 0.85)
@@ -37,14 +37,14 @@ def scan(search: Search, promising: Sequence[Screened], refit: Refit = Refit()) 
     refit = refit.among(search)
     points = [(i, u) for i, s in enumerate(promising) for u in _points(s, i)]
     found: list[list[tuple[float, Array]]] = [[] for _ in promising]
-    for k in range(0, len(points), BATCH):
-        some = points[k : k + BATCH]
+    for k in range(0, len(points), search.batch):
+        some = points[k : k + search.batch]
         rows = search.residuals([(promising[i].candidate.term(u),) for i, u in some])
         for (i, u), r in zip(some, rows, strict=True):
             if np.isfinite(r).all():
                 left = refit(r)
                 found[i].append((float(left @ left), u))
-        search.progress("scanning", min(1.0, (k + BATCH) / len(points)))
+        search.progress("scanning", min(1.0, (k + search.batch) / len(points)))
     out = []
     for s, mine in zip(promising, found, strict=True):
         mine.sort(key=lambda f: f[0])

@@ -14,7 +14,7 @@ import numpy as np
 
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.refit import Refit
-from ee_dist.discrepancy.search.search import BATCH, Search
+from ee_dist.discrepancy.search.search import Search
 from ee_dist.trials.log import Array
 
 
@@ -42,13 +42,13 @@ def screen(
     points = [(i, u) for i, c in enumerate(pool) for u in c.probes(shares)]
     rows: list[list[tuple[Array, float, float, float]]] = [[] for _ in pool]
     total = float(base @ base)
-    for k in range(0, len(points), BATCH):
-        some = points[k : k + BATCH]
+    for k in range(0, len(points), search.batch):
+        some = points[k : k + search.batch]
         found = search.residuals([(pool[i].term(u),) for i, u in some])
         for (i, u), r in zip(some, found, strict=True):
             if np.isfinite(r).all():
                 rows[i].append((u, *_promise(base, refit(r), total, pool[i], u)))
-        search.progress("screening", min(1.0, (k + BATCH) / len(points)))
+        search.progress("screening", min(1.0, (k + search.batch) / len(points)))
     return [_screened(c, found) for c, found in zip(pool, rows, strict=True)]
 
 

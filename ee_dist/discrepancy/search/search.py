@@ -14,7 +14,9 @@ from ee_dist.trials.log import Array
 Progress = Callable[[str, float], None]
 """Told (what is being done, share done in [0, 1])."""
 BATCH = 240
-"""Hypotheses that are asked for in one call while many are probed."""
+"""Hypotheses that are asked for in one call while many are probed, at most,"""
+VALUES = 2_000_000
+"""and residual values that they may have together: of long logs a call takes seconds and tens of MB with few of them."""
 
 
 def quiet(what: str, share: float) -> None:
@@ -36,6 +38,11 @@ class Search:
         if not hypotheses:
             return np.zeros((0, len(self.problem.segment_of)))
         return self.problem.residuals([(*self.fixed, *h) for h in hypotheses], self.trials)
+
+    @property
+    def batch(self) -> int:
+        """How many hypotheses are asked for in one call, by the memory that they take."""
+        return max(1, min(BATCH, VALUES // max(1, len(self.problem.segment_of))))
 
     def base(self) -> Array:
         """(n,) with the fixed terms alone."""

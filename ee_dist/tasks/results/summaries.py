@@ -12,6 +12,7 @@ from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.words import Account
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.summary import hypothesis_list
@@ -108,6 +109,7 @@ def of_rung(problem: Problem, r: Rung) -> dict[str, Any]:
         "held_out": r.held_out,
         "interval": list(r.interval),
         "tied_with": r.tied_with,
+        "alternatives": hypothesis_list(tuple(t for p, u in r.alternatives for t in Model(p.parts).hypothesis(u))),
     }
 
 

@@ -28,6 +28,8 @@ _SENSOR_FAULTS: dict[str, Any] = {
 
 DRAWS = 8
 """Draws of the noise of a faulty channel, whose mean roughness is compared with the measured one."""
+DRAWN = 5_000_000
+"""Drawn values that are in memory together, some times over: of long logs the draws of a few models."""
 
 
 def roughness(values: Array) -> Array:
@@ -161,9 +163,12 @@ class Predictor:
             else:
                 out[i] = self._with_declared_noise(found[i])
         for (k, *_), members in alike.items():
-            faulty = [(pairs[i][1], found[i], changed[id(pairs[i][1])]) for i in members]
-            for i, seen in zip(members, self._reported(k, faulty), strict=True):
-                out[i] = seen
+            size = max(1, DRAWN // (DRAWS * len(self.trials[k].log) * len(changed[id(pairs[members[0]][1])])))
+            for first in range(0, len(members), size):
+                some = members[first : first + size]
+                faulty = [(pairs[i][1], found[i], changed[id(pairs[i][1])]) for i in some]
+                for i, seen in zip(some, self._reported(k, faulty), strict=True):
+                    out[i] = seen
         return out
 
     def _changed(self, model: Robot) -> list[int]:

@@ -35,6 +35,8 @@ from ee_dist.trials.log import Array, SensorLog
 
 SOFT = 6.0
 """Residuals beyond this many standard deviations count by their logarithm."""
+TOGETHER = 4_000_000
+"""Residual values that are computed together: of long logs those of a few hypotheses."""
 COMMAND_SHARE = 0.005
 """Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
 _SOFT_FLOOR = 0.974
@@ -194,17 +196,24 @@ class OpenLoop(Problem):
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
         models = [apply(self.robot, h) for h in hypotheses]
         chosen = list(range(len(self.measured))) if trials is None else list(trials)
-        pairs = [(k, m) for k in chosen for m in self._held(models, k)]
-        digests = self.predictor.digests(pairs)
         out = np.zeros((len(models), len(self.segment_of)))
-        for place, k in enumerate(chosen):
-            mine = digests[place * len(models) : (place + 1) * len(models)]
-            parts = [np.stack([self._compare(k, d) for d in mine])]
-            trial = self.measured[k]
-            if isinstance(trial.driver, Network):
-                parts.append(self._command_residuals(trial, models))
-            out[:, self.slices[k]] = np.concatenate(parts, axis=1)
+        size = max(1, TOGETHER // max(1, len(self.segment_of)))
+        for k in range(0, len(models), size):
+            self._fill(out[k : k + size], models[k : k + size], chosen)
         return out
+
+    def _fill(self, out: Array, models: Sequence[Robot], chosen: Sequence[int]) -> None:
+        """Residuals (H, n) of some models on the chosen trials, into ``out``."""
+        digests = self.predictor.digests([(k, m) for k in chosen for m in self._held(models, k)])
+        for place, k in enumerate(chosen):
+            mine, trial = digests[place * len(models) : (place + 1) * len(models)], self.measured[k]
+            first, last = self.slices[k].start, self.slices[k].stop
+            if isinstance(trial.driver, Network):
+                sent = self._command_residuals(trial, models)
+                out[:, last - sent.shape[1] : last] = sent
+                last -= sent.shape[1]
+            for row, d in zip(out, mine, strict=True):
+                row[first:last] = self._compare(k, d)
 
     def _held(self, models: Sequence[Robot], trial: int) -> list[Robot]:
         """The models as they are held in a trial; trials held alike share them, for a robot's digest is not free."""

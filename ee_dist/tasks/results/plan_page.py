@@ -1,0 +1,169 @@
+"""A plan as people and programs read it: words, table of the terminal, summary.json and page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table as Shown
+
+from ee_dist.basics.names import listed
+from ee_dist.discrepancy.plan import ENOUGH, Parting, Plan, PlannedTrial
+from ee_dist.discrepancy.words import Account, placed, plain, told_all
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import command_unit
+from ee_dist.tasks.summary import hypothesis_list
+from ee_dist.trials.family import Limits
+from ee_dist.viewing import plan_figures as figures
+from ee_dist.viewing.report import Page, Section, Table
+
+Explanations = Sequence[tuple[str, Hypothesis]]
+SHOWN = 10
+"""Trials in the tables."""
+
+
+def account_of(robot: Robot, found: Plan, explanations: Explanations, trial: str, left_out: int = 0) -> Account:
+    """What to record, what it is expected to tell, what stays alike, and how to do it."""
+    best, names = found.best, [placed(n) for n, _ in explanations]
+    e, closest = best.excitation, f"{names[found.closest[0]]} from {names[found.closest[1]]}"
+    what = f"{e.told(robot).replace('_', ' ')} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}"
+    distance = f"{best.separation:.1f} standard deviations, {ENOUGH:g} are enough"
+    if found.enough:
+        head = f"Record next: {what}. It should tell {closest} ({distance})."
+        sure = f"How sure: {len(found.trials)} trials were simulated for {len(names)} explanations; the two most similar decide."
+        advice = ""
+    else:
+        head = f"No trial within these limits is expected to tell {closest}; the best is {what} ({distance})."
+        sure = f"How sure: {len(found.trials)} trials were simulated for {len(names)} explanations."
+        advice = "Next: allow more (task.seconds, task.amplitude), or measure a channel that shows the difference."
+    lines = [
+        "What their values may still make up for, within what was measured already, counts as no difference.",
+        f"The commands, for a robot of your own: plan.csv. On a simulated one: {trial}",
+    ]
+    if found.alike and found.enough:
+        pairs = [f"{names[a]} and {names[b]}" for a, b in found.alike]
+        lines.append(f"No trial within these limits tells these apart: {listed(pairs)}.")
+    if left_out > 0:
+        lines.append(f"{left_out} more that were tied are left out: the first {len(names)} are to be told apart.")
+    return Account(head, f"Tied: {listed(names)}.", sure, tuple(lines), found.enough, advice)
+
+
+def show_plan(console: Console, robot: Robot, found: Plan) -> None:
+    table = Shown(title="Trials within the limits, by what they tell apart", title_justify="left")
+    for name in ("motion", "seconds", "amplitude", "seed", "separation", ""):
+        table.add_column(name, justify="left" if name in ("motion", "") else "right")
+    for row in _rows(robot, found):
+        table.add_row(*row)
+    console.print(table)
+
+
+def _rows(robot: Robot, found: Plan) -> list[list[str]]:
+    """The best of each motion and size first, up to SHOWN."""
+    kept: dict[tuple[str, float], PlannedTrial] = {}
+    for t in found.trials:
+        kept.setdefault((t.excitation.told(robot), t.excitation.amplitude), t)
+    return [
+        [t.excitation.told(robot).replace("_", " "), f"{t.excitation.seconds:g}", f"{t.excitation.amplitude:g}",
+         str(t.excitation.seed), f"{t.separation:.1f}", "enough" if t.separation >= ENOUGH else "not enough"]
+        for t in list(kept.values())[:SHOWN]
+    ]  # fmt: skip
+
+
+def of_plan(
+    found: Plan, explanations: Explanations, folder: Path, files: Sequence[Path], limits: Limits, account: Account
+) -> dict[str, Any]:
+    """The part of summary.json that is the plan's own."""
+    names = [n for n, _ in explanations]
+    pairs = list(combinations(names, 2))
+
+    def trial(t: PlannedTrial) -> dict[str, Any]:
+        return {
+            **t.excitation.as_dict(),
+            "separation": t.separation,
+            "enough": t.separation >= ENOUGH,
+            "pairs": [
+                {"one": one, "other": other, "separation": s}
+                for (one, other), s in zip(pairs, t.separations, strict=True)
+            ],
+        }
+
+    return {
+        "explained": str(folder),
+        "measured": [str(f) for f in files],
+        "limits": asdict(limits),
+        "explanations": [{"name": n, "terms": hypothesis_list(h)} for n, h in explanations],
+        "enough_from": ENOUGH,
+        "enough": found.enough,
+        "alike": [[names[a], names[b]] for a, b in found.alike],
+        "best": trial(found.best),
+        "trials": [trial(t) for t in found.trials],
+        "headline": account.headline,
+        "words": account.words,
+    }
+
+
+def plan_page(
+    robot: Robot,
+    found: Plan,
+    explanations: Explanations,
+    shown: Parting,
+    account: Account,
+    files: Sequence[Path],
+    trial: str,
+) -> Page:
+    best, names = found.best, [placed(n) for n, _ in explanations]
+    sensor = robot.sensors[shown.channel]
+    around = (shown.from_s, shown.to_s)
+    page = Page(
+        f"Plan: {plain(robot.name)}",
+        f"after {', '.join(f.name for f in files)}; {len(found.trials)} trials were simulated",
+        account.headline,
+        account.lines,
+        "good" if found.enough else "open",
+        account.first,
+        following=trial,
+        tiles=[
+            (f"{best.separation:.1f}", "standard deviations between the two most similar"),
+            (f"{ENOUGH:g}", "are enough to tell them apart"),
+            (f"{best.excitation.seconds:g} s", best.excitation.told(robot).replace("_", " ")),
+            (str(len(names)), "explanations"),
+        ],
+        foot="ee_dist. Separations are those that a bootstrap over windows of time would hold to be more than chance.",
+    )
+    page.proof = Section(
+        f"Where they part most: {plain(sensor.name)}, {around[0]:.1f} to {around[1]:.1f} s",
+        "What each explanation predicts of this trial; below, its distance from the first of the two most similar (drawn thick).",
+        figures.parted(shown.times_s, shown.curves, names, sensor.unit, around, found.closest),
+    )
+    rows = _rows(robot, found)
+    columns = ["motion", "seconds", "amplitude", "seed", "separation", "judgement"]
+    pale = [k for k, r in enumerate(rows) if r[-1] == "not enough"]
+    caption = "Predicted distance of the two explanations that are most similar on it, in standard deviations."
+    page.sections.append(
+        Section("Trials within the limits", caption, None, Table(columns, rows, (1, 2, 3, 4), (0,), pale))
+    )
+    told = [[str(k + 1), told_all(h, robot)] for k, (_, h) in enumerate(explanations)]
+    page.sections.append(Section("What is to be told apart", "With the values that suit the measurements so far.", None,
+                                 Table(["", "model"], told)))  # fmt: skip
+    page.sections += _commands(robot, best)
+    return page
+
+
+def _commands(robot: Robot, best: PlannedTrial) -> list[Section]:
+    """Commands by their unit: radians and newton metres have no axis in common."""
+    values = best.excitation.commands(robot)
+    times = np.arange(len(values)) * robot.time_step_s
+    units = [command_unit(robot, d) for d in robot.drives]
+    out = []
+    for unit in dict.fromkeys(u for u in units if u is not None):
+        mine = [k for k, u in enumerate(units) if u == unit]
+        names = [plain(robot.motor_names[k]) for k in mine]
+        figure = figures.commanded(times, values[:, mine], names, unit)
+        out.append(Section(f"Commands ({unit})", "As plan.csv has them.", figure))
+    return out

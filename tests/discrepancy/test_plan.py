@@ -1,0 +1,112 @@
+"""Which trial would tell explanations apart: what is predicted of it, within limits, and what counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.plan import ENOUGH, Contender, parting, predicted, ranked
+from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.effects.catalogue import term
+from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.evaluation.cache import CachedEvaluator
+from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.robots.linear_stage import linear_stage
+from ee_dist.robots.quadruped_lab import quadruped_lab
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.tasks.config import ConfigError
+from ee_dist.tasks.plan import Options, motions
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.family import PLANNED, Limits, driven, family, fastest
+from ee_dist.trials.noise import with_noise
+
+ROBOT = with_noise(servo_pendulum(), 0.001)
+HEAVY = (term("part_mass", "arm", change=0.25),)
+LAZY = (term("command_gain", "servo", change=-0.03),)
+SMALL, LARGE = (Excitation("sway", 1.0, a, 1) for a in (0.03, 0.4))
+
+
+@pytest.fixture(scope="module")
+def evaluator() -> CachedEvaluator:
+    return CachedEvaluator(SerialEvaluator(MuJoCoEngine(1)))
+
+
+def free(effect: str, target: str, value: float, known: float) -> Contender:
+    """An effect whose one value is as well known as a measurement of that information says."""
+    chosen = candidate(ROBOT, effect, target)
+    u = chosen.shares({chosen.effect.main.name: value})
+    return Contender((chosen.term(u),), ((chosen.term(u + 0.01),),), (0.01,), np.array([[known]]))
+
+
+def test_the_motion_that_tells_them_apart_goes_first_whatever_the_order(evaluator) -> None:
+    pair = [Contender(HEAVY), Contender(LAZY)]
+    small, large = predicted(ROBOT, pair, (SMALL, LARGE), evaluator)
+    assert large.separation > ENOUGH and large.separation > 5 * small.separation
+    for trials in ((small, large), (large, small)):
+        found = ranked(2, trials)
+        assert found.best.excitation == LARGE and found.enough and not found.alike
+    assert predicted(ROBOT, pair, (LARGE,), SerialEvaluator(MuJoCoEngine(1))) == [large], (
+        "to the last bit, whatever is beside it"
+    )
+    shown = parting(ROBOT, [HEAVY, LAZY], (0, 1), LARGE, evaluator)
+    at = (shown.times_s >= shown.from_s) & (shown.times_s <= shown.to_s)
+    gap = np.abs(shown.curves[0] - shown.curves[1])
+    assert ROBOT.sensors[shown.channel].name in ("position", "speed")
+    assert gap[at].mean() > gap[~at].mean()
+
+
+def test_what_values_may_still_make_up_for_is_no_difference(evaluator) -> None:
+    """Two sizes of one effect are one explanation as long as its size is open, and two once it was measured well."""
+    sizes = (0.2, 0.25)
+
+    def apart(known: float) -> float:
+        pair = [free("part_mass", "arm", change, known) for change in sizes]
+        return predicted(ROBOT, pair, (LARGE,), evaluator)[0].separation
+
+    fixed = predicted(ROBOT, [Contender((term("part_mass", "arm", change=c),)) for c in sizes], (LARGE,), evaluator)[0]
+    assert fixed.separation > ENOUGH
+    assert apart(0.0) < 0.2 * fixed.separation
+    assert apart(1e9) == pytest.approx(fixed.separation, rel=0.05)
+    # What the model leaves counts like noise, and windows in which nothing differs say nothing.
+    pair = [Contender(HEAVY), Contender(LAZY)]
+    plain = predicted(ROBOT, pair, (LARGE,), evaluator)[0].separation
+    assert predicted(ROBOT, pair, (LARGE,), evaluator, left=4.0)[0].separation == pytest.approx(plain / 2)
+    assert predicted(ROBOT, pair, (LARGE,), evaluator, windows=40)[0].separation <= plain
+
+
+def test_twins_that_no_motion_separates_decide_nothing(evaluator) -> None:
+    twins = [Contender(HEAVY), Contender(HEAVY), Contender(LAZY)]
+    found = ranked(3, predicted(ROBOT, twins, (SMALL, LARGE), evaluator))
+    assert found.alike == ((0, 1),) and found.enough and found.closest in ((0, 2), (1, 2))
+    assert found.best.excitation == LARGE and found.best.separation > ENOUGH
+    only = ranked(2, predicted(ROBOT, twins[:2], (SMALL, LARGE), evaluator))
+    assert only.best.separation == 0.0 and not only.enough and only.alike == ((0, 1),)
+
+
+@pytest.mark.parametrize("robot", [servo_pendulum(), linear_stage(), quadruped_lab()], ids=lambda r: r.name)
+@pytest.mark.parametrize(
+    "limits", [Limits(2.0, 0.4), Limits(2.0, 1.0, 0.2), Limits(2.0, 1.0, speed=1.5), Limits(2.0, 0.7, 0.3, 0.9)]
+)
+def test_no_trial_goes_beyond_what_was_said(robot, limits) -> None:
+    found = family(robot, limits, seed=3)
+    assert found == family(robot, limits, seed=3) and found != family(robot, limits, seed=4)
+    assert {e.kind for e in found} <= set(PLANNED) and len({e.kind for e in found}) >= 4
+    assert {e.fixture for e in found} == ({"floor", "stand"} if robot.free_base else {"floor"})
+    for e in found:
+        sent = e.commands(robot)
+        assert len(sent) == round(2.0 / robot.time_step_s)
+        middle = np.array([(robot.joint(j).lower + robot.joint(j).upper) / 2 for j in robot.motor_names])
+        half = np.array([(robot.joint(j).upper - robot.joint(j).lower) / 2 for j in robot.motor_names])
+        assert (np.abs(sent - middle) <= np.minimum(limits.amplitude * half, limits.excursion) + 1e-9).all()
+        if e.kind != "rest":
+            assert fastest(robot, e) <= limits.speed * (1 + 1e-9)
+
+
+def test_a_robot_that_commands_cannot_drive_has_no_plan() -> None:
+    robot = servo_pendulum()
+    loose = replace(robot, drives=tuple(replace(d, command="none") for d in robot.drives))
+    assert driven(robot) and not driven(loose)
+    with pytest.raises(ConfigError, match="no drive that obeys commands"):
+        motions(loose, Options(), 0)

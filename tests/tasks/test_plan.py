@@ -1,0 +1,86 @@
+"""task=plan on the command line: a trial leaves two explanations tied, the planned one tells them apart."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from ee_dist.recording.reader import read_run
+from ee_dist.trials.excitation import parse
+
+QUICK = ("engine=mujoco", "evaluator=serial")
+SUSPECTS = "task.only=[part_mass,command_gain]"
+HIDDEN = "hidden=[{effect: part_mass, target: arm, change: 0.25}]"
+
+
+@pytest.fixture
+def run(cli):
+    def call(*arguments: str):
+        outcome = cli(*arguments)
+        assert outcome.status == 0, outcome.err
+        return outcome.runs()[0], outcome
+
+    return call
+
+
+def tied(folder: Path) -> list[str]:
+    best = json.loads((folder / "summary.json").read_text())["candidates"][0]
+    return [best["name"], *best["tied_with"]]
+
+
+def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
+    """At small angles a heavier pendulum and a drive that turns too little are one law. The whole chain, each by its own line."""
+    first, _ = run("task=trial", "robot=servo_pendulum", "task.excitations=['sway:seconds=2,amplitude=0.03,seed=1']",
+                   "task.noise=0.001", HIDDEN, "engine=mujoco")  # fmt: skip
+    before, _ = run("task=explain", f"measured={first}", SUSPECTS, "task.rerun=false", *QUICK)
+    assert set(tied(before)) == {"part_mass@arm", "command_gain@servo"}
+
+    plan, outcome = run("task=plan", f"task.explained={before}", "task.seconds=2", "task.draws=1", "evaluator=serial")
+    found = json.loads((plan / "summary.json").read_text())
+    assert found["engine"] == "mujoco", "as the run that it goes on from"
+    assert found["enough"] and found["best"]["enough"] and not found["alike"]
+    assert [t["separation"] for t in found["trials"]] == sorted(
+        (t["separation"] for t in found["trials"]), reverse=True
+    )
+    assert found["headline"] in (plan / "report.html").read_text() and found["headline"][:40] in outcome.out
+
+    # The same file of commands as the trial that the line makes.
+    line = shlex.join(found["command"])
+    assert line in outcome.out
+    second, _ = run(*shlex.split(line)[3:], HIDDEN)
+    sent = pd.read_csv(plan / found["csv"])
+    assert list(sent.columns) == ["time_s", "servo_command (rad)"]
+    log = read_run(second / "trial.mcap").trials[0].log
+    assert np.allclose(sent.to_numpy(), np.column_stack([log.times_s, log.commands]), atol=1e-6)
+    assert len(log) == 500 and np.abs(log.commands).max() <= 0.5 * 2 * np.pi
+
+    both = f"measured=[{first / 'trial.mcap'},{second / 'trial.mcap'}]"
+    after, _ = run("task=explain", both, SUSPECTS, "task.rerun=false", *QUICK)
+    assert tied(after) == ["part_mass@arm"]
+
+    # A run that tells it needs no plan, unless a suspicion is named.
+    outcome = cli("task=plan", f"task.explained={after}")
+    assert outcome.status == 2 and "nothing is tied with part_mass@arm" in outcome.err
+    few = (
+        f"task.explained={after}",
+        "task.seconds=1",
+        "task.kinds=[multisine,rest]",
+        "task.draws=1",
+        "evaluator=serial",
+    )
+    asked, _ = run("task=plan", "task.suspects=[backlash@servo]", *few)
+    one = json.loads((asked / "summary.json").read_text())
+    assert [e["name"] for e in one["explanations"]] == ["part_mass@arm", "part_mass@arm and backlash@servo"]
+    assert parse(one["command"][-1].split('"')[1]).kind == "multisine"
+
+    # The log of a real robot: what was sent, and what came back beside it.
+    seen = sent.assign(**{"servo_position (rad)": log.sensors[:, 0], "servo_speed (rad/s)": log.sensors[:, 1]})
+    seen.to_csv(plan / "recorded.csv", index=False)
+    taken, _ = run("task=import", "robot=servo_pendulum", f"measured={plan / 'recorded.csv'}")
+    back = read_run(taken / "measured.mcap").trials[0].log
+    assert np.allclose(back.commands, log.commands, atol=1e-6)
