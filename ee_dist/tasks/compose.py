@@ -39,8 +39,11 @@ USED_BY = {
         ("recover", "online", "trial", "import", "workbench"),
         "the others take the robot from the log or the model file",
     ),
-    "measured": (("compare", "explain", "improve", "import", "workbench"), "a run or recording to look at is log=..."),
-    "model": (("compare", "explain", "improve", "export", "workbench"), ""),
+    "measured": (
+        ("compare", "explain", "improve", "import", "plan", "workbench"),
+        "a run or recording to look at is log=...",
+    ),
+    "model": (("compare", "explain", "improve", "export", "plan", "workbench"), ""),
     "effect": (("improve",), "what explain tries is task.only=[...], what a trial hides is hidden=..."),
     "hidden": (("trial",), "what recover and online break is +scenario=..."),
     "log": (("view", "study", "reveal", "workbench"), "what the others read is measured=..."),

@@ -26,8 +26,9 @@ from ee_dist.tasks.config import Config, ConfigError, one_of
 from ee_dist.tasks.explained import Explained, explained, fitting
 from ee_dist.tasks.measurements import FEWEST_ROWS, Measurements, load
 from ee_dist.tasks.progress_line import SearchProgress
+from ee_dist.tasks.results.commands import command, setting
 from ee_dist.tasks.results.plan_page import account_of, of_plan, plan_page, show_plan
-from ee_dist.tasks.results.tables import command, setting, show_account
+from ee_dist.tasks.results.tables import show_account
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.ways import way_of
 from ee_dist.tasks.wiring import evaluator_of, for_few
