@@ -483,7 +483,7 @@ PLUGINS: Rows = (
 
 WHOLE: Rows = (
     ("+scenario=8 scenario.changes=[motor_weak]", "expected a list of mappings"),
-    ("task=explian --help", "did you mean explain or online or export?"),
+    ("task=explian --help", "did you mean explain"),
     ("+scenario=8 --foo", "settings are written key=value, and --help lists them"),
     ("+scenario=8 hydra.run.dir=", "hydra.run.dir=: which folder? a run writes into one of its own,"),
     ("+scenario=8 hydra.run.dir=/dev/null/x", "choose a folder with hydra.run.dir=FOLDER"),
