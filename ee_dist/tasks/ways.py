@@ -71,8 +71,10 @@ WAYS: dict[str, Way] = {
 """All ways by name. To add one is to write a ``Problem`` and put it here."""
 
 
-def _seen(robot: Robot) -> bool:
-    return any(s.kind == "position" for s in robot.sensors)
+def _seen(measured: Measurements) -> bool:
+    """Whether a motion was recorded that a simulation can start from and be set against."""
+    positions = any(s.kind == "position" for s in measured.robot.sensors)
+    return positions and all(t.log.joints is not None for t in measured.trials)
 
 
 def known_way(by: str) -> None:
@@ -90,7 +92,7 @@ def way_of(measured: Measurements, by: str) -> Way:
         )
         led = _led(measured.robot) or measured.robot.free_base
         by = "open_loop" if (driven and led) or not torques else "force_balance"
-        if driven and not led and _seen(measured.robot):
+        if driven and not led and _seen(measured):
             # Commanded torques are what went in, and measured ones hardly more than these: the motion is what came of them.
             by = "free_run"
     way = WAYS[by]

@@ -1,0 +1,51 @@
+"""Which way of comparing ``task.by=auto`` takes, by what was recorded and how the joints are led."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
+from ee_dist.robots.model import Robot
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
+from ee_dist.tasks.measurements import Measurements
+from ee_dist.tasks.ways import AUTO, way_of
+from ee_dist.trials.log import SensorLog
+
+ROWS = 200
+
+
+def measured(command: str) -> Measurements:
+    robot = servo_pendulum()
+    robot = replace(robot, drives=tuple(replace(d, command=command) for d in robot.drives))
+    return Measurements(robot, (MeasuredTrial("a", log(robot)),), (), (), None, Path())
+
+
+def log(robot: Robot) -> SensorLog:
+    t = np.arange(ROWS) * robot.time_step_s
+    commands = np.tile(0.1 * np.sin(t)[:, None], (1, len(robot.drives)))
+    sensors = np.tile(0.1 * np.cos(t)[:, None], (1, len(robot.sensors)))
+    joints = 0.1 * np.cos(t)[:, None]
+    units = tuple(s.unit for s in robot.sensors)
+    return SensorLog(t, sensors, commands, robot.sensor_names, units, robot.motor_names, joints=joints)
+
+
+@pytest.mark.parametrize(
+    ("command", "way"), [("position", "open_loop"), ("speed", "open_loop"), ("torque", "free_run")]
+)
+def test_what_was_commanded_says_what_is_compared(command: str, way: str) -> None:
+    assert way_of(measured(command), AUTO).name == way
+
+
+def test_where_torques_lead_the_model_starts_anew_and_slopes_are_trusted() -> None:
+    config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
+    free, held = (way_of(measured(c), "free_run").make(measured(c), config) for c in ("torque", "position"))
+    assert isinstance(free, FreeRun) and isinstance(held, FreeRun)
+    assert not free.rugged and held.rugged
+    assert len(free.pieces) > 1 and len(held.pieces) == 1
+    assert max(len(p.log) for p in free.pieces) * free.robot.time_step_s <= RESTART_S + 0.1
