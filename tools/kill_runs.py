@@ -84,12 +84,20 @@ class Bench:
                 cwd=self.folder, stdout=subprocess.DEVNULL, stderr=file, env=surroundings,
             )  # fmt: skip
 
-    def processes(self) -> dict[int, str]:
-        """Those that a run started, and itself, by name."""
+    def processes(self, by_files: bool = False) -> dict[int, str]:
+        """Those that a run started, and itself, by name. Some of Ray's write over their environment: ``by_files`` finds those
+        too that have a file of ours open, which takes longer."""
         found = {}
         for process in Path("/proc").iterdir():
             with contextlib.suppress(OSError):
-                if process.name.isdigit() and f"{MARK}={self.folder}".encode() in (process / "environ").read_bytes():
+                if (
+                    process.name.isdigit()
+                    and int(process.name) != os.getpid()
+                    and (
+                        f"{MARK}={self.folder}".encode() in (process / "environ").read_bytes()
+                        or (by_files and any(str(self.folder) in os.readlink(f) for f in (process / "fd").iterdir()))
+                    )
+                ):
                     found[int(process.name)] = (process / "comm").read_text().strip()
         return found
 
@@ -120,7 +128,7 @@ class Bench:
         """Processes and folders that are still there a while after the end of all runs."""
         end = time.monotonic() + LEAVE_S
         while True:
-            found = [*self.processes().values(), *(p.name for p in self.temporary.iterdir())]
+            found = [*self.processes(by_files=True).values(), *(p.name for p in self.temporary.iterdir())]
             if not found or time.monotonic() > end:
                 return found
             time.sleep(0.2)

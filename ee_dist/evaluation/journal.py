@@ -1,30 +1,38 @@
 """What was simulated, on the disk as soon as it is known: a run that was killed asks for it again and simulates nothing twice.
 
 A file of entries, each a key, a value and a checksum; whatever a kill left half-written at its end is cut off. Values
-are numbers and small arrays of numbers: what a search needs of a rollout. Others are simulated again.
+are numbers, small arrays of numbers, and records of these (a dataclass that a reduction says it returns): what a search needs
+of a rollout. Others are simulated again.
 """
 
 from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import fields, is_dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, get_type_hints
 from zlib import crc32
 
 import numpy as np
 
 from ee_dist.evaluation.jobs import Evaluator, Job
 
-MAGIC = b"ee_dist journal 1\n"
-LARGEST = 4096
+MAGIC = b"ee_dist journal 2\n"
+LARGEST = 2**16
 """Numbers in one value; larger ones are quicker to simulate again than to keep by the thousand."""
 MOST = 2**30
 """Bytes of a journal; beyond, nothing more is noted."""
-_HEAD = struct.Struct("<32sbII")
+_HEAD = struct.Struct("<32sB")
+"""Key, and how many parts a record has; 0 for a value that is none."""
+_PART = struct.Struct("<BBII")
+"""Kind of number, dimensions (0: a number alone), rows, columns."""
 _CRC = struct.Struct("<I")
+_KINDS = (np.dtype("<f8"), np.dtype("<f4"), np.dtype("?"))
+MOST_PARTS = 16
 
 
 class Journal:
@@ -56,22 +64,38 @@ class Journal:
         head = self._file.read(_HEAD.size)
         if len(head) < _HEAD.size:
             return None
-        key, dimensions, rows, columns = _HEAD.unpack(head)
-        scalar, flat = dimensions == -1, dimensions < 2
+        key, count = _HEAD.unpack(head)
+        read, values = [head], []
+        for _ in range(max(count, 1)) if count <= MOST_PARTS else ():
+            part = self._part(bool(count))
+            if part is None:
+                return None
+            read.append(part[0])
+            values.append(part[1])
+        told = self._file.read(_CRC.size)
+        if not values or len(told) < _CRC.size or _CRC.unpack(told)[0] != crc32(b"".join(read)):
+            return None
+        return key.hex(), tuple(values) if count else values[0]
+
+    def _part(self, of_record: bool) -> tuple[bytes, Any] | None:
+        """Its bytes and its value. Only a part of a record may be empty."""
+        head = self._file.read(_PART.size)
+        if len(head) < _PART.size:
+            return None
+        kind, dimensions, rows, columns = _PART.unpack(head)
         if (
-            dimensions not in (-1, 1, 2)
-            or not 0 < rows * columns <= LARGEST
-            or (flat and columns > 1)
-            or (scalar and rows > 1)
+            kind >= len(_KINDS)
+            or dimensions > 2
+            or not (0 if of_record and dimensions else 1) <= rows * columns <= LARGEST
+            or (dimensions < 2 and columns != 1)
+            or (not dimensions and rows != 1)
         ):
             return None
-        content = self._file.read(8 * rows * columns)
-        told = self._file.read(_CRC.size)
-        if len(told) < _CRC.size or _CRC.unpack(told)[0] != crc32(head + content):
+        content = self._file.read(_KINDS[kind].itemsize * rows * columns)
+        if len(content) < _KINDS[kind].itemsize * rows * columns:
             return None
-        numbers = np.frombuffer(content, dtype=np.float64)
-        value: Any = float(numbers[0]) if dimensions == -1 else numbers.reshape((rows, columns)[:dimensions]).copy()
-        return key.hex(), value
+        numbers = np.frombuffer(content, dtype=_KINDS[kind])
+        return head + content, numbers.reshape((rows, columns)[:dimensions]).copy() if dimensions else numbers[0].item()
 
     def note(self, found: Sequence[tuple[str, Any]]) -> None:
         """Keep these; when this returns they survive a kill and a loss of power."""
@@ -102,17 +126,40 @@ class Journal:
 
 def _packed(key: str, value: Any) -> bytes | None:
     """An entry as bytes; None for a value that is not kept."""
-    if isinstance(value, float):
-        dimensions, numbers = -1, np.array([value])
-    elif isinstance(value, np.ndarray) and value.dtype == np.float64 and value.ndim in (1, 2) and value.size <= LARGEST:
-        dimensions, numbers = value.ndim, value
-    else:
+    record = is_dataclass(value) and not isinstance(value, type)
+    values = [getattr(value, f.name) for f in fields(value)] if record else [value]
+    parts = [_packed_part(v) for v in values]
+    whole = [p for p in parts if p is not None]
+    if len(whole) < len(parts) or not 0 < len(parts) <= MOST_PARTS or (not record and np.size(value) == 0):
         return None
-    rows, columns = numbers.shape if numbers.ndim == 2 else (len(numbers), 1)
-    if not rows * columns:
-        return None
-    body = _HEAD.pack(bytes.fromhex(key), dimensions, rows, columns) + np.ascontiguousarray(numbers).tobytes()
+    body = _HEAD.pack(bytes.fromhex(key), len(parts) if record else 0) + b"".join(whole)
     return body + _CRC.pack(crc32(body))
+
+
+def _packed_part(value: Any) -> bytes | None:
+    array = np.asarray(value) if isinstance(value, (float, bool, np.ndarray)) else None
+    if array is None or array.dtype not in _KINDS or array.ndim > 2 or array.size > LARGEST:
+        return None
+    rows, columns = (*array.shape, 1, 1)[:2] if array.ndim else (1, 1)
+    return _PART.pack(_KINDS.index(array.dtype), array.ndim, rows, columns) + np.ascontiguousarray(array).tobytes()
+
+
+@lru_cache(64)
+def _record(kind: type) -> Callable[..., Any] | None:
+    """What reductions of this kind say that they return, where it is a record."""
+    try:
+        made = get_type_hints(kind.__call__).get("return")
+    except (NameError, TypeError, AttributeError):
+        return None
+    return made if isinstance(made, type) and is_dataclass(made) else None
+
+
+def _restored(job: Job, value: Any) -> Any:
+    """The value as the job's reduction gives it; None where what the journal has is of another shape."""
+    if not isinstance(value, tuple):
+        return value
+    made = _record(type(job.reduction))
+    return made(*value) if made is not None and len(fields(made)) == len(value) else None  # type: ignore[arg-type]
 
 
 class JournaledEvaluator:
@@ -126,8 +173,8 @@ class JournaledEvaluator:
         if self.journal is None:
             return self.inner.evaluate(jobs)
         known, keys, before = self.journal.values, [job.key for job in jobs], self.counts.copy()
-        fresh = [k for k, key in enumerate(keys) if key not in known]
-        found: list[Any] = [known.get(key) for key in keys]
+        found: list[Any] = [_restored(job, known.get(key)) for job, key in zip(jobs, keys, strict=True)]
+        fresh = [k for k, value in enumerate(found) if value is None]
         if fresh:
             results = self.inner.evaluate([jobs[k] for k in fresh])
             self.journal.note([(keys[k], value) for k, value in zip(fresh, results, strict=True)])

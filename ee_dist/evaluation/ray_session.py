@@ -79,7 +79,28 @@ class _Guard:
             self.process.wait(_LEAVE_S)
 
 
+class _Hush:
+    """What Ray's compiled part says of a Ray that is lost would stand beside our line: it writes to the system's error
+    stream, from which Python's own is taken apart meanwhile."""
+
+    def __init__(self) -> None:
+        sys.stderr.flush()
+        self.before, self.stream = sys.stderr, os.dup(2)
+        with suppress(OSError, ValueError):  # a stream that is not the system's stays as it is
+            if sys.stderr.fileno() == 2:
+                sys.stderr = open(self.stream, "w", 1, sys.stderr.encoding, "backslashreplace", closefd=False)  # noqa: SIM115
+        with open(os.devnull, "wb") as nothing:
+            os.dup2(nothing.fileno(), 2)
+
+    def end(self) -> None:
+        sys.stderr.flush()
+        os.dup2(self.stream, 2)
+        os.close(self.stream)
+        sys.stderr = self.before
+
+
 _guard: _Guard | None = None
+_hush: _Hush | None = None
 _watch: Watch | None = None
 _address: str | None = None
 _farewell: list[Callable[[str], None]] = []
@@ -97,7 +118,7 @@ def start_ray(address: str | None, workers: int) -> None:
     import ray
     from ray._private import auto_init_hook, ray_constants
 
-    global _guard, _address
+    global _guard, _address, _hush
     if ray.is_initialized():
         return
     # Ray's answer to SIGTERM is a dump of stacks; ours is a line.
@@ -125,6 +146,8 @@ def start_ray(address: str | None, workers: int) -> None:
         }
         # Inherited by the workers that Ray has ready: with a runtime_env it would start others, and a second later.
         environment = {**ONE_THREAD, **_guard.environment}
+    if _hush is None:
+        _hush = _Hush()
     starter = _Starter(options)
     _begun.clear()
     with _environment(environment):
@@ -185,11 +208,15 @@ class _Starter(threading.Thread):
 
 def stop_ray() -> None:
     """Stop what ``start_ray`` started, or leave the cluster. Ray's own way at the end of a process begins with a nap."""
+    global _hush
     _stop_watch()
     ray = sys.modules.get("ray")
     if ray is not None and ray.is_initialized():
         ray.shutdown()
     abandon_ray()
+    if _hush is not None:
+        _hush.end()
+        _hush = None
 
 
 def abandon_ray() -> None:

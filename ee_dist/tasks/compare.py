@@ -22,6 +22,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_comparison
 from ee_dist.tasks.results.tables import show_account, show_comparison
 from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.tasks.unfinished import note_nothing
 from ee_dist.tasks.ways import known_way, way_of
 from ee_dist.tasks.wiring import for_few
 from ee_dist.viewing.report import write_page
@@ -39,6 +40,7 @@ class Options:
 
 def run(config: Config, options: Options, out: Path) -> tuple[Problem, Comparison, Account]:
     """Write summary.json, report.html and compare.rrd into ``out``. Raises ConfigError, LogError, RecordingError."""
+    note_nothing()  # it is over in seconds
     console, watch, measured = Console(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
     for remark in measured.remarks:

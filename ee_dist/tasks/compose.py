@@ -60,7 +60,7 @@ _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench
 _SWEEP = ("-m", "--multirun")
 MOST_RUNS = 10_000
 _RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
-_NO_CHOICE = re.compile(r"^\+{0,2}(\w+)=(true|false|nan|[-+]?inf|[-+]?[0-9][0-9_.eE+-]*)$", re.IGNORECASE)
+_NO_CHOICE = re.compile(r"^\+{0,2}(\w+)=(true|false|null|nan|[-+]?inf|[-+]?[0-9][0-9_.eE+-]*)$", re.IGNORECASE)
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
 
 
@@ -216,6 +216,14 @@ _EXPECTED = (
     (r"Value '(.*)' of type '.*' could not be converted to Float", "a number"),
     (r"Value '(.*)' is not a valid bool", "true or false"),
     (r"Cannot convert '(?:List|Dict)Config' to string: '(.*)'", "one value, without brackets"),
+    (r"Cannot convert '(?:list|dict)' to string: '(.*)'", "a text"),
+    (r"Invalid type assigned: \w+ is not a subclass of str. value: (.*)", "a text"),
+    (
+        r"Invalid type assigned: \w+ is not a subclass of Dict.* value: (.*)",
+        "a mapping, such as {{effect: ..., target: ...}}",
+    ),
+    (r"Merge error: \w+ is not a subclass of \w+. value: (.*)", "settings of its own, such as {key}.NAME=..."),
+    (r"field '\w+' is not Optional", "settings of its own, such as {key}.NAME=..."),
     (r"Invalid value assigned: .* is not a ListConfig", "a list, such as {key}=[one,two]"),
     (r"Cannot assign \w+ to Dict", "a list of mappings, such as [{{effect: ..., target: ...}}]"),
     (r"Incompatible value 'None' for field of type", "a value, not null"),

@@ -197,6 +197,9 @@ def files_of(measured: Any, kind: str | None = None) -> list[Path]:
             files += inside
         else:
             files.append(path)
+    twice = [f for k, f in enumerate(files) if f.resolve() in [g.resolve() for g in files[:k]]]
+    if twice:
+        raise MeasurementError(f"measured={twice[0]}: the same file twice; name each once")
     return files
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ee_dist.evaluation.jobs import Travel
 from ee_dist.recovery.metrics import Distance, RollingMean, rolling_mean
 from ee_dist.trials.log import SensorLog
 
@@ -55,6 +56,7 @@ def test_a_model_that_left_the_finite_numbers_is_the_worst(metric):
     measured = log(np.zeros((20, 2)), 1.0)
     broken = log(np.full((20, 2), np.nan), float("nan"))
     assert metric.against(measured)(broken) == float("inf")
+    assert Travel()(broken) == float("-inf"), "and the worst of distances"
 
 
 @pytest.mark.parametrize(("header", "window"), [(5, 10), (10, 0)])

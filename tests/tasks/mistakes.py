@@ -5,6 +5,14 @@ from __future__ import annotations
 Rows = tuple[tuple[str, str], ...]
 
 COMPOSITION: Rows = (
+    ("+scenario=8 budget=null", "budget=null: no such choice; there are: paper, quick"),
+    ("+scenario=8 task=null", "task=null: no such choice; there are: compare"),
+    ("+scenario=null", "there are: 1"),
+    ("task=trial hardware=nowhere", "expected settings of its own"),
+    ("task=trial hardware=null", "hardware: expected settings of its own"),
+    ("+scenario=8 plugins=[null]", "plugins[0]=None: expected a text"),
+    ('+scenario=8 "scenario.changes=[null]"', "expected a mapping, such as {effect: ..., target: ...}"),
+    ("task=trial robot=servo_pendulum task.excitations=[[sway]]", "expected a text"),
     ("task=online +scenario=3 hardware.address=127.0.0.1:1", "it is for task=recover and task=trial"),
     ("task=online +scenario=3 metric=distance", "it is for task=recover"),
     (
@@ -115,6 +123,8 @@ VALUES: Rows = (
     ("+scenario=8 plugins=3", "expected a list, such as plugins=[one,two]"),
     ("+scenario=8 plugins=[3]", "no such file of effects: 3"),
     ("+scenario=8 ray.address=127.0.0.1:1", "start one with 'ray start --head', or leave ray.address empty"),
+    ("+scenario=8 ray.address=127.0.0.1:99999", "no Ray cluster answers there"),
+    ("+scenario=8 ray.address=ray://127.0.0.1:1", "no Ray cluster answers there"),
     ("+scenario=8 ray.address=nonsense", "ray.address=nonsense: neither 'auto' nor host:port, such as"),
     ("+scenario=8 hardware.address=nowhere", "expected host:port, such as 127.0.0.1:5555"),
     ("+scenario=8 hardware.address=127.0.0.1:1", "hardware.address=127.0.0.1:1: no robot answers there"),
@@ -269,6 +279,7 @@ WORKBENCH: Rows = (
     ("task=workbench measured=notes.mcap", "expected a recording written by ee_dist"),
     ("task=workbench model=effect.yaml", "did you mean viscous_friction or coulomb_friction or"),
     ("task=workbench log=nowhere", "log=nowhere: no such run"),
+    ("task=workbench log=/dev/zero", "log=/dev/zero: no such run"),
     (
         "task=workbench log=trial.mcap measured=trial.mcap",
         "log= follows a recovery, measured= compares a model with a log",
@@ -355,6 +366,8 @@ IMPORTS: Rows = (
     ("task=import measured=t.csv task.rate_hz=-5", "expected rows a second, more than 0 and at most 1e6"),
     ("task=import measured=t.csv task.rate_hz=nan", "expected rows a second, more than 0 and at most 1e6"),
     ("task=import measured=t.csv task.mapping=good.map task.joints=[nee]", "write it into good.map"),
+    ("task=import measured=t.csv robot=servo_pendulum task.joints=[servo,servo]", "servo is missing or named twice"),
+    ("task=import measured=[t.csv,t.csv] task.mapping=good.map", "measured=t.csv: the same file twice; name each once"),
     ("task=import measured=t.csv task.joints=[nee]", "there are: hip_front_left, knee_front_left, hip_front_right,"),
     ("task=import measured=t.csv robot=servo_pendulum task.joints=[nee]", "there are: servo"),
     (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -183,3 +184,52 @@ def test_a_journal_cut_anywhere_gives_its_whole_entries(tmp_path: Path):
             assert all(str(journal.values[j.key]) == str(e) for j, e in zip(jobs, expected, strict=True)
                        if j.key in journal.values)  # fmt: skip
     shutil.rmtree(tmp_path)
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    means: np.ndarray
+    nothing: np.ndarray
+    finite: bool
+
+
+class _ToKept:
+    key = "kept"
+
+    def __call__(self, log: object) -> _Kept:
+        raise AssertionError
+
+
+class _Records(_Numbers):
+    def evaluate(self, jobs):
+        self.asked += len(jobs)
+        return [
+            _Kept(np.full((3, 2), j.number, dtype=np.float32), np.empty((0, 2), np.float32), j.number > 2) for j in jobs
+        ]
+
+
+def test_a_journal_keeps_what_a_reduction_makes_of_a_log(tmp_path: Path):
+    """As open loop does: without it a search of hours would begin anew."""
+    path, jobs = tmp_path / "j.bin", [_Job(k) for k in range(5)]
+    for job in jobs:
+        job.reduction = _ToKept()
+    with Journal(path) as journal:
+        expected = JournaledEvaluator(_Records(), journal).evaluate(jobs)
+    whole = path.read_bytes()
+    for length in (*range(0, len(whole), 11), len(whole)):
+        path.write_bytes(whole[:length])
+        with Journal(path) as journal:
+            known, inner = len(journal.values), _Records()
+            found = JournaledEvaluator(inner, journal).evaluate(jobs)
+        assert inner.asked == 5 - known
+        for a, b in zip(found, expected, strict=True):
+            assert (a.means.dtype, a.means.tobytes(), a.nothing.shape, a.finite) == (
+                b.means.dtype, b.means.tobytes(), b.nothing.shape, b.finite,
+            )  # fmt: skip
+    assert known == 5
+    for job in jobs:
+        job.reduction = len  # which does not say that it gives such a record
+    inner = _Records()
+    with Journal(path) as journal:
+        JournaledEvaluator(inner, journal).evaluate(jobs)
+    assert inner.asked == 5

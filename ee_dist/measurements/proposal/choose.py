@@ -81,8 +81,9 @@ def _check_hints(robot: Robot, hints: Hints) -> None:
                     f"task.joints: {robot.name} has no driven joint {j!r}; {nearest(j, robot.motor_names)}"
                 )
         missing = [m for m in robot.motor_names if m not in hints.joints]
-        if missing or len({j for j in hints.joints if j in robot.motor_names}) < len(robot.motor_names):
-            which = missing[0] if missing else "a joint"
+        twice = [j for j in robot.motor_names if hints.joints.count(j) > 1]
+        if missing or twice:
+            which = (missing or twice)[0]
             raise MeasurementError(
                 f"task.joints: {which} is missing or named twice; expected all of {', '.join(robot.motor_names)}"
             )

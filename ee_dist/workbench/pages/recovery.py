@@ -67,7 +67,7 @@ class Followed:
 
 def show_recovery(log: Path, out: Path) -> None:
     """Serve the run at the root. Raises ConfigError where there is nothing to follow."""
-    if not log.exists():
+    if not (log.is_dir() or log.is_file()):
         raise ConfigError(f"log={log}: no such run; name the folder of one, such as log=logs/recover/...")
     followed = Followed(log, out)
     if not log.is_dir() and not followed.look():
