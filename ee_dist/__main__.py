@@ -89,12 +89,18 @@ def run(composed: DictConfig) -> None:
         remove_made()
         sys.exit(_complain(unasked_end(error)))
     except Exception as error:
+        if (left := leaving.asked()) is not None:
+            _stopped(left, out)
         sys.exit(_complain(defect(error, out), DEFECT))
     except KeyboardInterrupt as stop:
-        remove_made()
-        if multiprocessing.parent_process() is not None:
-            os._exit(leaving.told(stop).status)  # one job of several side by side: the sweep says the line
-        _leave(stop, out)
+        _stopped(stop, out)
+
+
+def _stopped(stop: KeyboardInterrupt, out: Path) -> NoReturn:
+    remove_made()
+    if multiprocessing.parent_process() is not None:
+        os._exit(leaving.told(stop).status)  # one job of several side by side: the sweep says the line
+    _leave(stop, out)
 
 
 def _lost(why: str, out: Path) -> NoReturn:

@@ -76,6 +76,12 @@ def told(stop: KeyboardInterrupt) -> Left:
     return stop if isinstance(stop, Left) else _left or Left(signal.SIGINT)
 
 
+def asked() -> Left | None:
+    """The signal that the run is unwinding for, if there was one: a library that it met while it was being loaded makes an
+    error of its own out of it."""
+    return _left
+
+
 def _unwind(number: int, frame: FrameType | None) -> None:
     global _leaving, _left
     if _leaving:

@@ -82,6 +82,28 @@ time.sleep(600)
 """
 
 
+LOADING = """
+import os, signal, sys
+from ee_dist import __main__
+from ee_dist.tasks import view
+def load(*_):
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+    except KeyboardInterrupt as stop:
+        raise ImportError("initialization failed") from stop
+view.run = load
+sys.argv[1:] = ["task=view", "log=x.mcap", "hydra.run.dir=out"]
+sys.exit(__main__.main())
+"""
+
+
+def test_a_library_that_was_being_loaded_makes_no_defect_of_it(tmp_path):
+    done = subprocess.run([sys.executable, "-c", LOADING], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 128 + signal.SIGTERM
+    assert done.stderr.startswith("ee_dist: stopped (asked to end)") and len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "out" / "error.txt").exists()
+
+
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
 def test_a_killed_run_leaves_no_process_and_no_folder_of_ray(tmp_path):
     with subprocess.Popen([sys.executable, "-c", GUARDED], stdout=subprocess.PIPE, text=True) as process:
