@@ -132,10 +132,11 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     rest |= {"csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}
     write_summary(out, "plan", found.config, options, watch, digest, rest)
     write_page(
-        plan_page(robot, result, explanations, shown, account, measured.files, command(trial)), out / "report.html"
+        plan_page(robot, result, explanations, shown, account, measured.files, command(trial) if result.enough else ""),
+        out / "report.html",
     )
     show_plan(console, robot, result)
-    show_account(console, account, out, trial)
+    show_account(console, account, out, trial if result.enough else ())
     return result
 
 
