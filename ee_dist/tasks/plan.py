@@ -126,7 +126,9 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     trial = ["task=trial", *robot_settings(robot, out), setting("task.noise", f"{noise_share(robot):.3g}"),
              setting("engine", found.config.engine.name), f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
     explanations = list(zip(names, [c.hypothesis for c in rivals], strict=True))
-    account = account_of(robot, result, explanations, command(trial), len(found.explanations) - MOST_TIED)
+    account = account_of(
+        robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED
+    )
     digest = digest_of([(t.excitation, [round(s, 9) for s in t.separations]) for t in result.trials])
     rest = of_plan(result, explanations, found.folder, measured.files, options.limits, account)
     rest |= {"csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}
