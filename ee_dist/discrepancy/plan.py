@@ -44,6 +44,8 @@ LIBRARY = (
 
 ENOUGH = 4.0
 """Standard deviations from which a trial is expected to tell two explanations apart."""
+SHORTEST = 60
+"""Rows of a trial that can be compared: a window of the open-loop way."""
 TOGETHER = 400_000
 """Robot-steps that are simulated between two words on the progress."""
 FARTHEST = 0.5
@@ -117,7 +119,7 @@ def _predicted(
 ) -> list[PlannedTrial]:
     best = contenders[0].hypothesis
     ahead = ahead_of(robot, best, excitations, evaluator)
-    usable = [k for k, t in enumerate(ahead) if t.log.finite]
+    usable = [k for k, t in enumerate(ahead) if t.log.finite and len(t.log) >= SHORTEST]
     none = tuple(0.0 for _ in combinations(contenders, 2))
     out = [PlannedTrial(e, 0.0, none) for e in excitations]
     if not usable:

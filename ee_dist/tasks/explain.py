@@ -56,6 +56,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     with SearchProgress(console, told) as progress:
         progress("weighing the measurements", 0.0)
         problem = way.make(measured, config)
+        progress("weighing the measurements", 1.0)
         pool = chosen(problem, options.without, options.only)
         count = len(measured.trials)
         console.print(

@@ -105,6 +105,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
         way = way_of(measured, found.way)
         progress("weighing the measurements", 0.0)
         problem = way.make(measured, found.config)
+        progress("weighing the measurements", 1.0)
         tied = [terms for _, terms in found.explanations[:MOST_TIED]]
         if way.name == OpenLoop.way:
             known = contenders(problem, tied, progress)
@@ -125,16 +126,19 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     trial = ["task=trial", *robot_settings(robot, out), setting("task.noise", f"{noise_share(robot):.3g}"),
              setting("engine", found.config.engine.name), f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
     explanations = list(zip(names, [c.hypothesis for c in rivals], strict=True))
-    account = account_of(robot, result, explanations, command(trial), len(found.explanations) - MOST_TIED)
+    account = account_of(
+        robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED
+    )
     digest = digest_of([(t.excitation, [round(s, 9) for s in t.separations]) for t in result.trials])
     rest = of_plan(result, explanations, found.folder, measured.files, options.limits, account)
     rest |= {"csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}
     write_summary(out, "plan", found.config, options, watch, digest, rest)
     write_page(
-        plan_page(robot, result, explanations, shown, account, measured.files, command(trial)), out / "report.html"
+        plan_page(robot, result, explanations, shown, account, measured.files, command(trial) if result.enough else ""),
+        out / "report.html",
     )
     show_plan(console, robot, result)
-    show_account(console, account, out, trial)
+    show_account(console, account, out, trial if result.enough else ())
     return result
 
 

@@ -52,7 +52,7 @@ def test_what_is_computed_together_is_limited_by_memory_and_changes_no_bit(monke
     monkeypatch.setattr(prediction, "reports", reports)
     problem, _ = look(2.0)
     search = Search(problem)
-    assert search.batch == BATCH
+    assert search.batch == BATCH and [b.stop - b.start for b in search.batches(500)] == [240, 240, 20]
     asked = [(c.term(u),) for c in POOL for u in c.probes((0.1, 0.6))]
     expected, promised = problem.residuals(asked), [s.promise for s in screen(search, POOL)]
     assert max(sizes) > 3 * prediction.DRAWS * rows
@@ -68,8 +68,8 @@ def test_what_is_computed_together_is_limited_by_memory_and_changes_no_bit(monke
     engine.called.clear()
     told: list[float] = []
     slow = Search(again, progress=lambda _, share: told.append(share))
-    assert slow.batch == 5
+    assert [b.stop - b.start for b in slow.batches(14)] == [1, 2, 4, 5, 2]
     assert np.array_equal(again.residuals(asked), expected)
     assert [s.promise for s in screen(slow, POOL)] == promised
     assert max(sizes) <= 2 * prediction.DRAWS * rows and max(engine.called) <= 3 * rows
-    assert told[0] < 0.35 and told[-1] == 1.0, "a word after every few of them"
+    assert told[0] < 0.1 and told[-1] == 1.0, "a word soon, and after every few of them"

@@ -103,6 +103,6 @@ def test_compare_says_where_it_fails(engine: MuJoCoEngine) -> None:
 
 def test_a_trial_that_separates_is_proposed(engine: MuJoCoEngine) -> None:
     tied = [(term("viscous_friction", f"knee_{leg}", damping_nm_s_rad=0.3),) for leg in ("front_left", "front_right")]
-    library = (Excitation("rest", 0.6, fixture="stand"), Excitation("multisine", 1.2, 0.5, 2, "stand"))
+    library = (Excitation("rest", 1.2, fixture="stand"), Excitation("multisine", 2.4, 0.5, 2, "stand"))
     ahead = next_trials(ROBOT, tied, CachedEvaluator(SerialEvaluator(engine)), library)
     assert ahead[0].excitation.kind == "multisine" and ahead[0].separation > ENOUGH

@@ -11,6 +11,8 @@ import pandas as pd
 import pytest
 
 from ee_dist.recording.reader import read_run
+from ee_dist.tasks.config import Config
+from ee_dist.tasks.explained import explained
 from ee_dist.trials.excitation import parse
 
 QUICK = ("engine=mujoco", "evaluator=serial")
@@ -84,3 +86,27 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     taken, _ = run("task=import", "robot=servo_pendulum", f"measured={plan / 'recorded.csv'}")
     back = read_run(taken / "measured.mcap").trials[0].log
     assert np.allclose(back.commands, log.commands, atol=1e-6)
+
+
+def test_a_run_of_improve_gives_its_model_and_that_with_what_was_tied_in_its_place(tmp_path):
+    """Each effect of the model exchanged for each that was tied with it when it was added; not those that went again."""
+
+    def entry(effect: str, **values: float) -> dict[str, object]:
+        return {"effect": effect, "target": "servo", "values": values}
+
+    viscous, dry = entry("viscous_friction", damping_nm_s_rad=0.01), entry("coulomb_friction", torque_nm=0.02)
+    slow, gone = entry("command_delay", delay_s=0.01), entry("deadband", half_width_rad=0.1)
+    ladder = [
+        {"added": [], "alternatives": []},
+        {"added": [gone], "alternatives": [entry("backlash", gap_rad=0.1)]},
+        {"added": [dry], "alternatives": [entry("load_friction", share=0.1), viscous]},
+        {"added": [viscous], "alternatives": []},
+    ]
+    summary = {"task": "improve", "verdict": "explained", "way": "open_loop", "engine": "mujoco", "ladder": ladder}
+    (tmp_path / "summary.json").write_text(json.dumps(summary | {"model_terms": [slow, dry, viscous]}))
+    found = explained(str(tmp_path), Config(measured="trial.mcap"))
+    assert [(name, [t.effect for t in terms]) for name, terms in found.explanations] == [
+        ("coulomb_friction@servo", ["command_delay", "coulomb_friction", "viscous_friction"]),
+        ("load_friction@servo", ["command_delay", "load_friction", "viscous_friction"]),
+    ]
+    assert found.config.engine.name == "mujoco" and found.config.measured == "trial.mcap"

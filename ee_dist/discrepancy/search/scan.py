@@ -37,14 +37,14 @@ def scan(search: Search, promising: Sequence[Screened], refit: Refit = Refit()) 
     refit = refit.among(search)
     points = [(i, u) for i, s in enumerate(promising) for u in _points(s, i)]
     found: list[list[tuple[float, Array]]] = [[] for _ in promising]
-    for k in range(0, len(points), search.batch):
-        some = points[k : k + search.batch]
+    for part in search.batches(len(points)):
+        some = points[part]
         rows = search.residuals([(promising[i].candidate.term(u),) for i, u in some])
         for (i, u), r in zip(some, rows, strict=True):
             if np.isfinite(r).all():
                 left = refit(r)
                 found[i].append((float(left @ left), u))
-        search.progress("scanning", min(1.0, (k + search.batch) / len(points)))
+        search.progress("scanning", part.stop / len(points))
     out = []
     for s, mine in zip(promising, found, strict=True):
         mine.sort(key=lambda f: f[0])

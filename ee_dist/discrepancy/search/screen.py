@@ -42,13 +42,13 @@ def screen(
     points = [(i, u) for i, c in enumerate(pool) for u in c.probes(shares)]
     rows: list[list[tuple[Array, float, float, float]]] = [[] for _ in pool]
     total = float(base @ base)
-    for k in range(0, len(points), search.batch):
-        some = points[k : k + search.batch]
+    for part in search.batches(len(points)):
+        some = points[part]
         found = search.residuals([(pool[i].term(u),) for i, u in some])
         for (i, u), r in zip(some, found, strict=True):
             if np.isfinite(r).all():
                 rows[i].append((u, *_promise(base, refit(r), total, pool[i], u)))
-        search.progress("screening", min(1.0, (k + search.batch) / len(points)))
+        search.progress("screening", part.stop / len(points))
     return [_screened(c, found) for c, found in zip(pool, rows, strict=True)]
 
 

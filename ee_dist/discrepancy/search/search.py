@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,8 @@ BATCH = 240
 """Hypotheses that are asked for in one call while many are probed, at most,"""
 VALUES = 2_000_000
 """and residual values that they may have together: of long logs a call takes seconds and tens of MB with few of them."""
+FIRST = 6
+"""How much smaller the first of them is."""
 
 
 def quiet(what: str, share: float) -> None:
@@ -43,6 +45,15 @@ class Search:
     def batch(self) -> int:
         """How many hypotheses are asked for in one call, by the memory that they take."""
         return max(1, min(BATCH, VALUES // max(1, len(self.problem.segment_of))))
+
+    def batches(self, count: int) -> Iterator[slice]:
+        """``count`` hypotheses in the batches that they are asked for in. Where a batch takes long the first are smaller: who
+        waits is told soon how long."""
+        size = max(1, self.batch // FIRST) if self.batch < BATCH / FIRST else self.batch
+        at = 0
+        while at < count:
+            yield slice(at, min(at + size, count))
+            at, size = at + size, min(2 * size, self.batch)
 
     def base(self) -> Array:
         """(n,) with the fixed terms alone."""

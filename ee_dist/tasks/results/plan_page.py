@@ -28,8 +28,11 @@ SHOWN = 10
 """Trials in the tables."""
 
 
-def account_of(robot: Robot, found: Plan, explanations: Explanations, trial: str, left_out: int = 0) -> Account:
-    """What to record, what it is expected to tell, what stays alike, and how to do it."""
+def account_of(
+    robot: Robot, found: Plan, explanations: Explanations, trial: str, fitted: bool, left_out: int = 0
+) -> Account:
+    """What to record, what it is expected to tell, what stays alike, and how to do it. ``fitted``: whether the values were
+    let come nearer to one another, as far as measurements leave them open."""
     best, names = found.best, [placed(n) for n, _ in explanations]
     e, closest = best.excitation, f"{names[found.closest[0]]} from {names[found.closest[1]]}"
     what = f"{e.told(robot).replace('_', ' ')} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}"
@@ -43,7 +46,9 @@ def account_of(robot: Robot, found: Plan, explanations: Explanations, trial: str
         sure = f"How sure: {len(found.trials)} trials were simulated for {len(names)} explanations."
         advice = "Next: allow more (task.seconds, task.amplitude), or measure a channel that shows the difference."
     lines = [
-        "What their values may still make up for, within what was measured already, counts as no difference.",
+        "What their values may still make up for, within what was measured already, counts as no difference."
+        if fitted
+        else "Their values count as certain, as they were fitted: a trial may promise more than it keeps.",
         f"The commands, for a robot of your own: plan.csv. On a simulated one: {trial}",
     ]
     if found.alike and found.enough:
