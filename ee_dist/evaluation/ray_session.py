@@ -5,8 +5,10 @@ Ray itself is loaded by whoever starts it: its errors are known, and its end is 
 
 from __future__ import annotations
 
+import fcntl
 import logging
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -42,6 +44,7 @@ LOOK_S = 0.5
 """How often to look whether Ray is still there while it starts."""
 _SOCKET_PATH = 40
 """Longest name of Ray's folder, characters: sockets lie in it, and the system takes 107 for the name of one."""
+_FOLDER, _HELD = "ee_dist_", ".held"
 _LEAVE_S = 10.0
 KNOCK_S = 2.0
 """How often to look whether a cluster of others still answers."""
@@ -55,7 +58,10 @@ class _Guard:
     def __init__(self) -> None:
         self.mark = f"{MARK}={uuid.uuid4().hex}"
         place = tempfile.gettempdir()
-        self.folder = tempfile.mkdtemp(prefix="ee_dist_", dir=place if len(place) < _SOCKET_PATH - 16 else "/tmp")
+        place = place if len(place) < _SOCKET_PATH - 16 else "/tmp"
+        _remove_orphans(Path(place))
+        self.folder = tempfile.mkdtemp(prefix=_FOLDER, dir=place)
+        self.lock = _locked(Path(self.folder))
         script = str(Path(__file__).with_name("ray_guard.py"))
         command = [sys.executable, "-I", "-S", script, self.mark, self.folder]
         self.process = subprocess.Popen(
@@ -77,6 +83,8 @@ class _Guard:
             if self.process.stdin:
                 self.process.stdin.close()
             self.process.wait(_LEAVE_S)
+        with suppress(OSError):
+            os.close(self.lock)
 
 
 class _Hush:
@@ -97,6 +105,28 @@ class _Hush:
         os.dup2(self.stream, 2)
         os.close(self.stream)
         sys.stderr = self.before
+
+
+def _locked(folder: Path) -> int:
+    """Handle of a lock in the folder that goes with this process, however it ends."""
+    part = folder / f"{_HELD}.part"
+    handle = os.open(part, os.O_RDWR | os.O_CREAT, 0o600)
+    fcntl.flock(handle, fcntl.LOCK_EX)
+    part.rename(folder / _HELD)  # nobody sees it unlocked
+    return handle
+
+
+def _remove_orphans(place: Path) -> None:
+    """Folders of runs that ended together with their guards, as when a machine fails: ours, with a lock that nobody holds."""
+    for lock in place.glob(f"{_FOLDER}*/{_HELD}"):
+        with suppress(OSError):
+            handle = os.open(lock, os.O_RDWR | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if lock.parent.stat().st_uid == os.getuid():
+                    shutil.rmtree(lock.parent, ignore_errors=True)
+            finally:
+                os.close(handle)
 
 
 _guard: _Guard | None = None

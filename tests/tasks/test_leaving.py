@@ -13,6 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from ee_dist.evaluation import ray_session
 from ee_dist.evaluation.ray_session import MARK
 from ee_dist.recording.reader import read_run
 
@@ -118,6 +119,28 @@ def test_a_killed_run_leaves_no_process_and_no_folder_of_ray(tmp_path):
         waited += 1
     assert not marked(mark)
     assert not Path(folder).exists()
+
+
+def test_what_a_failed_machine_left_of_ray_is_removed_by_the_next_run(tmp_path, monkeypatch):
+    """There the guard ended with its run."""
+    monkeypatch.setattr(ray_session.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(ray_session, "_SOCKET_PATH", 10**6)
+    own = tmp_path / "ee_dist_mine"
+    own.mkdir()
+    (own / "notes.txt").write_text("mine")
+    first = ray_session._Guard()
+    (Path(first.folder) / "session").mkdir()
+    second = ray_session._Guard()
+    assert Path(first.folder).is_dir(), "its run goes on"
+    first.process.kill()
+    first.process.wait()
+    os.close(first.lock)
+    third = ray_session._Guard()
+    assert not Path(first.folder).exists()
+    assert Path(second.folder).is_dir() and (own / "notes.txt").exists()
+    for guard in (second, third):
+        guard.release()
+    assert [p.name for p in tmp_path.iterdir()] == ["ee_dist_mine"]
 
 
 def marked(mark: str) -> list[str]:
