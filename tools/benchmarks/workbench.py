@@ -58,8 +58,8 @@ WATCH = """((kind) => {
     plot.on('plotly_afterplot', look);
   });
 })(%r)"""
-PLACE = """(() => { const r = [...document.querySelectorAll(%r)].find((e) => e.offsetParent).getBoundingClientRect();
-  return [r.x, r.y, r.width, r.height]; })()"""
+PLACE = """(() => { const all = [...document.querySelectorAll(%r)].map((e) => e.getBoundingClientRect());
+  const r = all.find((r) => r.width); return [r.x, r.y, r.width, r.height]; })()"""
 SHOWN = """(() => { const p = [...document.querySelectorAll('.js-plotly-plot')].find(
   (p) => p.offsetParent && p.data?.[0]?.name === 'measured');
   return [p.data[0].x, ...p.layout.xaxis.range]; })()"""
