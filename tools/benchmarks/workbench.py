@@ -63,7 +63,7 @@ PLACE = """(() => { const all = [...document.querySelectorAll(%r)].map((e) => e.
   const r = all.find((r) => r.width); return [r.x, r.y, r.width, r.height]; })()"""
 SHOWN = """(() => { const p = [...document.querySelectorAll('.js-plotly-plot')].find(
   (p) => p.offsetParent && p.data?.[0]?.name === 'measured');
-  return [p.data[0].x, ...p.layout.xaxis.range]; })()"""
+  return [p.calcdata[0].map((c) => c.x), ...p.layout.xaxis.range]; })()"""
 
 
 class Timed(Bench):
