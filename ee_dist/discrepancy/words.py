@@ -340,6 +340,9 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
     lines += [tie_text(placed(r.name), r.tied_with) for r in steps if r.tied_with]
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for r in steps for d in r.dropped]
+    vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
+    if vague:
+        lines.append(f"Left out in the end, since these data do not tell them from neutral: {'; '.join(vague)}.")
     lines.append("The model: " + (phrase(found.terms, robot) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]

@@ -159,6 +159,12 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         account = improve_account(problem, found)  # type: ignore[arg-type]
         assert account.headline.endswith(said) or said in account.headline
         assert account.good is (verdict == EXPLAINED) and ("Nothing" in account.headline) is account.good
+    rung.dropped = ("offset_torque@servo",)
+    end = SimpleNamespace(**{**vars(start), "dropped": ("rotor_inertia@servo",)})
+    found.ladder = [start, rung, end]
+    lines = improve_account(problem, found).lines  # type: ignore[arg-type]
+    assert "Dropped again: offset torque at servo, which a later effect made useless." in lines
+    assert "Left out in the end, since these data do not tell them from neutral: rotor inertia at servo." in lines
 
 
 def test_units_are_told_behind_values_and_not_in_names():
