@@ -177,6 +177,7 @@ def test_a_disk_that_fills_up_in_the_search_is_one_line_and_the_run_goes_on_late
         real(self, found)
 
     monkeypatch.setattr(Journal, "note", note)
+    close_evaluators()  # what a run before this one simulated is remembered, and noted no more
     outcome = cli(*ask, f"hydra.run.dir={tmp_path}/out")
     assert outcome.status == 2
     (line,) = outcome.err.strip().splitlines()
