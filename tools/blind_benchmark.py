@@ -29,28 +29,28 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
+from benchmarks.cases import tried
 
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, candidates
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.ways.open_loop.unmodelled import from_entries
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.contract import Engine, EngineError
-from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.improve import calibrated
 from ee_dist.tasks.measurements import Measurements
-from ee_dist.tasks.trial import one_trial
 from ee_dist.tasks.ways import WAYS, way_of
 from ee_dist.tasks.wiring import close_evaluators, engine_maker
 from ee_dist.trials.excitation import STANDARD, Excitation
@@ -94,13 +94,8 @@ class Case:
 
 def measured(engine: Engine, robot: Robot, hidden: Hypothesis, seed: Sequence[int]) -> tuple[MeasuredTrial, ...]:
     """The standard trials of a robot with a hidden change: what the recording of each would hold."""
-    out = []
-    for k, excitation in enumerate(STANDARD if robot.free_base else FIXED_BASE):
-        held = setup_of(excitation)
-        hardware = PhysicalRobot(engine, robot, (*hidden, *held), np.random.SeedSequence([*seed, k]))
-        _, record = one_trial(hardware, excitation, robot, k)
-        out.append(MeasuredTrial(f"{k} {record.name}", record.log, record.driver, held))
-    return tuple(out)
+    plan = STANDARD if robot.free_base else FIXED_BASE
+    return tuple(tried(engine, robot, hidden, e, [*seed, k], k) for k, e in enumerate(plan))
 
 
 class Bench:

@@ -11,12 +11,11 @@ names, the error on the motions held out, and whether 95 % intervals hold what i
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -25,11 +24,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 from benchmarks.arm6 import desk_arm_6
+from benchmarks.cases import tried, write_cases
 
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.ladder import Improvement
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
@@ -37,11 +37,9 @@ from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.effects.groups import members_of
 from ee_dist.engines.contract import EngineError
-from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
-from ee_dist.tasks.trial import one_trial
 from ee_dist.tasks.wiring import close_evaluators, engine_maker, evaluator_of
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.noise import with_noise
@@ -131,13 +129,7 @@ class Bench:
         self.motions = motions(robot, args.seconds)
 
     def trials(self, hidden: Hypothesis, plan: Sequence[Excitation], seed: Sequence[int]) -> tuple[MeasuredTrial, ...]:
-        out = []
-        for k, excitation in enumerate(plan):
-            held = setup_of(excitation)
-            hardware = PhysicalRobot(self.engine, self.robot, (*hidden, *held), np.random.SeedSequence([*seed, k]))
-            _, record = one_trial(hardware, excitation, self.robot, k)
-            out.append(MeasuredTrial(f"{k} {record.name}", record.log, record.driver, held))
-        return tuple(out)
+        return tuple(tried(self.engine, self.robot, hidden, e, [*seed, k], k) for k, e in enumerate(plan))
 
     def problem(self, trials: Sequence[MeasuredTrial]) -> Problem:
         return WAYS[self.args.by](trials, self.robot, evaluator_of(self.config))
@@ -260,10 +252,7 @@ def main() -> int:
               f"{case.before:6.2f} -> {case.ratio:5.2f} x floor {case.seconds:5.0f} s  "
               f"{'wrong: ' + ', '.join(case.wrong) if case.wrong else ''}", flush=True)  # fmt: skip
     found = report(cases, args)
-    if args.json:
-        settings = {k: v for k, v in vars(args).items() if k != "json"}
-        content = {"settings": settings, **found, "robots": [asdict(c) for c in cases]}
-        args.json.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")
+    write_cases(args, found, cases)
     return 0
 
 

@@ -11,33 +11,32 @@ and less so where fewer of the others are left. Each physical effect is hidden f
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
+from benchmarks.cases import tried, write_cases
 
 from ee_dist.discrepancy.contenders import contenders
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.plan import predicted, ranked
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.contract import EngineError
-from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.robots.describe import load_robot
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.plan import MOST_TIED
-from ee_dist.tasks.trial import one_trial
 from ee_dist.tasks.wiring import close_evaluators, engine_maker, evaluator_of
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.family import PLANNED, Limits, family
@@ -83,10 +82,7 @@ class Bench:
         return Excitation(str(rng.choice(kinds)), self.limits.seconds, amplitude, int(rng.integers(1000)), fixture)
 
     def trial(self, hidden: Hypothesis, excitation: Excitation, seed: Sequence[int]) -> MeasuredTrial:
-        held = setup_of(excitation)
-        hardware = PhysicalRobot(self.engine, self.robot, (*hidden, *held), np.random.SeedSequence(seed))
-        _, record = one_trial(hardware, excitation, self.robot, 0)
-        return MeasuredTrial(str(excitation), record.log, record.driver, held)
+        return tried(self.engine, self.robot, hidden, excitation, seed)
 
     def explained(self, trials: Sequence[MeasuredTrial]) -> tuple[OpenLoop, Explanation]:
         problem = OpenLoop(trials, self.robot, evaluator_of(self.config))
@@ -196,10 +192,7 @@ def main() -> int:
             flush=True,
         )
     found = report(cases, args) if cases else {"cases": 0}
-    if args.json:
-        settings = {k: v for k, v in vars(args).items() if k != "json"}
-        content = {"settings": settings, **found, "robots": [asdict(c) for c in cases]}
-        args.json.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")
+    write_cases(args, found, cases)
     return 0
 
 
