@@ -92,8 +92,8 @@ def way_of(measured: Measurements, by: str) -> Way:
         )
         led = _led(measured.robot) or measured.robot.free_base
         by = "open_loop" if (driven and led) or not torques else "force_balance"
-        if driven and not led and _seen(measured):
-            # Commanded torques are what went in, and measured ones hardly more than these: the motion is what came of them.
+        if driven and not led and not torques and _seen(measured):
+            # A controller may stand behind recorded torques (an arm's currents), so forces are balanced where they were measured.
             by = "free_run"
     way = WAYS[by]
     if measured.robot.free_base and not way.moves:
