@@ -59,9 +59,10 @@ def everywhere(
         without = [cross_fit(search, [(model, current.u)], cut)[0].residual for cut in cuts]
     calm = search.among(calm_trials(search.problem, as_it_is))
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
-    found = look.kept(current)
+    found, places = look.kept(current), Model(current.parts).places
     for keep in _instead(current, own):
-        other = look.kept(current.only(keep), more=not keep[own:])
+        base = Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
+        other = look.kept(base, more=not keep[own:])
         if other is not None and (
             found is None or other.held < found.held + (0.0 if keep[own:] else look.luck(other.held))
         ):
@@ -172,6 +173,7 @@ class _Look:
     def steps(self, found: _Kept) -> Everywhere:
         """One step a kind of effect, those that matter most first; kinds that help only together are one step."""
         search, problem, kept, own = self.search, self.search.problem, found.model, self.own
+        places = Model(kept.parts).places
         names = {c.name for c in self.current.parts}
         gone = tuple(c.name for c in self.current.parts[own:] if c.name not in {p.name for p in kept.parts})
         # What the ladder has already is not shown as a step again.
@@ -183,13 +185,14 @@ class _Look:
             chosen = sorted(
                 [*chosen, *(k for k, c in enumerate(kept.parts) if c.effect.name == kind and k not in shown)]
             )
-            step = kept.only(chosen)
-            (held,) = cross_fit(search, [(Model(step.parts), step.u)], found.cut)
+            model = Model(tuple(kept.parts[k] for k in chosen))
+            start = _values(kept.u, places, chosen)
+            (held,) = cross_fit(search, [(model, start)], found.cut)
             now = float(held.residual @ held.residual)
             if now >= energy and kind != order[-1]:
                 continue
             mine = [k for k in chosen if k not in shown]
-            terms = step.hypothesis
+            terms = model.hypothesis(start)
             rungs.append(
                 Rung(
                     _label([kept.parts[k] for k in mine]),
@@ -208,11 +211,13 @@ class _Look:
 
     def _order(self, kept: Current) -> list[str]:
         """Kinds of effect that are new, by what the model would lose without them."""
-        names = {c.name for c in self.current.parts}
+        names, places = {c.name for c in self.current.parts}, Model(kept.parts).places
         new = [k for k, c in enumerate(kept.parts) if k >= self.own and c.name not in names]
         kinds = list(dict.fromkeys(kept.parts[k].effect.name for k in new))
         rests = [[k for k, c in enumerate(kept.parts) if k not in new or c.effect.name != kind] for kind in kinds]
-        rows = self.search.residuals([kept.only(rest).hypothesis for rest in rests])
+        rows = self.search.residuals(
+            [Model(tuple(kept.parts[k] for k in rest)).hypothesis(_values(kept.u, places, rest)) for rest in rests]
+        )
         costs = [float(r @ r) if np.isfinite(r).all() else np.inf for r in rows]
         return [kinds[i] for i in np.argsort(costs, kind="stable")[::-1]]
 
@@ -268,3 +273,7 @@ def _distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[C
             found.append(c)
             kept += mine
     return found
+
+
+def _values(u: Array, places: Sequence[slice], chosen: Sequence[int]) -> Array:
+    return np.concatenate([*(u[places[k]] for k in chosen), np.zeros(0)])

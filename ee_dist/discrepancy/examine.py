@@ -66,12 +66,6 @@ class Current:
     def hypothesis(self) -> Hypothesis:
         return Model(self.parts).hypothesis(self.u)
 
-    def only(self, keep: Sequence[int]) -> Current:
-        """The same with just the parts of these numbers, in this order."""
-        places = Model(self.parts).places
-        values = np.concatenate([*(self.u[places[k]] for k in keep), np.zeros(0)])
-        return Current(tuple(self.parts[k] for k in keep), values)
-
 
 @dataclass(eq=False)
 class Examined:

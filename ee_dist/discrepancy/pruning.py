@@ -26,30 +26,29 @@ def pruned(search: Search, fit: Fit, own: int, tried: int, newest: int = 0) -> C
     that would cost least, by its value and what the others can make up for (Wald's test). The first ``own`` and the
     ``newest`` parts stay."""
     for _ in range(ROUNDS):
-        less = _worth_keeping(search, fit, own, tried, newest)
-        if len(less.parts) == len(fit.model.parts):
+        keep = _to_keep(search, fit, own, tried, newest)
+        if len(keep) == len(fit.model.parts):
             break
-        (fit,) = follow_valley(search, [(Model(less.parts), less.u)], fit.mask, PRIOR, widths=(AGAIN,))
+        places = fit.model.places
+        model = Model(tuple(fit.model.parts[k] for k in keep))
+        start = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
+        (fit,) = follow_valley(search, [(model, start)], fit.mask, PRIOR, widths=(AGAIN,))
     return Current(fit.model.parts, fit.u)
 
 
-def _worth_keeping(search: Search, fit: Fit, own: int, tried: int, newest: int) -> Current:
-    """The parts to keep, with the values that make up for those that go, as far as slopes tell."""
+def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> list[int]:
+    """Numbers of the parts to keep."""
     problem, places = search.problem, fit.model.places
     count = max(1, int(fit.mask.sum()))
     floor = float(problem.floor[fit.mask].sum())
     pieces = PIECES * len(np.unique(problem.segment_of[fit.mask]))
     # Noise averages out from value to value, what is above it at best from piece to piece.
     luck = floor / count + max(0.0, fit.energy - floor) / pieces
-    values, kept, units = (
-        fit.u.copy(),
-        list(range(len(fit.model.parts))),
-        _units(fit.model, own, len(fit.model.parts) - newest),
-    )
+    kept, units = list(range(len(fit.model.parts))), _units(fit.model, own, len(fit.model.parts) - newest)
     while units:
         at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
         normal = fit.slopes[:, at].T @ fit.slopes[:, at] + PRIOR * np.eye(len(at))
-        inverse, u = np.linalg.inv(normal), values[at]
+        inverse, u = np.linalg.inv(normal), fit.u[at]
         where = [
             np.flatnonzero(np.isin(at, np.concatenate([np.arange(len(fit.u))[places[k]] for k in m]))) for m in units
         ]
@@ -61,11 +60,12 @@ def _worth_keeping(search: Search, fit: Fit, own: int, tried: int, newest: int) 
         cheapest = int(np.argmin(costs))
         if costs[cheapest] > 0:
             break
+        # What the others make up for goes into them, as far as slopes tell.
         mine = where[cheapest]
-        values[at] = u - inverse[:, mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine])
+        fit.u[at] = u - inverse[:, mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine])
         gone = units.pop(cheapest)
         kept = [k for k in kept if k not in gone]
-    return Current(fit.model.parts, values).only(kept)
+    return kept
 
 
 def _units(model: Model, first: int, end: int) -> list[list[int]]:
@@ -91,10 +91,11 @@ def without_useless(
         return current, ()
     if len(current.u) >= LARGE:
         return _by_slopes(search, current, own, added, cut, tried)
-    problem, models = search.problem, [(Model(current.parts), current.u)]
+    problem, places = search.problem, Model(current.parts).places
+    models = [(Model(current.parts), current.u)]
     for k in old:
-        less = current.only([j for j in range(len(current.parts)) if j != k])
-        models.append((Model(less.parts), less.u))
+        keep = np.delete(np.arange(len(current.u)), places[k])
+        models.append((Model((*current.parts[:k], *current.parts[k + 1 :])), current.u[keep]))
     whole, *without = cross_fit(search, models, cut)
     energy = float((whole.residual**2).sum())
     allowed = _allowed(problem, energy, cut, tried)
@@ -153,7 +154,9 @@ def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int) 
         if not least or max(told[k] for k in least) >= 1.0:
             break
         gone.append(tuple(current.parts[k].name for k in least))
-        current = models[-1].only([k for k in range(len(told)) if k not in least])
+        keep = [k for k in range(len(told)) if k not in least]
+        values = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
+        current = Current(tuple(current.parts[k] for k in keep), values)
     # Slopes of a rugged error may mislead.
     while gone and not _as_good(search, models[0], models[len(gone)], cut, tried):
         gone = gone[: len(gone) // 2]
