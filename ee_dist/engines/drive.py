@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ee_dist.effects.laws import LAWS, LawContext, LawFunction, drive_law, find_law
 from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import EngineError
+from ee_dist.engines.delay import Delay
 from ee_dist.engines.friction import Friction
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.transmission import Transmission
@@ -72,21 +73,11 @@ class DrivePath:
         self.current = np.zeros(shape)
         """Torque (B, M) that the current of each motor stands for in the last step, by its nominal constant: before a weak motor,
         the gear and any friction take their part of it."""
-        self._prepare_delay(shape)
+        self.delay = Delay(p["delay_s"], self.dt)
         self._prepare_joints(robots, shape)
         self._prepare_laws(robots)
 
     # -- preparation -------------------------------------------------------------------------------------------------
-
-    def _prepare_delay(self, shape: tuple[int, int]) -> None:
-        if not self.uses["delay_s"]:
-            return
-        steps = self.p["delay_s"] / self.dt
-        self.delay_whole = np.floor(steps + 1e-9).astype(int)
-        self.delay_part = np.clip(steps - self.delay_whole, 0.0, 1.0)
-        self.past: Array = np.zeros((int(self.delay_whole.max()) + 2, *shape))
-        self.past_filled = False
-        self.rows, self.columns = np.indices(shape)
 
     def _prepare_joints(self, robots: Sequence[Robot], shape: tuple[int, int]) -> None:
         stops = np.array(per_robot(robots, lambda r: [r.joint(d.joint).stops for d in r.drives])).reshape(*shape, 2)
@@ -183,14 +174,7 @@ class DrivePath:
 
     def _command(self, command: Array) -> Array:
         if self.uses["delay_s"]:
-            if not self.past_filled:
-                self.past[:] = command
-                self.past_filled = True
-            self.past = np.roll(self.past, 1, axis=0)
-            self.past[0] = command
-            near = self.past[self.delay_whole, self.rows, self.columns]
-            far = self.past[self.delay_whole + 1, self.rows, self.columns]
-            command = np.where(self.delay_part > 0, near * (1 - self.delay_part) + far * self.delay_part, near)
+            command = self.delay(command)
         if self.uses["command_gain"]:
             command = command * self.p["command_gain"]
         return command

@@ -12,6 +12,7 @@ from dataclasses import fields
 
 import numpy as np
 
+from ee_dist.engines.delay import Delay
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import Array
@@ -37,13 +38,7 @@ class SensingPath:
             self.pressed_s = np.zeros(shape)
         self.stuck_at: Array = np.zeros(shape)
         self.dt = time_step_s
-        if self.uses["delay_s"]:
-            ticks = self.p["delay_s"] / time_step_s
-            self.whole = np.floor(ticks + 1e-9).astype(int)
-            self.rest = np.clip(ticks - self.whole, 0.0, 1.0)
-            self.past: Array = np.zeros((int(self.whole.max()) + 2, *shape))
-            self.filled = False
-            self.rows, self.columns = np.indices(shape)
+        self.delay = Delay(self.p["delay_s"], time_step_s)
         if self.uses["noise"] or self.uses["dropout"]:
             self.normal = np.zeros((steps, *shape))
             self.uniform = np.ones((steps, *shape))
@@ -70,14 +65,7 @@ class SensingPath:
         if self.uses["bias"]:
             value = np.where(p["bias"] != 0, value + p["bias"], value)
         if self.uses["delay_s"]:
-            if not self.filled:
-                self.past[:] = value
-                self.filled = True
-            self.past = np.roll(self.past, 1, axis=0)
-            self.past[0] = value
-            near = self.past[self.whole, self.rows, self.columns]
-            far = self.past[self.whole + 1, self.rows, self.columns]
-            value = np.where(self.rest > 0, near * (1 - self.rest) + far * self.rest, near)
+            value = self.delay(value)
         if self.uses["noise"]:
             value = np.where(p["noise"] != 0, value + p["noise"] * self.normal[step], value)
         if self.uses["dropout"]:
