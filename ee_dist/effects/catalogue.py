@@ -92,7 +92,10 @@ class Effect:
     """Whether a little of it is in every real robot, at each of its targets."""
 
     def shared(self, robot: Robot) -> tuple[str, ...]:
-        """Groups of joints or sensors that it can act on with one set of values (see groups.py)."""
+        """Groups of joints or sensors that it can act on with one set of values (see groups.py). What is wrong with a part is
+        so with all of them only where a little of it is in every robot: masses, but not loads or lost parts."""
+        if self.family == "body" and not self.everywhere:
+            return ()
         return shared_targets(robot, self.targets(robot))
 
     def proposed(self, robot: Robot) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.engines.compiled import compiled
 from ee_dist.trials.log import Array
 
 LOAD_LIMIT = 2.0
@@ -45,11 +46,15 @@ class Friction:
         self.p, self.uses = p, uses
         self.per_step = inertia / dt
         self.loaded = any(uses[n] for n in LOADED)
-        self.most_gear = GEAR_LIMIT * p["torque_limit"]
         self.rubbing = self.rows(p)
-        self.electric = p["back_emf"] * p["strength"]
-        self.uses_viscous = any(uses[n] for n in (*SLOPED, "viscous_asymmetry"))
-        self.backdriving = np.maximum(p["load_friction"] + p["backdrive_friction"], 0.0)
+        self.none, self.one = np.zeros(inertia.shape), np.ones(inertia.shape)
+        derived = {
+            "most_gear": GEAR_LIMIT * p["torque_limit"],
+            "electric": p["back_emf"] * p["strength"],
+            "backdriving": np.maximum(p["load_friction"] + p["backdrive_friction"], 0.0),
+            "dry": p["coulomb"] + p["brake"],
+        }
+        self.table = np.stack([derived[n] if n in derived else p[n] for n in RUBBING])
         self.last_speed: Array | None = None
         self.last_torque = np.zeros(inertia.shape)
         self.last_give: Array | None = None
@@ -69,48 +74,87 @@ class Friction:
         A back-EMF beyond the model's own is viscous friction that is gone when the drive is not ``enabled``: as part of
         the motor's explicit torque it could be too steep for the time step.
         """
-        p, uses = self.p, self.uses
-        load: Array = np.zeros_like(torque)
-        if self.last_speed is not None:
-            heavier = self.per_step if self.last_give is None else self.per_step + self.last_give
-            load = heavier * (speed - self.last_speed) - self.last_torque
-        if give is not None:
-            torque = torque + give * speed
-        limit = self._limit(motor, torque - motor + load, speed)
-        up = down = limit
-        if uses["friction_asymmetry"]:
-            up = np.maximum(limit + p["friction_asymmetry"], 0.0)
-            down = np.maximum(limit - p["friction_asymmetry"], 0.0)
-        viscous = p["viscous"] + (self.electric if enabled is None else self.electric * enabled)
-        steepest = viscous + np.abs(p["viscous_asymmetry"])
-        most = np.abs(torque) + LOAD_LIMIT * (np.maximum(up, down) + steepest * np.abs(speed))
-        rate = self.per_step * speed + torque + np.clip(load, -most, most)
-        taken = dry = np.clip(rate, -down, up)
-        if self.uses_viscous:
-            left = rate - dry
-            if uses["viscous_asymmetry"]:
-                viscous = np.maximum(viscous + p["viscous_asymmetry"] * np.sign(left), 0.0)
-            per_step = self.per_step if give is None else self.per_step + give
-            taken = dry + left * viscous / (per_step + viscous)
-        found = np.where(self.rubbing, torque - taken, torque)
-        return found if give is None else found - give * speed
-
-    def _limit(self, motor: Array, external: Array, speed: Array) -> Array:
-        p, uses = self.p, self.uses
-        limit = p["coulomb"] + p["brake"]
-        fading = np.exp(-np.abs(speed) / p["stribeck_speed"]) if uses["stribeck"] or uses["stribeck_load"] else None
-        if uses["stribeck"]:
-            limit = limit + p["stribeck"] * fading
-        if self.loaded:
-            external = np.clip(external, -self.most_gear, self.most_gear)
-            limit = limit + np.abs(p["load_friction"] * motor - self.backdriving * external)
-            through = np.abs(motor - external)
-            if uses["quadratic_friction"]:
-                limit = limit + p["quadratic_friction"] * through**2
-            if uses["stribeck_load"]:
-                limit = limit + p["stribeck_load"] * fading * through
-        return limit
+        p, uses, shape = self.p, self.uses, torque.shape
+        fading = self.none
+        if uses["stribeck"] or uses["stribeck_load"]:
+            # NumPy's own exponential: a compiled one may differ in its last bit.
+            fading = np.exp(-np.abs(speed) / p["stribeck_speed"])
+        found = np.empty(shape)
+        _rub(
+            self.table, self.per_step, self.rubbing, self.loaded, torque, motor, speed, fading,
+            self.one if enabled is None else np.ascontiguousarray(np.broadcast_to(enabled, shape)),
+            self.none if give is None else give,
+            self.none if self.last_speed is None else self.last_speed, self.last_torque,
+            self.none if self.last_give is None else self.last_give, self.last_speed is not None, found,
+        )  # fmt: skip
+        return found
 
     def record(self, torque: Array, speed: Array, give: Array | None = None) -> None:
         """Remember the torque that the step is made with."""
         self.last_speed, self.last_torque, self.last_give = speed, torque, give
+
+
+RUBBING = (
+    "dry", "stribeck", "load_friction", "backdriving", "quadratic_friction", "stribeck_load", "friction_asymmetry",
+    "viscous", "electric", "viscous_asymmetry", "most_gear",
+)  # fmt: skip
+"""Rows of the table that ``_rub`` reads, in this order."""
+
+
+@compiled
+def _rub(
+    table: Array,
+    per_step: Array,
+    rubbing: NDArray[np.bool_],
+    loaded: bool,
+    torque: Array,
+    motor: Array,
+    speed: Array,
+    fading: Array,
+    enabled: Array,
+    give: Array,
+    last_speed: Array,
+    last_torque: Array,
+    last_give: Array,
+    begun: bool,
+    found: Array,
+) -> None:
+    """Write to ``found`` (B, M) the torque less friction. ``table`` is (len(RUBBING), B, M), ``fading`` the share of Stribeck
+    friction that the speed leaves; others (B, M) as in ``Friction.__call__``."""
+    for i in range(found.shape[0]):
+        for j in range(found.shape[1]):
+            asked = torque[i, j] + give[i, j] * speed[i, j]
+            if not rubbing[i, j]:
+                found[i, j] = asked - give[i, j] * speed[i, j]
+                continue
+            dry, stribeck, driving, backdriving, quadratic = table[:5, i, j]
+            stribeck_load, sided, viscous, electric, viscous_sided = table[5:10, i, j]
+            load = 0.0
+            if begun:
+                load = (per_step[i, j] + last_give[i, j]) * (speed[i, j] - last_speed[i, j]) - last_torque[i, j]
+            limit = dry + stribeck * fading[i, j]
+            if loaded:
+                external = _between(asked - motor[i, j] + load, -table[10, i, j], table[10, i, j])
+                limit = limit + abs(driving * motor[i, j] - backdriving * external)
+                through = abs(motor[i, j] - external)
+                limit = limit + quadratic * (through * through)
+                limit = limit + stribeck_load * fading[i, j] * through
+            up, down = max(limit + sided, 0.0), max(limit - sided, 0.0)
+            viscous = viscous + electric * enabled[i, j]
+            steepest = viscous + abs(viscous_sided)
+            most = abs(asked) + LOAD_LIMIT * (max(up, down) + steepest * abs(speed[i, j]))
+            rate = per_step[i, j] * speed[i, j] + asked + _between(load, -most, most)
+            taken = _between(rate, -down, up)
+            left = rate - taken
+            if viscous_sided != 0.0:
+                viscous = max(viscous + viscous_sided * np.sign(left), 0.0)
+            taken = taken + left * viscous / (per_step[i, j] + give[i, j] + viscous)
+            found[i, j] = asked - taken - give[i, j] * speed[i, j]
+
+
+@compiled
+def _between(value: float, low: float, high: float) -> float:
+    """Value within [low, high]; not a number stays so."""
+    if value < low:
+        return low
+    return high if value > high else value

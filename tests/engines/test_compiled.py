@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ee_dist.engines import compiled as module
-from ee_dist.engines import drive, drivers, loop
+from ee_dist.engines import drive, drivers, friction, loop
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.robots.model import COMMANDS, RobotError, Sensor
@@ -51,6 +51,20 @@ def test_a_network(robots: int, channels: int, hidden: int, motors: int, seed: i
     weights = [some(hidden, channels + 1 + hidden), some(hidden), some(motors, hidden + 1)]
     kept = [some(channels + 1 + hidden), some(hidden + 1)]
     assert_same_bits(drivers._think, [some(channels), *weights, some(motors), some(motors), *kept, some(motors)])
+
+
+@settings(max_examples=30, deadline=None)
+@given(motors=st.integers(1, 9), loaded=st.booleans(), begun=st.booleans(), **sizes)
+def test_friction(robots: int, motors: int, loaded: bool, begun: bool, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = (robots, motors)
+    table = rng.uniform(0, 0.5, (len(friction.RUBBING), *shape)) * rng.integers(0, 2, (len(friction.RUBBING), *shape))
+    table[friction.RUBBING.index("friction_asymmetry")] -= 0.2
+    rubbing = rng.random(shape) < 0.7
+    torque, motor, speed, last_speed, last_torque = rng.normal(size=(5, *shape))
+    fading, enabled, give, last_give = rng.uniform(0, 1, (4, *shape))
+    arrays = [torque, motor, speed, fading, enabled, give, last_speed, last_torque, last_give]
+    assert_same_bits(friction._rub, [table, np.full(shape, 2.0), rubbing, loaded, *arrays, begun, np.empty(shape)])
 
 
 @settings(max_examples=30, deadline=None)
