@@ -123,6 +123,10 @@ class Problem(ABC):
         """The simulated motion of each trial with the poses of all parts; None where nothing is simulated."""
         return [None] * len(self.measured)
 
+    def shows(self, effect: str, target: str) -> bool:
+        """Whether an effect of one of ``families`` can show at a place in these very data."""
+        return True
+
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         """What this way alone can say about what a model leaves, in lines for people."""
         return []

@@ -68,6 +68,7 @@ class Friction:
         self, torque: Array, motor: Array, speed: Array, enabled: Array | None = None, give: Array | None = None
     ) -> Array:
         """Torque at the joint less friction, from torque at the joint, torque of the motor, speed: all (B, M).
+        Friction of a single robot takes those of many instants.
 
         ``give`` (B, M) is by how much the torque falls with the speed at the end of the step, where the engine takes it so.
 
@@ -75,17 +76,19 @@ class Friction:
         the motor's explicit torque it could be too steep for the time step.
         """
         p, uses, shape = self.p, self.uses, torque.shape
-        fading = self.none
+        none, one = (np.full(shape, v) for v in (0.0, 1.0)) if shape != self.none.shape else (self.none, self.one)
+        fading = none
         if uses["stribeck"] or uses["stribeck_load"]:
             # NumPy's own exponential: a compiled one may differ in its last bit.
             fading = np.exp(-np.abs(speed) / p["stribeck_speed"])
         found = np.empty(shape)
         _rub(
             self.table, self.per_step, self.rubbing, self.loaded, torque, motor, speed, fading,
-            self.one if enabled is None else np.ascontiguousarray(np.broadcast_to(enabled, shape)),
-            self.none if give is None else give,
-            self.none if self.last_speed is None else self.last_speed, self.last_torque,
-            self.none if self.last_give is None else self.last_give, self.last_speed is not None, found,
+            one if enabled is None else np.ascontiguousarray(np.broadcast_to(enabled, shape)),
+            none if give is None else give,
+            none if self.last_speed is None else self.last_speed,
+            none if self.last_speed is None else self.last_torque,
+            none if self.last_give is None else self.last_give, self.last_speed is not None, found,
         )  # fmt: skip
         return found
 
@@ -120,21 +123,24 @@ def _rub(
     found: Array,
 ) -> None:
     """Write to ``found`` (B, M) the torque less friction. ``table`` is (len(RUBBING), B, M), ``fading`` the share of Stribeck
-    friction that the speed leaves; others (B, M) as in ``Friction.__call__``."""
+    friction that the speed leaves; others (B, M) as in ``Friction.__call__``. What belongs to the robots (``table``,
+    ``per_step``, ``rubbing``) may have a single row for all."""
+    one = table.shape[1] == 1
     for i in range(found.shape[0]):
+        r = 0 if one else i
         for j in range(found.shape[1]):
             asked = torque[i, j] + give[i, j] * speed[i, j]
-            if not rubbing[i, j]:
+            if not rubbing[r, j]:
                 found[i, j] = asked - give[i, j] * speed[i, j]
                 continue
-            dry, stribeck, driving, backdriving, quadratic = table[:5, i, j]
-            stribeck_load, sided, viscous, electric, viscous_sided = table[5:10, i, j]
+            dry, stribeck, driving, backdriving, quadratic = table[:5, r, j]
+            stribeck_load, sided, viscous, electric, viscous_sided = table[5:10, r, j]
             load = 0.0
             if begun:
-                load = (per_step[i, j] + last_give[i, j]) * (speed[i, j] - last_speed[i, j]) - last_torque[i, j]
+                load = (per_step[r, j] + last_give[i, j]) * (speed[i, j] - last_speed[i, j]) - last_torque[i, j]
             limit = dry + stribeck * fading[i, j]
             if loaded:
-                external = _between(asked - motor[i, j] + load, -table[10, i, j], table[10, i, j])
+                external = _between(asked - motor[i, j] + load, -table[10, r, j], table[10, r, j])
                 limit = limit + abs(driving * motor[i, j] - backdriving * external)
                 through = abs(motor[i, j] - external)
                 limit = limit + quadratic * (through * through)
@@ -143,12 +149,12 @@ def _rub(
             viscous = viscous + electric * enabled[i, j]
             steepest = viscous + abs(viscous_sided)
             most = abs(asked) + LOAD_LIMIT * (max(up, down) + steepest * abs(speed[i, j]))
-            rate = per_step[i, j] * speed[i, j] + asked + _between(load, -most, most)
+            rate = per_step[r, j] * speed[i, j] + asked + _between(load, -most, most)
             taken = _between(rate, -down, up)
             left = rate - taken
             if viscous_sided != 0.0:
                 viscous = max(viscous + viscous_sided * np.sign(left), 0.0)
-            taken = taken + left * viscous / (per_step[i, j] + give[i, j] + viscous)
+            taken = taken + left * viscous / (per_step[r, j] + give[i, j] + viscous)
             found[i, j] = asked - taken - give[i, j] * speed[i, j]
 
 

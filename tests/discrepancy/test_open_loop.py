@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import candidates
+from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
@@ -63,6 +65,25 @@ def test_a_sensor_fault_too_small_to_matter_costs_nothing(mujoco: MuJoCoEngine) 
     base, *others = (float(r @ r) for r in p.residuals([(), *faults]))
     for found in others:
         assert found == pytest.approx(base, abs=6.0), "no other channel may look worse for it"
+
+
+@pytest.mark.parametrize("coarse", ["all", "one"])
+def test_how_most_sensors_are_is_not_what_is_wrong_with_one(mujoco: MuJoCoEngine, coarse: str) -> None:
+    (trial,) = trials(mujoco, ())
+    places = [c for c, s in enumerate(ROBOT.sensors) if s.kind == "position"]
+    values = trial.log.sensors.copy()
+    for c in places if coarse == "all" else places[:1]:
+        step = 0.5 * float(np.ptp(values[:, c]))
+        values[:, c] = np.round(values[:, c] / step) * step
+    p = problem(mujoco, [replace(trial, log=replace(trial.log, sensors=values))])
+    first, single = ROBOT.sensors[places[0]].name, coarse == "one"
+    names = {c.name for c in pool_of(p)}
+    assert (f"sensor_dropout@{first}" in names, f"sensor_quantisation@{first}" in names) == (single, single)
+    assert "sensor_noise@roll" in names and f"sensor_stuck@{first}" in names, "others are told by other marks"
+    assert len(p.remarks(())) == (0 if single else 1)
+    left_out = p.residuals([()])[0]
+    p.repeating = frozenset()
+    assert (float(left_out @ left_out) == pytest.approx(float((p.residuals([()])[0] ** 2).sum()))) == single
 
 
 def test_a_stuck_touch_sensor_is_better_explained_by_the_truth_than_by_nothing(mujoco: MuJoCoEngine) -> None:

@@ -11,4 +11,4 @@ from ee_dist.discrepancy.search.candidates import Candidate, candidates
 def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] = ()) -> list[Candidate]:
     """Candidates at all places and groups, less those left out. Raises EffectError for names that do not exist."""
     found = candidates(problem.robot, without, only or None, problem.families)
-    return [c for c in found if c.size or problem.switches]
+    return [c for c in found if (c.size or problem.switches) and problem.shows(c.effect.name, c.target)]

@@ -26,8 +26,10 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
     rollout_of,
 )
 from ee_dist.discrepancy.ways.open_loop.scale import channel_scale
+from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, frozen, repeating
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
 from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.effects.groups import members_of
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.robots.model import Robot
@@ -109,6 +111,7 @@ class OpenLoop(Problem):
         models += ensemble(models[0], self._members)
         pairs = [(k, m) for k in range(len(self.measured)) for m in self._held(models, k)]
         found = self.predictor.digests(pairs)
+        self.repeating = repeating(self.robot, zip(self._data, found[:: len(models)], strict=True), self.window)
         tiny = (0.25 * self.scale.scale) ** 2
         self.deviation: list[Array] = []
         self.grain_deviation: list[Array] = []
@@ -127,6 +130,20 @@ class OpenLoop(Problem):
         quiet = np.array([s.kind != "touch" for s in self.robot.sensors])
         alone = self.scale.scale**2 / self.block
         self._trust = tuple(float(1.0 / np.mean((d**2 / alone)[:, quiet])) for d in self.deviation)
+
+    def shows(self, effect: str, target: str) -> bool:
+        """Where most sensors repeat readings, that one does so too says nothing."""
+        if effect not in REPEATING:
+            return True
+        members = members_of(self.robot, target, self.robot.sensor_names) or (target,)
+        return not any(x.kind in self.repeating for x in self.robot.sensors if x.name in members)
+
+    def remarks(self, hypothesis: Hypothesis) -> list[str]:
+        return [
+            f"Most {kind} sensors repeat readings more often than the model's (coarse steps, rows that were filled "
+            "in): how often they do is not compared."
+            for kind in sorted(self.repeating)
+        ]
 
     def _known(self, trial: int) -> Array:
         """(2, S) mean squares that calibration left in a trial: of block means, and of the log of roughness."""
@@ -234,11 +251,10 @@ class OpenLoop(Problem):
         if not predicted.finite:
             return np.full(measured.means.size + 2 * measured.rough.size, np.inf)
         shape = (measured.means.astype(float) - predicted.means) / self.deviation[trial]
-        w, tiny = self.window, (0.25 * self.scale.scale) ** 2
+        tiny = (0.25 * self.scale.scale) ** 2
         grain = np.log((measured.rough + tiny) / (predicted.rough + tiny)) / self.grain_deviation[trial]
-        p = 0.5 * (predicted.repeated + 1 / w)
-        frozen = (measured.repeated - predicted.repeated) / np.sqrt(np.maximum(p * (1 - p), 1 / w) / w + 0.0004)
-        texture = np.stack([grain, frozen], axis=1)
+        compared = np.array([x.kind not in self.repeating for x in self.robot.sensors])
+        texture = np.stack([grain, frozen(measured, predicted, self.window) * compared], axis=1)
         return np.concatenate([soften(shape).ravel(), soften(texture).ravel()])
 
     def _command_residuals(self, trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
