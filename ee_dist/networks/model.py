@@ -130,11 +130,11 @@ class GeneNetwork:
     def sensor_names(self) -> tuple[str, ...]:
         return tuple(s.name for s in self.sensors)
 
-    @property
+    @cached_property
     def gene_names(self) -> tuple[str, ...]:
         return tuple(g.name for g in self.genes)
 
-    @property
+    @cached_property
     def link_names(self) -> tuple[str, ...]:
         """``regulator>gene`` of every link."""
         return tuple(f"{link.regulator}>{g.name}" for g in self.genes for link in g.links)
