@@ -7,6 +7,7 @@ from ee_dist.effects import (  # noqa: F401
     drive,
     fixture,
     friction,
+    genes,
     sensing,
     transmission,
     wiring,

@@ -13,14 +13,16 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import math
+import re
 import sys
 import traceback
+from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 from ee_dist.basics.names import did_you_mean, listed, nearest
 from ee_dist.basics.quoted import quoted
@@ -28,8 +30,11 @@ from ee_dist.effects.groups import common, members_of, shared_targets
 from ee_dist.effects.laws import LAWS
 from ee_dist.effects.scales import Range, Ranges
 from ee_dist.robots.model import Robot, RobotError
+from ee_dist.robots.system import System
 
 FAMILIES = ("body", "world", "drive", "sensing", "wiring")
+OTHER_FAMILIES = ("genes",)
+"""Of effects on systems that are no robots."""
 
 
 class EffectError(ValueError):
@@ -54,7 +59,8 @@ class Parameter:
     """Smallest change worth telling apart in a report."""
 
 
-Transform = Callable[[Robot, str, Mapping[str, float]], Robot]
+Transform = Callable[[Any, str, Mapping[str, float]], Any]
+Model = TypeVar("Model", bound=System)
 
 SLIDE_UNITS = {
     "rad": "m",
@@ -77,7 +83,7 @@ class Effect:
     name: str
     family: str
     transform: Transform
-    targets: Callable[[Robot], tuple[str, ...]]
+    targets: Callable[[Any], tuple[str, ...]]
     parameters: tuple[Parameter, ...]
     physics: str
     signature: str
@@ -90,6 +96,8 @@ class Effect:
     """On which robots ``explain`` proposes it, where that is not all of them."""
     everywhere: bool = False
     """Whether a little of it is in every real robot, at each of its targets."""
+    of: type = Robot
+    """The kind of system that it changes; on others it has no targets."""
 
     def shared(self, robot: Robot) -> tuple[str, ...]:
         """Groups of joints or sensors that it can act on with one set of values (see groups.py). What is wrong with a part is
@@ -164,7 +172,7 @@ class Term:
         return f"{self.effect}@{self.target}" if self.target else self.effect
 
     def __str__(self) -> str:
-        entry = CATALOGUE.get(self.effect)
+        entry = EVERY.get(self.effect)
         shown = []
         for name, value in self.values:
             unit = entry.parameter(name).unit if entry else ""
@@ -176,15 +184,18 @@ class Term:
 Hypothesis = tuple[Term, ...]
 
 _registry: dict[str, Effect] = {}
+_others: dict[str, Effect] = {}
 CATALOGUE: Mapping[str, Effect] = MappingProxyType(_registry)
-"""All effects by name, in the order in which they were registered."""
+"""All effects on robots by name, in the order in which they were registered."""
+EVERY: Mapping[str, Effect] = MappingProxyType(ChainMap(_others, _registry))
+"""These, and the effects on other systems."""
 
 
 def effect(
     name: str,
     *,
     family: str,
-    targets: Callable[[Robot], tuple[str, ...]],
+    targets: Callable[[Any], tuple[str, ...]],
     parameters: tuple[Parameter, ...] = (),
     physics: str,
     signature: str,
@@ -193,13 +204,14 @@ def effect(
     ranges: Ranges | None = None,
     worth_proposing: Callable[[Robot], bool] | None = None,
     everywhere: bool = False,
+    of: type = Robot,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
     def register(transform: Transform) -> Transform:
-        if name in _registry and _registry[name].transform.__module__ != transform.__module__:
+        if name in EVERY and EVERY[name].transform.__module__ != transform.__module__:
             raise EffectError(f"an effect named {quoted(name)} exists already")
-        if family not in FAMILIES:
+        if family not in (*FAMILIES, *OTHER_FAMILIES):
             raise EffectError(f"{name}: no family {quoted(family)}; there are: {', '.join(FAMILIES)}")
         for p in parameters:
             if not p.name.isidentifier() or p.name in RESERVED:
@@ -208,11 +220,11 @@ def effect(
                 raise EffectError(f"{name}: the neutral value of {p.name} lies outside its bounds")
             if ranges is None and not (math.isfinite(p.lower) and math.isfinite(p.upper)):
                 raise EffectError(f"{name}: {p.name} has no finite bounds, so the effect must give ranges")
-        _registry[name] = Effect(
+        (_registry if of is Robot else _others)[name] = Effect(
             name,
             family,
             transform,
-            _Asked(name, targets),
+            _Asked(name, targets, of),
             parameters,
             physics,
             signature,
@@ -221,6 +233,7 @@ def effect(
             ranges,
             worth_proposing,
             everywhere,
+            of,
         )
         return transform
 
@@ -229,12 +242,16 @@ def effect(
 
 @dataclass(frozen=True)
 class _Asked:
-    """``targets`` of the effect ``name``, of which a user's own may fail or give something else: then it raises EffectError."""
+    """``targets`` of the effect ``name``, of which a user's own may fail or give something else: then it raises EffectError.
+    None on a system of another kind than ``of``."""
 
     name: str
-    targets: Callable[[Robot], tuple[str, ...]]
+    targets: Callable[[Any], tuple[str, ...]]
+    of: type
 
-    def __call__(self, robot: Robot) -> tuple[str, ...]:
+    def __call__(self, robot: System) -> tuple[str, ...]:
+        if not isinstance(robot, self.of):
+            return ()
         try:
             found = self.targets(robot)
         except (Exception, SystemExit) as error:
@@ -248,9 +265,9 @@ class _Asked:
 
 def find(name: str) -> Effect:
     """The effect of that name. Raises EffectError with the nearest names."""
-    if name in _registry:
-        return _registry[name]
-    raise EffectError(f"no effect named {quoted(name)}; {did_you_mean(name, _registry, cutoff=0.5)}")
+    if name in EVERY:
+        return EVERY[name]
+    raise EffectError(f"no effect named {quoted(name)}; {did_you_mean(name, EVERY, cutoff=0.5)}")
 
 
 def term(effect_name: str, target: str = "", **values: float) -> Term:
@@ -280,10 +297,12 @@ def from_dict(entry: Mapping[str, Any]) -> Term:
     return term(name, str(entry.get("target") or ""), **values)
 
 
-def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
-    """The model: the robot under every effect of the hypothesis, in order. Raises EffectError for a wrong target."""
+def apply(robot: Model, hypothesis: Iterable[Term]) -> Model:
+    """The model: the system under every effect of the hypothesis, in order. Raises EffectError for a wrong target."""
     for t in hypothesis:
         entry = find(t.effect)
+        if not isinstance(robot, entry.of):
+            raise EffectError(f"{t.effect} is an effect on a {_kind(entry.of)}; {robot.name} is a {_kind(type(robot))}")
         allowed = entry.targets(robot)
         places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
         if not places:
@@ -298,9 +317,16 @@ def apply(robot: Robot, hypothesis: Iterable[Term]) -> Robot:
             raise EffectError(f"{t}: {error}") from error
         except (Exception, SystemExit) as error:
             raise EffectError(f"{t}: its transform failed: {type(error).__name__}: {error}") from error
-        if not isinstance(robot, Robot):
-            raise EffectError(f"{t}: its transform gave {type(robot).__name__}, not a Robot; does it return one?")
+        if not isinstance(robot, entry.of):
+            raise EffectError(
+                f"{t}: its transform gave {type(robot).__name__}, not a {entry.of.__name__}; does it return one?"
+            )
     return robot
+
+
+def _kind(of: type) -> str:
+    """A kind of system in words: GeneNetwork is a gene network."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", of.__name__).lower()
 
 
 _plugins: dict[str, str] = {}

@@ -9,15 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ee_dist.robots.model import Drive, Robot
+from ee_dist.robots.system import System
 
 ALL_JOINTS = "all_joints"
 JOIN = "+"
 _SETTINGS = tuple(f for f in Drive.__dataclass_fields__ if f != "joint")
 
 
-def groups(robot: Robot) -> dict[str, tuple[str, ...]]:
+def groups(robot: System) -> dict[str, tuple[str, ...]]:
     """Names of groups and their members (two or more): all driven joints, joints of equal drives where these differ (named
-    by their members, ``a+b+c``), all parts, all sensors of a kind."""
+    by their members, ``a+b+c``), all parts, all sensors of a kind. A system that is no robot has none."""
+    if not isinstance(robot, Robot):
+        return {}
     found: dict[str, tuple[str, ...]] = {}
     joints = robot.motor_names
     if len(joints) > 1:
@@ -38,7 +41,7 @@ def groups(robot: Robot) -> dict[str, tuple[str, ...]]:
     return {name: members for name, members in found.items() if name not in taken}
 
 
-def members_of(robot: Robot, target: str, allowed: tuple[str, ...]) -> tuple[str, ...]:
+def members_of(robot: System, target: str, allowed: tuple[str, ...]) -> tuple[str, ...]:
     """The members of a group, or of any list ``a+b+c``, if an effect can act on each of them; empty otherwise."""
     found = tuple(target.split(JOIN)) if JOIN in target else groups(robot).get(target, ())
     return found if set(found) <= set(allowed) else ()

@@ -5,13 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.engines.drivers import Driver
-from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog, State
 
 
@@ -23,13 +22,16 @@ class EngineError(RuntimeError):
 class Rollout:
     """One run to be simulated: a model, what drives it, for how many steps (rows of the log).
 
+    ``model`` is a Robot, or another system (``robots/system.py``) for the engine of its kind; what is of bodies below, such as
+    ``pose`` and ``start``, says nothing to a system without one.
+
     ``seed`` feeds the noise of the sensors, if they have any. ``pose`` asks for body pose, joint positions and torques
     at every row. ``supply_v`` (steps,) is the measured supply voltage. ``enabled`` (steps,) is 0 where the drives are
     released: open circuit, no torque. ``external`` (steps, M) is a known torque on each drive's joint that is not the drive's
     (a force for a slide): a stage pushed by a measured disturbance.
     """
 
-    model: Robot
+    model: Any
     driver: Driver
     steps: int
     seed: int | None = None

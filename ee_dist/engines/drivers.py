@@ -17,6 +17,7 @@ import numpy as np
 from ee_dist.engines.compiled import compiled
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import command_span, span
+from ee_dist.robots.system import System
 from ee_dist.trials.log import Array
 
 HIDDEN = 3
@@ -92,7 +93,7 @@ def _middle_and_half(spans: Sequence[tuple[float, float]]) -> tuple[Array, Array
 
 class _Networks:
     def __init__(
-        self, robots: Sequence[Robot], drivers: Sequence[Network], base: Sequence[tuple[Array, Array]]
+        self, robots: Sequence[System], drivers: Sequence[Network], base: Sequence[tuple[Array, Array]]
     ) -> None:
         s, m = len(robots[0].sensors), len(robots[0].drives)
         h = len(robots[0].wiring.hidden_gain) or HIDDEN
@@ -183,7 +184,7 @@ def _dot(a: Array, b: Array) -> float:
 
 
 class _Series:
-    def __init__(self, robots: Sequence[Robot], drivers: Sequence[Commands], steps: int) -> None:
+    def __init__(self, robots: Sequence[System], drivers: Sequence[Commands], steps: int) -> None:
         longest = max(1, steps)
         rows = []
         for robot, driver in zip(robots, drivers, strict=True):
@@ -199,7 +200,7 @@ class _Series:
 
 
 class _Loops:
-    def __init__(self, robots: Sequence[Robot], drivers: Sequence[ClosedLoop]) -> None:
+    def __init__(self, robots: Sequence[System], drivers: Sequence[ClosedLoop]) -> None:
         self.functions = [d.make() for d in drivers]
         self.source = [list(r.wiring.source) for r in robots]
 
@@ -211,7 +212,7 @@ class Controllers:
     """All controllers of a batch: ``step`` takes sensors (B, S) and returns commands (B, M)."""
 
     def __init__(
-        self, robots: Sequence[Robot], drivers: Sequence[Driver], scales: Sequence[tuple[Array, Array]], steps: int
+        self, robots: Sequence[System], drivers: Sequence[Driver], scales: Sequence[tuple[Array, Array]], steps: int
     ) -> None:
         self.motors = len(robots[0].drives)
         self.groups: list[tuple[Array | slice, _Runner]] = []

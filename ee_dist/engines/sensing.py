@@ -14,7 +14,8 @@ import numpy as np
 
 from ee_dist.engines.delay import Delay
 from ee_dist.engines.per_robot import per_robot
-from ee_dist.robots.model import Robot, Sensor
+from ee_dist.robots.model import Sensor
+from ee_dist.robots.system import System
 from ee_dist.trials.log import Array
 
 TOUCHING, LIFTED = 1.0, -1.0
@@ -23,7 +24,7 @@ TOUCHING, LIFTED = 1.0, -1.0
 class SensingPath:
     """State and arithmetic of the S channels of B robots."""
 
-    def __init__(self, robots: Sequence[Robot], time_step_s: float, steps: int, seeds: Sequence[int | None]) -> None:
+    def __init__(self, robots: Sequence[System], time_step_s: float, steps: int, seeds: Sequence[int | None]) -> None:
         names = [f.name for f in fields(Sensor) if isinstance(f.default, float)]
         rows = per_robot(robots, lambda r: np.array([[getattr(s, n) for n in names] for s in r.sensors], dtype=float))
         table = np.array(rows).reshape(len(robots), len(robots[0].sensors), len(names))

@@ -13,7 +13,7 @@ import numpy as np
 
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Engine, EngineError, Rollout
-from ee_dist.robots.model import Robot
+from ee_dist.robots.system import System
 from ee_dist.trials.log import SensorLog
 from ee_dist.trials.noise import with_noise
 
@@ -25,7 +25,7 @@ class PhysicalRobot:
     __slots__ = ("_run", "reveal", "trials")
 
     def __init__(
-        self, engine: Engine, robot: Robot, hidden: Hypothesis, seed: np.random.SeedSequence, noise: float = 0.0
+        self, engine: Engine, robot: System, hidden: Hypothesis, seed: np.random.SeedSequence, noise: float = 0.0
     ) -> None:
         changed = apply(with_noise(robot, noise), hidden)
         self.trials = 0
@@ -44,7 +44,7 @@ class PhysicalRobot:
 
 
 def _runner(
-    engine: Engine, robot: Robot, seed: np.random.SeedSequence, cause: str
+    engine: Engine, robot: System, seed: np.random.SeedSequence, cause: str
 ) -> Callable[[Any, int, int], SensorLog]:
     def run(driver: Any, steps: int, index: int) -> SensorLog:
         stream = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, index))

@@ -5,32 +5,29 @@ An optional array cannot be told from an empty one by its rows, so the trial mes
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
+from ee_dist.effects.catalogue import EVERY, Hypothesis, Term
 from ee_dist.engines.drivers import Commands, Network
 from ee_dist.recording import schemas
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.records import GenerationRecord, HypothesisRecord, TrialRecord
-from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
 _ALWAYS = ("sensors", "commands")
 _TABLES = ("base_pose", "joints", "torques", "external")
 _SERIES = "supply_v"
-_JOINT_UNITS = {"hinge": "rad", "slide": "m"}
 
 
 # -- to messages -----------------------------------------------------------------------------------------------------
 
 
-def trial_message(number: int, record: TrialRecord, robot: Robot) -> Any:
-    """The ``Trial`` ahead of the rows; ``robot`` gives the units of motors. Raises RecordingError for the driver."""
+def trial_message(number: int, record: TrialRecord, units: Mapping[str, str]) -> Any:
+    """The ``Trial`` ahead of the rows; ``units`` are those of commands, by drive. Raises RecordingError for the driver."""
     log = record.log
-    units = {j.name: _JOINT_UNITS.get(j.kind, "") for j in robot.joints}
     return schemas.Trial(
         id=number,
         index=record.index,
@@ -110,7 +107,7 @@ def _term_messages(terms: Hypothesis) -> list[Any]:
 
 
 def _unit(effect: str, parameter: str) -> str:
-    entry = CATALOGUE.get(effect)
+    entry = EVERY.get(effect)
     return next((p.unit for p in entry.parameters if p.name == parameter), "") if entry else ""
 
 

@@ -10,20 +10,26 @@ from google.protobuf.message import DecodeError
 from ee_dist.recording import codec, schemas, topics
 from ee_dist.recording.contents import Contents, damage, read_contents
 from ee_dist.recording.errors import RecordingError
+from ee_dist.recording.forms import FILES, FORMS
 from ee_dist.recording.records import HARDWARE, HypothesisRecord, RunRecord, TrialRecord
 from ee_dist.recording.upgrade import Record, upgraded
-from ee_dist.robots.model import RobotError
-from ee_dist.robots.numbers import checked
-from ee_dist.robots.serial import robot_from_json
+from ee_dist.robots.model import Robot, RobotError
+
+ANY = tuple(FORMS)
+"""All kinds of systems that a recording may be of."""
 
 
-def read_run(path: str | Path) -> RunRecord:
+def read_run(path: str | Path, kinds: tuple[type, ...] = (Robot,)) -> RunRecord:
     """The run recorded in a file, whole or cut.
 
     ``complete`` says that the run reached its end and nothing of it is missing. A trial of which rows are missing is
-    left out. Raises RecordingError if the file is not a recording, is too new, or lacks its robot.
+    left out. Raises RecordingError if the file is not a recording, is too new, lacks its robot, or has another system than
+    one of these ``kinds`` (``ANY`` are all).
     """
-    return read_with_order(Path(path))[0]
+    run = read_with_order(Path(path))[0]
+    if not isinstance(run.robot, kinds):
+        raise RecordingError(f"{path}: a recording of {run.robot.name}, which is no robot; expected that of a robot")
+    return run
 
 
 def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
@@ -31,13 +37,13 @@ def read_with_order(path: Path) -> tuple[RunRecord, list[Record]]:
     contents, version, metadata, status = _read(path)
     if contents.damaged:
         raise damage(path, f"attachment {contents.damaged[0]!r:.60}")
-    robot = contents.attachments.pop(topics.ROBOT_FILE, None)
-    if robot is None:
+    name = next((f for f in FILES if f in contents.attachments), None)
+    if name is None:
         raise RecordingError(f"{path}: cut off before its robot was recorded; nothing can be recovered")
     try:
-        run = RunRecord(checked(robot_from_json(robot), "robot"), metadata, contents.attachments)
+        run = RunRecord(FILES[name].read(contents.attachments.pop(name)), metadata, contents.attachments)
     except (RobotError, UnicodeError, RecursionError) as error:
-        raise RecordingError(f"{path}: the attachment {topics.ROBOT_FILE} is not a robot of ours: {error}") from error
+        raise RecordingError(f"{path}: the attachment {name} is not a robot of ours: {error}") from error
     records = list(_records(path, contents))
     if version == topics.FIRST_FORMAT:
         records = upgraded(records)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.drivers import Commands, Network
-from ee_dist.robots.model import Robot
 from ee_dist.trials.log import SensorLog
 
 HARDWARE, PREDICTION, HINDSIGHT = "hardware", "prediction", "hindsight"
@@ -69,9 +69,12 @@ class GenerationRecord:
 
 @dataclass
 class RunRecord:
-    """A whole run. ``metadata`` holds short strings (task, version, seed, digests), ``attachments`` files by name."""
+    """A whole run. ``metadata`` holds short strings (task, version, seed, digests), ``attachments`` files by name.
 
-    robot: Robot
+    ``robot`` is a Robot, or another system of those in ``forms.py``.
+    """
+
+    robot: Any
     metadata: dict[str, str] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     trials: list[TrialRecord] = field(default_factory=list)

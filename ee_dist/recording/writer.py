@@ -20,11 +20,9 @@ from ee_dist.recording import codec, schemas, topics
 from ee_dist.recording.clock import RunClock, offsets_ns
 from ee_dist.recording.contents import with_checksum
 from ee_dist.recording.errors import RecordingError
+from ee_dist.recording.forms import FILES, form_of
 from ee_dist.recording.records import GenerationRecord, HypothesisRecord, TrialRecord
-from ee_dist.recording.scene import scene_message
-from ee_dist.recording.transforms import model_of, transform_messages
-from ee_dist.robots.model import Robot
-from ee_dist.robots.serial import robot_to_json
+from ee_dist.robots.system import System
 
 _MEDIA_TYPES = {".json": "application/json", ".yaml": "application/yaml", ".csv": "text/csv", ".txt": "text/plain"}
 
@@ -41,23 +39,21 @@ class RunWriter:
     def __init__(
         self,
         path: str | Path,
-        robot: Robot,
+        robot: System,
         metadata: Mapping[str, str] | None = None,
         attachments: Mapping[str, bytes] | None = None,
     ) -> None:
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + ".part")
-        self._robot = robot
+        self._robot, self._form = robot, form_of(robot)
         self._clock = RunClock()
         self._trials = 0
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         metadata, attachments = dict(metadata or {}), dict(attachments or {})
         _check_texts(metadata)
-        if topics.ROBOT_FILE in attachments:
-            raise RecordingError(
-                f"{self.path}: the attachment name {topics.ROBOT_FILE} is taken by the robot; use another"
-            )
+        for name in FILES.keys() & attachments.keys():
+            raise RecordingError(f"{self.path}: the attachment name {name} is taken by the robot; use another")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file = self.part.open("wb")
@@ -71,7 +67,7 @@ class RunWriter:
             self._mcap.start(profile=topics.PROFILE, library=topics.LIBRARY)
             self._note(topics.FORMAT_RECORD, {"format": topics.FORMAT})
             self._note(topics.RUN_RECORD, metadata)
-            self._attach(topics.ROBOT_FILE, robot_to_json(robot).encode())
+            self._attach(self._form.file, self._form.write(robot).encode())
             for name, data in sorted(attachments.items()):
                 self._attach(name, data)
             self._save()
@@ -85,7 +81,7 @@ class RunWriter:
                 f"trial {record.name!r}: no source {record.source!r}; there are: {', '.join(topics.SOURCES)}"
             )
         number = self._trials
-        header = codec.trial_message(number, record, self._robot)
+        header = codec.trial_message(number, record, self._form.command_units(self._robot))
         offsets = offsets_ns(record.log.times_s)
         start = self._clock.trial(record.index, int(offsets.max(initial=0)))
         self._trials += 1
@@ -97,11 +93,8 @@ class RunWriter:
             ):
                 self._mcap.add_message(channel, start + offset, data, start + offset, row)
             length = int(offsets.max(initial=0))
-            if len(record.log):
-                solids = scene_message(model_of(record, self._robot), record.source, start, length)
-                self._add(topics.scene_topic(record.source), solids, start)
-            for log_time, message in transform_messages(record, self._robot, start):
-                self._add(topics.transforms_topic(record.source), message, log_time)
+            for topic, log_time, message in self._form.pictures(record, self._robot, start, length):
+                self._add(topic, message, log_time)
             self._save()
 
     def hypothesis(self, record: HypothesisRecord) -> None:

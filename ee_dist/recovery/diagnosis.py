@@ -17,7 +17,7 @@ from ee_dist.recording.records import DIAGNOSIS, EVOLVED, POLISHED, PRUNED, Gene
 from ee_dist.recovery.genome import LENGTH, decode, first_hypotheses, neighbours
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
-from ee_dist.robots.model import Robot
+from ee_dist.robots.system import System
 from ee_dist.trials.log import SensorLog
 
 LAST_RANKS = 10
@@ -28,13 +28,13 @@ class Judge:
     """Errors of hypotheses against the trials so far: the mean over trials of the metric, lower is better."""
 
     def __init__(
-        self, robot: Robot, trials: Sequence[tuple[object, SensorLog]], metric: Metric, evaluator: Evaluator
+        self, robot: System, trials: Sequence[tuple[object, SensorLog]], metric: Metric, evaluator: Evaluator
     ) -> None:
         self.robot, self.evaluator = robot, evaluator
         self.trials: list[tuple[object, Reduction, int]] = [
             (driver, metric.against(log), metric.steps(len(log))) for driver, log in trials
         ]
-        self._models: dict[Hypothesis, Robot] = {}
+        self._models: dict[Hypothesis, System] = {}
         self._meanings: dict[bytes, Hypothesis] = {}
 
     def hypothesis(self, genome: Genomes) -> Hypothesis:
@@ -44,7 +44,7 @@ class Judge:
             self._meanings[genome_bytes] = decode(genome, self.robot)
         return self._meanings[genome_bytes]
 
-    def model(self, hypothesis: Hypothesis) -> Robot:
+    def model(self, hypothesis: Hypothesis) -> System:
         if hypothesis not in self._models:
             self._models[hypothesis] = apply(self.robot, hypothesis)
         return self._models[hypothesis]

@@ -16,10 +16,11 @@ from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.evolution.ga import Budget, Genomes
 from ee_dist.recording.records import HARDWARE, HINDSIGHT, PREDICTION, TrialRecord
 from ee_dist.recovery.diagnosis import Judge, believe
+from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.recovery.repair import repair
-from ee_dist.robots.model import Robot
+from ee_dist.robots.system import System
 from ee_dist.trials.hardware import Hardware
 from ee_dist.trials.log import SensorLog
 
@@ -59,19 +60,20 @@ class Plan:
 
 @dataclass
 class Recovery:
-    """What a run found. ``distances_m`` is of the hardware: intact, after the change, then each compensating trial."""
+    """What a run found. ``intact``, ``after`` and each of ``trials`` (the compensating ones) say how well the hardware did, as
+    does ``expected`` of the model that each controller was chosen on: values of the function, for a robot its distance in m."""
 
-    intact_m: float = float("nan")
-    after_m: float = float("nan")
-    trials_m: list[float] = field(default_factory=list)
-    expected_m: list[float] = field(default_factory=list)
+    intact: float = float("nan")
+    after: float = float("nan")
+    trials: list[float] = field(default_factory=list)
+    expected: list[float] = field(default_factory=list)
     hypotheses: list[Hypothesis] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
     controllers: list[Network] = field(default_factory=list)
 
 
 def recover(
-    robot: Robot,
+    robot: System,
     intact: Hardware,
     changed: Hardware,
     metric: Metric,
@@ -87,11 +89,11 @@ def recover(
     passes = plan.compensating_trials
     streams = seed.spawn(2 * passes + 1)
     repair_seeds, diagnosis_seeds = streams[: passes + 1], streams[passes + 1 :]
-    result = Recovery()
+    result, subject = Recovery(), subject_of(robot)
 
     best, expected = repair(robot, [], evaluator, plan.repair, plan.steps, repair_seeds[0], observer, 0)
     controllers: list[Network] = [best]
-    result.expected_m.append(expected)
+    result.expected.append(expected)
 
     def say(index: int, name: str, source: str, driver: Network, hypothesis: Hypothesis) -> None:
         """Record what the model under this hypothesis does in the trial of that index."""
@@ -101,12 +103,12 @@ def recover(
 
     say(0, "intact", PREDICTION, best, ())
     log = intact.trial(best, plan.steps)
-    result.intact_m = log.travel_m
+    result.intact = subject.value(log)
     observer.trial(TrialRecord(0, "intact", HARDWARE, best, log))
 
     say(1, "after the change", PREDICTION, best, ())
     log = changed.trial(best, plan.steps)
-    result.after_m = log.travel_m
+    result.after = subject.value(log)
     observer.trial(TrialRecord(1, "after the change", HARDWARE, best, log))
     trials: list[tuple[Network, SensorLog]] = [(best, log)]
     believed: list[Genomes] = []
@@ -126,10 +128,10 @@ def recover(
             model, known, evaluator, plan.repair, plan.steps, repair_seeds[k + 1], observer, k + 1, plan.related
         )
         controllers.append(best)
-        result.expected_m.append(expected)
+        result.expected.append(expected)
         say(k + 2, f"trial {k + 1}", PREDICTION, best, hypothesis)
         log = changed.trial(best, plan.steps)
-        result.trials_m.append(log.travel_m)
+        result.trials.append(subject.value(log))
         observer.trial(TrialRecord(k + 2, f"trial {k + 1}", HARDWARE, best, log))
         trials.append((best, log))
     result.controllers = controllers

@@ -6,13 +6,13 @@ Both return the error of one trial (lower is better); a hypothesis is judged by 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from ee_dist.evaluation.jobs import Reduction, array_key
+from ee_dist.evaluation.jobs import Reduction, Travel, array_key
 from ee_dist.trials.log import Array, SensorLog
 
 
@@ -76,24 +76,27 @@ class _RollingMeanError:
 
 @dataclass(frozen=True)
 class Distance:
-    """|measured - simulated| forward distance over the whole trial, m (Eq. 1, the paper's control)."""
+    """|measured - simulated| function over the whole trial: of a robot the forward distance, m (Eq. 1, the paper's control)."""
 
+    function: Reduction = field(default_factory=Travel)
     name: str = "distance"
 
     def steps(self, full: int) -> int:
         return full
 
     def against(self, measured: SensorLog) -> Reduction:
-        return _DistanceError(measured.travel_m)
+        return _DistanceError(self.function, self.function(measured))
 
 
 @dataclass(frozen=True)
 class _DistanceError:
-    travel_m: float
+    function: Reduction
+    measured: float
 
     @property
     def key(self) -> str:
-        return f"distance:{self.travel_m!r}"
+        return f"distance:{self.function.key}:{self.measured!r}"
 
     def __call__(self, log: SensorLog) -> float:
-        return abs(log.travel_m - self.travel_m) if math.isfinite(log.travel_m) else math.inf
+        value = self.function(log)
+        return abs(value - self.measured) if math.isfinite(value) else math.inf

@@ -8,11 +8,12 @@ import numpy as np
 
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Network, weight_count
-from ee_dist.evaluation.jobs import Evaluator, Job, Travel
+from ee_dist.evaluation.jobs import Evaluator, Job
 from ee_dist.evolution.ga import SCALE, Budget, GeneticAlgorithm, Genomes, values
 from ee_dist.recording.records import REPAIR, GenerationRecord
+from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.observer import Observer
-from ee_dist.robots.model import Robot
+from ee_dist.robots.system import System
 
 NEAREST, FARTHEST = 0.01, 0.3
 """Shares of new values in the relatives of a controller that start a pass."""
@@ -47,7 +48,7 @@ def relatives(database: Genomes, count: int, rng: np.random.Generator) -> Genome
 
 
 def repair(
-    model: Robot,
+    model: System,
     database: Sequence[Network],
     evaluator: Evaluator,
     budget: Budget,
@@ -57,7 +58,7 @@ def repair(
     pass_index: int,
     related: float = 1.0,
 ) -> tuple[Network, float]:
-    """Best controller found on ``model`` and its forward distance there (m).
+    """Best controller found on ``model`` and how well it does there: the value of the function that the system has.
 
     Controllers of the database and their relatives make up the share ``related`` of the first population (the database
     is in it in any case); the rest is random.
@@ -68,11 +69,11 @@ def repair(
     (start,) = seed.spawn(1)
     ga = GeneticAlgorithm(length, budget, seed, relatives(known, wanted, np.random.default_rng(start)))
     observer.pass_started(REPAIR, pass_index, budget.generations)
-    reduction = Travel()
+    function = subject_of(model).function
     while not ga.done:
         genomes = ga.ask()
         before = evaluator.counts.copy()
-        jobs = [Job(Rollout(model, network(g), steps), reduction) for g in genomes]
+        jobs = [Job(Rollout(model, network(g), steps), function) for g in genomes]
         ga.tell(np.array(evaluator.evaluate(jobs)))
         finite = ga.scores[np.isfinite(ga.scores)]
         observer.generation(

@@ -29,7 +29,7 @@ class RobotFormatError(RobotError):
 
 def robot_to_dict(robot: Robot) -> dict[str, Any]:
     """``{"version": 1, "robot": {...}}`` out of dictionaries, lists, strings and finite numbers."""
-    return {"version": VERSION, "robot": _plain(robot)}
+    return {"version": VERSION, "robot": plain(robot)}
 
 
 def robot_from_dict(data: Any) -> Robot:
@@ -39,7 +39,7 @@ def robot_from_dict(data: Any) -> Robot:
     _check_keys(data, required={"version", "robot"}, allowed={"version", "robot"}, where="file")
     if data["version"] != VERSION:
         raise RobotFormatError(f"version: expected {VERSION}, not {quoted(data['version'])}")
-    return cast(Robot, _build(Robot, data["robot"], "robot"))
+    return cast(Robot, built(Robot, data["robot"], "robot"))
 
 
 def robot_to_json(robot: Robot) -> str:
@@ -56,11 +56,12 @@ def robot_from_json(text: str | bytes) -> Robot:
     return robot_from_dict(data)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """A dataclass, or what one holds, out of dictionaries, lists, strings and finite numbers."""
     if is_dataclass(value):
-        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, tuple):
-        return [_plain(v) for v in value]
+        return [plain(v) for v in value]
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else str(float(value))
     return value
@@ -74,14 +75,14 @@ def _fields_of(kind: type) -> tuple[dict[str, Any], frozenset[str]]:
     return {f.name: hints[f.name] for f in fields(kind)}, frozenset(required)
 
 
-def _build(kind: Any, value: Any, where: str) -> Any:
-    """A value of type ``kind`` out of plain data."""
+def built(kind: Any, value: Any, where: str) -> Any:
+    """A value of type ``kind`` out of plain data. Raises RobotFormatError."""
     if is_dataclass(kind):
         types, required = _fields_of(cast(type, kind))
         if not isinstance(value, Mapping):
             raise RobotFormatError(f"{where}: expected a mapping, not {quoted(value)}")
         _check_keys(value, required, types.keys(), where)
-        return cast(type, kind)(**{k: _build(types[k], v, f"{where}.{k}") for k, v in value.items()})
+        return cast(type, kind)(**{k: built(types[k], v, f"{where}.{k}") for k, v in value.items()})
     if get_origin(kind) is tuple:
         return _build_tuple(get_args(kind), value, where)
     if kind is float:
@@ -107,7 +108,7 @@ def _build_tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, .
         kinds = (kinds[0],) * len(value)
     if len(value) != len(kinds):
         raise RobotFormatError(f"{where}: expected {len(kinds)} entries, not {len(value)}")
-    return tuple(_build(k, v, f"{where}[{i}]") for i, (k, v) in enumerate(zip(kinds, value, strict=True)))
+    return tuple(built(k, v, f"{where}[{i}]") for i, (k, v) in enumerate(zip(kinds, value, strict=True)))
 
 
 def _check_keys(value: Mapping[Any, Any], required: Any, allowed: Any, where: str) -> None:

@@ -35,6 +35,7 @@ TASKS = (
 )
 USED_BY = {
     "scenario": (("recover", "online"), "what task=trial hides is hidden=..."),
+    "system": (("recover",), "the others know robots only"),
     "robot": (
         ("recover", "online", "trial", "import", "workbench"),
         "the others take the robot from the log or the model file",
@@ -140,6 +141,9 @@ def check_used(overrides: list[str], task: str) -> None:
             having = f"{', '.join(most)} and {last}" if most else last
             hint = f", {instead}" if instead else ""
             raise ConfigError(f"{override}: task={task} has no use for it; it is for {having}{hint}")
+        other = next((o for o in overrides if re.match(r"\+{0,2}system=", o)), None)
+        if name.partition(".")[0] == "robot" and other is not None:
+            raise ConfigError(f"{override}: of no use beside {other}, which takes the place of the robot")
         opened = next((o for o in overrides if _OPENS.match(o)), None) if task == "workbench" else None
         if name.partition(".")[0] == "robot" and opened is not None:
             raise ConfigError(

@@ -8,12 +8,13 @@ from typing import Any, get_args, get_type_hints
 
 from ee_dist.basics.names import did_you_mean
 from ee_dist.effects.catalogue import Hypothesis, from_dict
+from ee_dist.evaluation.jobs import Reduction, Travel
 from ee_dist.evolution.ga import Budget
 from ee_dist.recovery.loop import Plan
 from ee_dist.recovery.metrics import Distance, Metric, RollingMean
 from ee_dist.trials.hardware import Limits
 
-ENGINES = ("pybullet", "mujoco")
+ENGINES = ("pybullet", "mujoco", "kinetics")
 EVALUATORS = ("auto", "ray", "serial")
 AUTO = "auto"
 """task.by: the way of comparing is chosen by what was measured."""
@@ -111,9 +112,10 @@ class MetricConfig:
         one_of("metric", self.name, ("rolling_mean", "distance"))
         self.build()
 
-    def build(self) -> Metric:
+    def build(self, function: Reduction | None = None) -> Metric:
+        """``function``: what a system is for, where that is not the way that a robot goes."""
         if self.name == "distance":
-            return Distance()
+            return Distance(function or Travel())
         try:
             return RollingMean(self.header, self.window)
         except ValueError as error:
@@ -173,15 +175,49 @@ class BudgetConfig:
 
 @dataclass
 class ScenarioConfig:
+    """``number``: of the paper's situations. Others have a ``name``."""
+
     number: int = -1
+    name: str = ""
     title: str = ""
     changes: list[dict[str, Any]] = field(default_factory=list)
 
     def hidden(self) -> Hypothesis:
         """What happens to the physical robot. Raises EffectError for an unknown effect or value, ConfigError without one."""
-        if self.number < 0 and not self.changes:
+        if self.number < 0 and not self.name and not self.changes:
             raise ConfigError("scenario: neither one of the scenarios, such as +scenario=8, nor scenario.changes=[...]")
         return tuple(from_dict(entry) for entry in self.changes)
+
+    @property
+    def label(self) -> str:
+        return self.name or str(self.number)
+
+
+KINETICS = "kinetics"
+"""The engine of gene networks, and of nothing else."""
+
+
+def _at_least_0(value: Any) -> bool:
+    return isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0
+
+
+@dataclass
+class SystemConfig:
+    """Another system than a robot: which, what of it a controller sees and commands, and what it is wanted for."""
+
+    name: str = "gene_network"
+    network: str = "dream4_size10_1"
+    output: str = "G4"
+    levels: list[Any] = field(default_factory=lambda: [[4.0, 0.3], [9.0, 0.3], [12.0, 0.5]])
+    stimulated: list[str] = field(default_factory=lambda: ["G1", "G8", "G9"])
+    reported: list[str] = field(default_factory=lambda: ["G2", "G4", "G5", "G7"])
+
+    def __post_init__(self) -> None:
+        one_of("system", self.name, ("gene_network",))
+        one_of("system.network", self.network, ("dream4_size10_1",))
+        for pair in self.levels:
+            if not isinstance(pair, list) or len(pair) != 2 or not all(_at_least_0(v) for v in pair):
+                raise ConfigError(f"system.levels: {pair}; expected [hours, level] each, such as [[4, 0.3], [12, 0.6]]")
 
 
 @dataclass
@@ -207,8 +243,16 @@ class Config:
     metric: MetricConfig = field(default_factory=MetricConfig)
     budget: BudgetConfig = field(default_factory=BudgetConfig)
     scenario: ScenarioConfig | None = None
+    system: SystemConfig | None = None
 
     def __post_init__(self) -> None:
+        if (self.engine.name == KINETICS) != (self.system is not None):
+            here, right = ("a gene network", KINETICS) if self.system else ("a robot", "pybullet or engine=mujoco")
+            raise ConfigError(f"engine={self.engine.name}: cannot simulate {here}; it takes engine={right}")
+        if self.system is not None and self.hardware.address is not None:
+            raise ConfigError(
+                f"hardware.address={self.hardware.address}: is for a robot; the cells of +system={self.system.name} are simulated"
+            )
         if not 0 <= self.seed < 2**63:
             raise ConfigError(f"seed={self.seed}: must be a whole number from 0 to 2^63 - 1")
         if self.metric.name == "rolling_mean" and self.metric.header > self.budget.steps:

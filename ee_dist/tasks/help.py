@@ -43,7 +43,7 @@ VERBS = {
     "recover": Verb(
         "the loop: break, diagnose, repair",
         "+scenario=8",
-        ("scenario", "budget", "metric", "robot", *_RUN),
+        ("scenario", "budget", "metric", "robot", "system", *_RUN),
         ("seed", "noise", "plugins", "ray.address", *_HARDWARE),
     ),
     "online": Verb(
@@ -136,13 +136,15 @@ def verb_help(name: str) -> str:
     parts += _table("Settings it shares with other verbs", shared)
     for group in verb.groups:
         options = sorted((p.stem for p in (conf / group).glob("*.yaml")), key=lambda n: (len(n), n))
-        plus = "+" if group == "scenario" else ""
+        plus = "+" if group in ("scenario", "system") else ""
         parts += textwrap.wrap(f"{plus}{group}=" + ", ".join(options), WIDTH, subsequent_indent="    ")
         if group == "scenario":
             continue
         known = {f"{group}.name"}
         for option in sorted(options, key=lambda o: o != _default(conf, group)):
-            own = [s for s in settings_in(conf / group / f"{option}.yaml", group) if s.key not in known]
+            file = conf / group / f"{option}.yaml"
+            prefix = "" if "@package _global_" in file.read_text(encoding="utf-8") else group
+            own = [s for s in settings_in(file, prefix) if s.key not in known]
             known |= {s.key for s in own}
             parts += _table(f"  with {group}={option}", own)
     return "\n".join([*parts, f"Units stand in brackets. All verbs: {PROGRAM} --help"])

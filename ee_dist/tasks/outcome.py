@@ -10,6 +10,7 @@ from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recovery.gait import gait
 from ee_dist.recovery.observer import Observer
 from ee_dist.robots.model import Robot
+from ee_dist.robots.system import System
 
 RESTORED = 0.9
 """Function counts as restored at this share of the intact distance."""
@@ -34,18 +35,19 @@ class Score:
 
 
 class Gaits(Observer):
-    """How the hardware made its distances: what is no gait in each trial, by its number.
+    """How the hardware made its distances: what is no gait in each trial, by its number; nothing of what has no body.
 
     The physical robot after the change is ``robot`` under ``hidden``, where that is known.
     """
 
-    def __init__(self, robot: Robot, hidden: Hypothesis) -> None:
+    def __init__(self, robot: System, hidden: Hypothesis) -> None:
         self.bodies = (robot, apply(robot, hidden))
         self.cheats: list[tuple[str, ...]] = []
 
     def trial(self, record: TrialRecord) -> None:
         if record.source == HARDWARE:
-            found = gait(self.bodies[min(record.index, 1)], record.log)
+            body = self.bodies[min(record.index, 1)]
+            found = gait(body, record.log) if isinstance(body, Robot) else None
             self.cheats.append(() if found is None else found.cheats)
 
     @property
@@ -55,16 +57,19 @@ class Gaits(Observer):
 
 
 def score(
-    intact_m: float,
-    trials_m: Sequence[float],
+    intact: float,
+    trials: Sequence[float],
     believed: Hypothesis,
     truth: Hypothesis,
     cheats: Sequence[tuple[str, ...]] = (),
 ) -> Score:
-    """Compare with the truth, distances in metres. A trial with ``cheats`` does not count as function restored."""
+    """Compare with the truth, and trials with the intact one by the value of their function.
+
+    A trial with ``cheats`` does not count as function restored.
+    """
     named, real = _places(believed), _places(truth)
-    counted = [m for k, m in enumerate(trials_m) if not (k < len(cheats) and cheats[k])]
-    best, fraction = (max(m) / intact_m if m and intact_m > 0 else float("nan") for m in (list(trials_m), counted))
+    counted = [m for k, m in enumerate(trials) if not (k < len(cheats) and cheats[k])]
+    best, fraction = (max(m) / intact if m and intact > 0 else float("nan") for m in (list(trials), counted))
     return Score(best, fraction, fraction >= RESTORED, len(named & real), len(real), len(named - real))
 
 

@@ -20,6 +20,8 @@ from ee_dist.recording.records import (
     TrialRecord,
 )
 from ee_dist.recovery.observer import Observer
+from ee_dist.recovery.subject import Subject
+from ee_dist.recovery.walking import WALKING
 from ee_dist.viewing.story import told
 
 
@@ -41,8 +43,10 @@ class PassProgress(Observer):
     diagnosis pass; that of POLISHED is what follows the generations of a diagnosis.
     """
 
-    def __init__(self, console: Console, passes: dict[str, int], weights: dict[str, float]) -> None:
-        self.console = console
+    def __init__(
+        self, console: Console, passes: dict[str, int], weights: dict[str, float], subject: Subject = WALKING
+    ) -> None:
+        self.console, self.subject = console, subject
         self.live = console.is_terminal
         self.weights = weights
         self.started = time.monotonic()
@@ -86,7 +90,7 @@ class PassProgress(Observer):
 
     def generation(self, record: GenerationRecord) -> None:
         self.done += self.weights[self.phase] / self.generations
-        good = f"best {record.best:.2f} m" if record.phase == REPAIR else f"error {record.best:.4f}"
+        good = f"best {self.subject.measure(record.best)}" if record.phase == REPAIR else f"error {record.best:.4f}"
         self.bars.update(self.pass_bar, advance=1, best=good)
         self.bars.update(self.run_bar, completed=round(100 * self.done / self.total))
         if record.generation < self.generations - 1:
@@ -109,7 +113,7 @@ class PassProgress(Observer):
 
     def trial(self, record: TrialRecord) -> None:
         if record.source == HARDWARE:
-            self._say(f"hardware, {record.name}: {record.log.travel_m:.2f} m")
+            self._say(f"hardware, {record.name}: {self.subject.measure(self.subject.value(record.log))}")
 
     def _say(self, text: str) -> None:
         seconds = time.monotonic() - self.started

@@ -21,8 +21,10 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recording.records import DIAGNOSIS, POLISHED, REPAIR
 from ee_dist.recording.writer import RunWriter
+from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.loop import Recovery, recover
 from ee_dist.recovery.observer import Observers
+from ee_dist.recovery.subject import Subject
 from ee_dist.tasks.compose import config_folder
 from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig, one_of
 from ee_dist.tasks.observers import Beliefs, Recorder
@@ -39,7 +41,7 @@ from ee_dist.tasks.summary import (
     write_summary,
 )
 from ee_dist.tasks.unfinished import remembered
-from ee_dist.tasks.wiring import build_robot, engine_maker, evaluator_name, evaluator_of, hardware_of
+from ee_dist.tasks.wiring import build_system, engine_maker, evaluator_name, evaluator_of, hardware_of
 from ee_dist.viewing.story import told
 
 GAITS = ("walking", "any")
@@ -67,13 +69,14 @@ def run(config: Config, options: Options, out: Path) -> None:
     console, watch = Console(), Stopwatch()
     own = config.hardware.address
     if config.scenario is None and not own:
-        numbers = sorted(int(p.stem) for p in (config_folder() / "scenario").glob("*.yaml") if p.stem.isdigit())
-        raise ConfigError(f"which scenario? add one, such as +scenario=8; there are: {', '.join(map(str, numbers))}")
+        raise ConfigError(_which(config.system is None))
     scenario = config.scenario or ScenarioConfig(title=f"a robot at {own}, of which nothing is known")
-    plan, metric = config.budget.plan(), config.metric.build()
+    plan = config.budget.plan()
     truth = scenario.hidden() if config.scenario else None
     hidden = truth or ()
-    robot = build_robot(config)
+    robot = build_system(config)
+    subject = subject_of(robot)
+    metric = config.metric.build(subject.function)
     apply(robot, hidden)  # A wrong target must be said before hours of work, not after.
     hardware = engine_maker(config, alone=True)()
     seeds = np.random.SeedSequence(config.seed)
@@ -89,11 +92,11 @@ def run(config: Config, options: Options, out: Path) -> None:
         "engine": config.engine.name,
         "metric": config.metric.name,
         "budget": config.budget.name,
-        "scenario": str(scenario.number),
+        "scenario": scenario.label,
         "title": scenario.title,
         "config_digest": config_digest(config, options),
     }
-    console.print(f"Scenario {scenario.number}: {scenario.title}. Seed {config.seed}, budget {config.budget.name}, "
+    console.print(f"Scenario {scenario.label}: {scenario.title}. Seed {config.seed}, budget {config.budget.name}, "
                   f"{config.engine.name}.", highlight=False)  # fmt: skip
     path = out / "recovery.mcap"
     digest = ResultDigest()
@@ -109,10 +112,10 @@ def run(config: Config, options: Options, out: Path) -> None:
         evaluator = evaluator_of(config)
     with (
         RunWriter(path, robot, metadata, {"config.yaml": config_yaml(config, options).encode()}) as writer,
-        PassProgress(console, passes, weights) as progress,
+        PassProgress(console, passes, weights, subject) as progress,
     ):
         # Slow to load, and needed only later: done while the first controllers run.
-        Thread(target=_load, args=("scipy.stats", "ee_dist.viewing.rerun_scene"), daemon=True).start()
+        Thread(target=_load, args=("scipy.stats", "ee_dist.viewing.scenes"), daemon=True).start()
         observer = Observers(Recorder(writer), digest, beliefs, gaits, progress)
         result = recover(robot, first, later, metric, plan, evaluator, search_seed, observer)
         known = {} if truth is None else {"truth": json.dumps([t.as_dict() for t in truth])}
@@ -120,14 +123,14 @@ def run(config: Config, options: Options, out: Path) -> None:
     counts = evaluator.counts
     hardware.close()
     refused = gaits.compensating if options.gaits == "walking" else ()
-    final = score(result.intact_m, result.trials_m, result.hypotheses[-1], hidden, refused)
+    final = score(result.intact, result.trials, result.hypotheses[-1], hidden, refused)
     summary = write_summary(out, "recover", config, options, watch, digest.hex, {
-        "scenario": scenario.number,
+        "scenario": scenario.name or scenario.number,
         "title": scenario.title,
         "metric": config.metric.name,
         "budget": config.budget.name,
-        "distance_m": {"intact": result.intact_m, "after": result.after_m, "trials": result.trials_m},
-        "expected_m": result.expected_m,
+        subject.key: {"intact": result.intact, "after": result.after, "trials": result.trials},
+        subject.expected_key: result.expected,
         "hypotheses": [hypothesis_list(h) for h in result.hypotheses],
         "fitness": digest.fitness,
         "diagnosis_error": result.errors,
@@ -144,13 +147,13 @@ def run(config: Config, options: Options, out: Path) -> None:
     })  # fmt: skip
     recording = drawn(path)
     wall, _ = watch.read()
-    _print(console, result, truth, final, gaits.cheats)
+    _print(console, subject, result, truth, final, gaits.cheats)
     if config.budget.name == "quick":
         console.print(QUICK, highlight=False)
     saved = 1 - counts.simulated / max(counts.asked, 1)
     console.print(
         f"\n{counts.asked:,} evaluations asked, {counts.simulated:,} simulated ({saved:.0%} saved), "
-        f"{counts.steps / 1e6:.1f} million robot-steps, {wall:.0f} s. Digest {digest.hex[:16]}.",
+        f"{counts.steps / 1e6:.1f} million {subject.noun}-steps, {wall:.0f} s. Digest {digest.hex[:16]}.",
         highlight=False,
     )
     for label, file in (("recording", path), ("rerun", recording), ("summary", summary)):
@@ -169,24 +172,36 @@ def _load(*modules: str) -> None:
         import_module(name)
 
 
+def _which(of_robots: bool) -> str:
+    """The paper's situations have numbers; those of other systems have names."""
+    names = [p.stem for p in (config_folder() / "scenario").glob("*.yaml") if p.stem.isdigit() == of_robots]
+    found = sorted(names, key=lambda n: (int(n) if of_robots else 0, n))
+    return f"which scenario? add one, such as +scenario={8 if of_robots else found[0]}; there are: {', '.join(found)}"
+
+
 def _print(
-    console: Console, result: Recovery, truth: Hypothesis | None, final: Score, cheats: Sequence[tuple[str, ...]]
+    console: Console,
+    subject: Subject,
+    result: Recovery,
+    truth: Hypothesis | None,
+    final: Score,
+    cheats: Sequence[tuple[str, ...]],
 ) -> None:
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("trial")
-    table.add_column("distance\n(m)", justify="right")
+    table.add_column(subject.heading.replace(" ", "\n"), justify="right")
     table.add_column("of\nintact", justify="right")
     table.add_column("diagnosis\nerror", justify="right")
-    table.add_column("what the robot believed", overflow="fold")
+    table.add_column(f"what the {subject.noun} believed", overflow="fold")
 
-    def share(m: float) -> str:
-        return f"{m / result.intact_m:.0%}" if result.intact_m > 0 else "-"
+    def share(value: float) -> str:
+        return f"{value / result.intact:.0%}" if result.intact > 0 else "-"
 
-    table.add_row("intact", f"{result.intact_m:.2f}", "100%", "", "nothing is wrong")
-    table.add_row("after the change", f"{result.after_m:.2f}", share(result.after_m), "", "")
-    for k, metres in enumerate(result.trials_m):
+    table.add_row("intact", f"{result.intact:.2f}", "100%", "", "nothing is wrong")
+    table.add_row("after the change", f"{result.after:.2f}", share(result.after), "", "")
+    for k, reached in enumerate(result.trials):
         table.add_row(
-            f"{k + 1}", f"{metres:.2f}", share(metres), f"{result.errors[k]:.5f}", lines(result.hypotheses[k])
+            f"{k + 1}", f"{reached:.2f}", share(reached), f"{result.errors[k]:.5f}", lines(result.hypotheses[k])
         )
     table.add_section()
     table.add_row("truth", "", "", "", "not known" if truth is None else lines(truth))

@@ -21,7 +21,7 @@ from ee_dist.evaluation.journal import Journal, JournaledEvaluator
 from ee_dist.recording.reader import read_logs
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.writer import RunWriter
-from ee_dist.robots.model import Robot
+from ee_dist.robots.system import System
 from ee_dist.robots.untrusted import UntrustedError, json_of, plain_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.folder import SETTINGS, held, shown
@@ -50,7 +50,7 @@ class Unfinished:
             self._journal = Journal(self.folder / _SIMULATED)
         return self._journal
 
-    def hardware(self, name: str, inner: Hardware, robot: Robot) -> Hardware:
+    def hardware(self, name: str, inner: Hardware, robot: System) -> Hardware:
         """``inner``, of which no trial is asked twice. ``robot`` as its recordings know it."""
         return _Remembered(self, name, inner, robot)
 
@@ -112,7 +112,7 @@ class Unfinished:
 class _Remembered:
     """Hardware whose trials are on the disk as soon as they are made; those that are there are not made again."""
 
-    def __init__(self, run: Unfinished, name: str, inner: Hardware, robot: Robot) -> None:
+    def __init__(self, run: Unfinished, name: str, inner: Hardware, robot: System) -> None:
         self.run, self.folder, self.name, self.inner, self.robot = run, run.folder, name, inner, robot
         self.count = 0
         knock = getattr(inner, "knock", None)
@@ -188,7 +188,7 @@ def note_nothing() -> None:
     _current = None
 
 
-def remembered(name: str, inner: Hardware, robot: Robot) -> Hardware:
+def remembered(name: str, inner: Hardware, robot: System) -> Hardware:
     """Hardware of the run under way, of which no trial is asked twice."""
     return inner if _current is None else _current.hardware(name, inner, robot)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ee_dist.recording.reader import read_run
+from ee_dist.recording.reader import ANY, read_run
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.viewing.rerun_scene import write_rrd
+from ee_dist.viewing.scenes import write_scene
 from ee_dist.viewing.viewer import open_viewer
 
 
@@ -46,5 +46,5 @@ def find(path: Path, rebuild: bool, out: Path) -> Path:
         return beside
     out.mkdir(parents=True, exist_ok=True)
     rebuilt = out / f"{path.stem}.rrd"
-    write_rrd(read_run(path), rebuilt)
+    write_scene(read_run(path, ANY), rebuilt)
     return rebuilt

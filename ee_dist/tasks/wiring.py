@@ -18,12 +18,15 @@ from ee_dist.evaluation.recent import RecentEvaluator
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.evaluation.socket_body import SocketBody
 from ee_dist.evaluation.stepped import SteppedRobot
+from ee_dist.networks.dream4 import dream4
 from ee_dist.robots.describe import robot_of
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import Config
+from ee_dist.robots.system import System
+from ee_dist.tasks.config import KINETICS, Config
 from ee_dist.tasks.unfinished import note_in
 
 ONE_JOINT = "one_joint"
+HOUR_S = 3600.0
 LARGE = 1024
 """Robots of one joint that are simulated in one batch."""
 
@@ -44,6 +47,10 @@ class EngineMaker:
             from ee_dist.engines.one_joint import OneJointEngine
 
             return OneJointEngine(LARGE)
+        if self.name == KINETICS:
+            from ee_dist.engines.kinetics.engine import KineticsEngine
+
+            return KineticsEngine()
         if self.name == "mujoco":
             from ee_dist.engines.mujoco.engine import MuJoCoEngine
 
@@ -65,10 +72,19 @@ def build_robot(config: Config) -> Robot:
     return robot_of(config.robot.name, config.robot.urdf, config.robot.drives)[0]
 
 
-def hardware_of(config: Config, robot: Robot) -> SteppedRobot | None:
+def build_system(config: Config) -> System:
+    """What the loop works on: the robot, or the system that was chosen instead. Raises RobotError for a name it does not have."""
+    chosen = config.system
+    if chosen is None:
+        return build_robot(config)
+    levels = tuple((float(hours) * HOUR_S, float(level)) for hours, level in chosen.levels)
+    return dream4(chosen.output, levels, tuple(chosen.stimulated), tuple(chosen.reported))
+
+
+def hardware_of(config: Config, robot: System) -> SteppedRobot | None:
     """The user's own robot, where ``hardware.address`` names one. Raises HardwareError for an address that is none."""
     own = config.hardware
-    if not own.address:
+    if not own.address or not isinstance(robot, Robot):
         return None
     return SteppedRobot(SocketBody(own.address, own.timeout_s, own.begin_s), robot, own.limits())
 

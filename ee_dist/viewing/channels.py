@@ -65,7 +65,7 @@ def send_sensors(
             continue
         for name in units_of(shots):
             place = f"{path}/{name}/{source.key}"
-            _send_scalars(stream, place, [(s, g, g.channel(name)) for s, g in present if name in g.sensor_names])
+            send_scalars(stream, place, [(s, g, g.channel(name)) for s, g in present if name in g.sensor_names])
             stream.log(place, _line(name in switches, source.colour, source.label, width), static=True)
 
 
@@ -81,7 +81,7 @@ def send_measured(
         for k, name in enumerate(names):
             place = f"{path}/{name}/{MEASURED_NAME}"
             logs = [(s.start_s, s.measured) for s in shots if name in s.measured.sensor_names]
-            _send_scalars(stream, place, [(start, log, log.channel(name)) for start, log in logs])
+            send_scalars(stream, place, [(start, log, log.channel(name)) for start, log in logs])
             stream.log(place, _line(name in switches, series_colour(k), name.replace("_", " "), 1.5), static=True)
 
 
@@ -111,7 +111,7 @@ def send_residuals(
         seen[unit] += 1
         for m in models:
             place = f"{path}/{name}/{m.key}"
-            _send_scalars(stream, place, _residuals(shots, name, m.key))
+            send_scalars(stream, place, _residuals(shots, name, m.key))
             line = (colour, name) if len(models) == 1 else (m.colour, m.label)
             stream.log(place, rr.SeriesLines(colors=line[0], names=line[1], widths=1.5), static=True)
 
@@ -131,7 +131,7 @@ def send_commands(stream: rr.RecordingStream, shots: Sequence[Shot], path: str =
     """Scalars at ``<path>/<motor>``: what was commanded on the hardware."""
     for k, name in enumerate(shots[0].measured.motor_names):
         place = f"{path}/{name}"
-        _send_scalars(stream, place, [(p.start_s, p.measured, p.measured.commands[:, k]) for p in shots])
+        send_scalars(stream, place, [(p.start_s, p.measured, p.measured.commands[:, k]) for p in shots])
         stream.log(place, rr.SeriesLines(colors=series_colour(k), names=name, widths=1.0), static=True)
 
 
@@ -189,7 +189,8 @@ def _send_states(
     stream.send_columns(place, [times(at)], column)
 
 
-def _send_scalars(stream: rr.RecordingStream, place: str, series: Sequence[tuple[float, SensorLog, Array]]) -> None:
+def send_scalars(stream: rr.RecordingStream, place: str, series: Sequence[tuple[float, SensorLog, Array]]) -> None:
+    """Scalars at ``place``: of each log, from its start on, one number a row."""
     at: list[Array] = []
     values: list[Array] = []
     if not series:

@@ -5,26 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import rerun as rr
 import rerun.blueprint as rrb
 
-from ee_dist.recording.records import DIAGNOSIS, HARDWARE, HINDSIGHT, PREDICTION, REPAIR, RunRecord, TrialRecord
+from ee_dist.recording.records import HARDWARE, PREDICTION, RunRecord, TrialRecord
 from ee_dist.robots.ranges import command_units
-from ee_dist.viewing import blueprint, channels, palette, search_curves, story, world
-from ee_dist.viewing.channels import Model, Shot
+from ee_dist.viewing import blueprint, channels, search_scene, story, world
+from ee_dist.viewing.channels import Shot
 from ee_dist.viewing.robot3d import Appearance, Shown
+from ee_dist.viewing.search_scene import SAID
 from ee_dist.viewing.stream import interval_s, log_digest, recording, starts_of
 from ee_dist.viewing.text import document
 from ee_dist.viewing.trial_scene import write_trial_rrd
 from ee_dist.viewing.world import Ghost
 
 APPLICATION = "ee_dist"
-ZERO = "texts/zero"
-SAID = {
-    PREDICTION: Model(palette.PREDICTED_NAME, "expected before", palette.PREDICTED),
-    HINDSIGHT: Model(palette.HINDSIGHT_NAME, "explained after", palette.HINDSIGHT),
-}
-"""The models of a run: that which a controller was chosen on, and that of the diagnosis after its trial."""
 
 
 def write_rrd(run: RunRecord, path: str | Path) -> None:
@@ -56,22 +50,12 @@ def write_rrd(run: RunRecord, path: str | Path) -> None:
             channels.send_commands(stream, shots)
             channels.send_touch(stream, shots, [SAID[PREDICTION]], switches)
             channels.send_trial_lane(stream, shots, [label(t) for t in trials])
-        _send_search(stream, run)
+        search_scene.send_search(stream, run)
 
 
 def _is_loop(run: RunRecord) -> bool:
     """Whether a search was recorded, or at least models beside the trials."""
     return "scenario" in run.metadata or bool(run.generations) or any(t.source != HARDWARE for t in run.trials)
-
-
-def _send_search(stream: rr.RecordingStream, run: RunRecord) -> None:
-    of = {phase: [g for g in run.generations if g.phase == phase] for phase in (REPAIR, DIAGNOSIS)}
-    for phase, own in of.items():
-        if own and not search_curves.anything(own):
-            text = f"It was 0 in each of the {len(own)} generations of {phase}."
-            stream.log(f"{ZERO}/{phase}", document(text), static=True)
-    search_curves.send_curve(stream, "search/distance", of[REPAIR], "repair")
-    search_curves.send_curve(stream, "search/error", of[DIAGNOSIS], "diagnosis", story.beliefs(run))
 
 
 def _appearances(
@@ -112,7 +96,7 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
         rrb.TextDocumentView(origin="/texts/details", name="Details"),
         active_tab=0,
     )
-    search = _search_views(run)
+    search = search_scene.search_views(run)
     if not trials:
         return blueprint.framed(rrb.Horizontal(*search, text))
     named = "Robot (blue), expected before (orange), explained after (violet)"
@@ -136,19 +120,3 @@ def _blueprint(run: RunRecord, trials: Sequence[TrialRecord], starts: Sequence[f
         rrb.Horizontal(left, right, column_shares=[5, 3]), blueprint.chapters(end_s), row_shares=[10, 1]
     )
     return blueprint.framed(whole)
-
-
-def _search_views(run: RunRecord) -> list[rrb.View]:
-    """The course of the search; only what has anything to show."""
-    views: list[rrb.View] = []
-    for phase, origin, name in (
-        (REPAIR, "/search/distance", "Repair: best distance (m), generation by generation"),
-        (DIAGNOSIS, "/search/error", "Diagnosis: least error (violet: of what was believed)"),
-    ):
-        own = [g for g in run.generations if g.phase == phase]
-        if search_curves.anything(own):
-            views.append(blueprint.bars(origin, name))
-        elif own:
-            # Bars of nothing but zeros would be an empty panel.
-            views.append(rrb.TextDocumentView(origin=f"{ZERO}/{phase}", name=name))
-    return views

@@ -18,15 +18,20 @@ from ee_dist.recording.records import (
     RunRecord,
     TrialRecord,
 )
-from ee_dist.robots.model import Robot
+from ee_dist.recovery.kinds import subject_of
+from ee_dist.recovery.subject import Subject
+from ee_dist.robots.system import System
 
 INTACT = "intact"
 """Name of the trial before the change."""
 
 
-def guide(robot: Robot, hindsight: bool) -> str:
+def guide(robot: System, hindsight: bool) -> str:
     """How to read the screen, for this robot."""
-    said = ["**Blue**: what the robot did.", "**Orange**: what its model expected, before the trial."]
+    said = [
+        f"**Blue**: what the {subject_of(robot).noun} did.",
+        "**Orange**: what its model expected, before the trial.",
+    ]
     if hindsight:
         said.append("**Violet**: the same trial on the model of the diagnosis that followed.")
     if any(s.kind == "touch" for s in robot.sensors):
@@ -73,14 +78,14 @@ def hardware_trials(run: RunRecord) -> list[TrialRecord]:
     return sorted((t for t in run.trials if t.source == HARDWARE), key=lambda t: t.index)
 
 
-def intact_distance(trials: Sequence[TrialRecord]) -> float | None:
-    """How far the robot went before the change, m."""
-    return next((t.log.travel_m for t in trials if t.name == INTACT), None)
+def intact_value(subject: Subject, trials: Sequence[TrialRecord]) -> float | None:
+    """How well the system did before the change."""
+    return next((subject.value(t.log) for t in trials if t.name == INTACT), None)
 
 
-def share_text(trial: TrialRecord, intact: float | None) -> str:
-    """Distance as a share of the intact robot's."""
-    return f"{100 * trial.log.travel_m / intact:.0f} %" if intact and intact > 0 else ""
+def share_text(value: float, intact: float | None) -> str:
+    """A value as a share of that of the intact system."""
+    return f"{100 * value / intact:.0f} %" if intact and intact > 0 else ""
 
 
 def title_of(run: RunRecord) -> str:
@@ -90,22 +95,26 @@ def title_of(run: RunRecord) -> str:
 
 
 def finding(run: RunRecord) -> list[str]:
-    """What came out, before anything else: the last belief, how far the robot goes with it, how sure, what next."""
-    trials, believed = hardware_trials(run), beliefs(run)
+    """What came out, before anything else: the last belief, how well it does with it, how sure, what next."""
+    trials, believed, subject = hardware_trials(run), beliefs(run), subject_of(run.robot)
     if not believed or len(trials) < 3:
         return []
-    last, intact, compensating = believed[max(believed)], intact_distance(trials), trials[2:]
-    best = max(compensating, key=lambda t: t.log.travel_m)
-    of = f", {share_text(best, intact)} of the intact robot's {intact:.2f} m" if share_text(best, intact) else ""
+    last, intact, compensating = believed[max(believed)], intact_value(subject, trials), trials[2:]
+    best = max(compensating, key=lambda t: subject.value(t.log))
+    reached = subject.value(best.log)
+    share = share_text(reached, intact)
+    of = f", {share} of the intact {subject.noun}'s {subject.measure(intact)}" if share and intact is not None else ""
     lines = [
         f"**Believed in the end: {told(last.terms)}.**",
-        f"Best trial: {best.name}, {best.log.travel_m:.2f} m{of}.",
+        f"Best trial: {best.name}, {subject.measure(reached)}{of}.",
         f"How sure: with it the model differs from the trials by {last.error:.3g} (0 is exact)",
     ]
     foreseen = {t.index: t for t in run.trials if t.source == PREDICTION}.get(trials[-1].index)
     if foreseen is not None:
-        went = f"{trials[-1].log.travel_m:.2f} m"
-        lines[-1] += f"; it foresaw {foreseen.log.travel_m:.2f} m for the last trial, which went {went}"
+        went = subject.measure(subject.value(trials[-1].log))
+        lines[-1] += (
+            f"; it foresaw {subject.measure(subject.value(foreseen.log))} for the last trial, which went {went}"
+        )
     lines[-1] += "."
     scenario = run.metadata.get("scenario", "")
     if scenario.isdigit() and int(scenario):
@@ -115,8 +124,8 @@ def finding(run: RunRecord) -> list[str]:
 
 def result_text(run: RunRecord) -> str:
     """The first thing to read: what is to be seen, what happened, what was believed, how far the robot went."""
-    trials = hardware_trials(run)
-    intact = intact_distance(trials)
+    trials, subject = hardware_trials(run), subject_of(run.robot)
+    intact = intact_value(subject, trials)
     said = {(t.source, t.index): t for t in run.trials}
     after = any(source == HINDSIGHT for source, _ in said)
     lines = [
@@ -125,14 +134,15 @@ def result_text(run: RunRecord) -> str:
         *finding(run),
         guide(run.robot, after),
         "",
-        "**How far it went forward (m)**",
+        f"**{subject.meaning}{f' ({subject.unit})' if subject.unit else ''}**",
         "",
     ]
     lines += ["| trial | measured | of intact | expected before | explained after |", "|---|---|---|---|---|"]
     for t in trials:
         models = [said.get((source, t.index)) for source in (PREDICTION, HINDSIGHT)]
-        told_of = ["" if m is None else f"{m.log.travel_m:.2f}" for m in models]
-        lines.append(f"| {t.name} | {t.log.travel_m:.2f} | {share_text(t, intact)} | {' | '.join(told_of)} |")
+        told_of = ["" if m is None else f"{subject.value(m.log):.2f}" for m in models]
+        reached = subject.value(t.log)
+        lines.append(f"| {t.name} | {reached:.2f} | {share_text(reached, intact)} | {' | '.join(told_of)} |")
     believed, truth, start = beliefs(run), truth_of(run), evolved(run)
     if believed or truth is not None:
         # Not a table: the viewer cuts its rows instead of folding them.

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,11 +23,13 @@ from recording_samples import bits, record, sample_log, write
 from ee_dist.engines.drivers import Network
 from ee_dist.recording.contents import read_contents
 from ee_dist.recording.errors import RecordingError
+from ee_dist.recording.forms import FORMS
 from ee_dist.recording.reader import read_logs, read_run
 from ee_dist.recording.records import HARDWARE, RunRecord, TrialRecord
 from ee_dist.recording.repair import repair
 from ee_dist.recording.topics import PROFILE
 from ee_dist.recording.writer import RunWriter
+from ee_dist.robots.model import Robot
 
 KILLED = """
 import sys, time
@@ -141,7 +144,7 @@ def test_a_robot_of_another_kind_is_an_error_in_one_line(
     make_file: Callable[[], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for text in ('{"mess": 1}', "[" * 100_000, "nothing"):
-        monkeypatch.setattr("ee_dist.recording.writer.robot_to_json", lambda _, text=text: text)
+        monkeypatch.setitem(FORMS, Robot, replace(FORMS[Robot], write=lambda _, text=text: text))
         with pytest.raises(RecordingError, match=r"robot\.json is not a robot of ours: [^\n]+$"):
             read_run(make_file())
 

@@ -9,10 +9,12 @@ from hypothesis.extra.numpy import arrays
 
 from ee_dist.effects import apply, term
 from ee_dist.evolution.ga import SCALE
-from ee_dist.recovery.genome import ACTIVE, LENGTH, SITUATIONS, choice, decode, first_hypotheses, neighbours
+from ee_dist.recovery.genome import ACTIVE, LENGTH, choice, decode, first_hypotheses, neighbours
+from ee_dist.recovery.walking import WALKING
 from ee_dist.robots.quadruped import quadruped
 
 ROBOT = quadruped()
+SITUATIONS = [s.effect for s in WALKING.situations]
 genomes = arrays(np.int16, (LENGTH,), elements=st.integers(-SCALE, SCALE))
 
 

@@ -88,7 +88,7 @@ def test_passes_and_trials_come_in_the_papers_order(finished):
     assert all(said.index((k, PREDICTION)) < said.index((k, HARDWARE)) for k in before)
     assert all(said.index((k, HINDSIGHT)) > said.index((k, HARDWARE)) for k in after)
     assert changed.trials == 3, "one right after the change, two compensating"
-    assert len(result.trials_m) == len(result.hypotheses) == 2
+    assert len(result.trials) == len(result.hypotheses) == 2
 
 
 def test_restarts_begin_with_the_intact_gait_and_the_last_pass_with_all(engine, monkeypatch):
@@ -114,14 +114,14 @@ def test_an_intact_robot_does_what_its_model_says(finished):
         next(t for t in notes.trials if t.index == 0 and t.source == s) for s in (HARDWARE, PREDICTION)
     )
     assert measured.log.sensors.tobytes() == predicted.log.sensors.tobytes()
-    assert result.intact_m == result.expected_m[0]
+    assert result.intact == result.expected[0]
 
 
 def test_a_lost_leg_is_found_and_the_repair_then_keeps_its_promise(finished):
     result, _, _ = finished
     assert result.hypotheses[-1] == (term("part_lost", "upper_rear_left"),)
     assert result.errors[-1] == 0.0
-    assert result.trials_m[-1] == result.expected_m[-1], (
+    assert result.trials[-1] == result.expected[-1], (
         "on the right model a controller does on the body what it did there"
     )
 
@@ -130,7 +130,7 @@ def test_a_prediction_is_what_the_pass_that_chose_the_controller_expected(finish
     result, notes, _ = finished
     forecast = {t.index: t for t in notes.trials if t.source == PREDICTION}
     assert [forecast[k].believed for k in range(4)] == [(), (), *result.hypotheses]
-    expected = [result.expected_m[0], *result.expected_m]
+    expected = [result.expected[0], *result.expected]
     assert [forecast[k].log.travel_m for k in range(4)] == expected
     hindsight = {t.index: t.believed for t in notes.trials if t.source == HINDSIGHT}
     assert hindsight == dict(enumerate(result.hypotheses, start=1))

@@ -5,7 +5,7 @@ from __future__ import annotations
 Rows = tuple[tuple[str, str], ...]
 
 COMPOSITION: Rows = (
-    ("+scenario=8 budget=null", "budget=null: no such choice; there are: paper, quick"),
+    ("+scenario=8 budget=null", "budget=null: no such choice; there are: gene_network, paper, quick"),
     ("+scenario=8 task=null", "task=null: no such choice; there are: compare"),
     ("+scenario=null", "there are: 1"),
     ("task=trial hardware=nowhere", "expected settings of its own"),
@@ -32,8 +32,35 @@ COMPOSITION: Rows = (
     ("task=compare measured=trial.mcap model=[model.yaml]", "expected one value, without brackets"),
     ("+scenario=14", "there are: 1, 2, 3, 4"),
     ("+scenario=-1", "there are: 1, 2, 3, 4"),
-    ("+scenario=8 budget=papr", "there are: paper, quick"),
-    ("+scenario=8 engine=mujuco", "there are: mujoco, pybullet"),
+    ("+scenario=8 budget=papr", "there are: gene_network, paper, quick"),
+    ("+scenario=8 engine=mujuco", "there are: kinetics, mujoco, pybullet"),
+    ("+system=gene_netwrk +scenario=knockout", "system=gene_netwrk: no such choice; there are: gene_network"),
+    (
+        "+system=gene_network",
+        "which scenario? add one, such as +scenario=altered_rate; there are: altered_rate, knockout",
+    ),
+    ("+system=gene_network +scenario=8", "part_lost is an effect on a robot; dream4_size10_1 is a gene network"),
+    ("+scenario=knockout", "gene_knockout is an effect on a gene network; quadruped is a robot"),
+    (
+        "+system=gene_network +scenario=knockout system.output=G44",
+        "wanted: there is no 'level_G44'; did you mean level_G4",
+    ),
+    ("+system=gene_network +scenario=knockout system.stimulated=[G1,GG8]", "there is no 'GG8'; did you mean G8"),
+    (
+        "+system=gene_network +scenario=knockout scenario.changes=[{effect:gene_knockout,target:G11}]",
+        "gene_knockout cannot act on 'G11' of dream4_size10_1; it can act on: G1",
+    ),
+    ("+system=gene_network +scenario=knockout scenario.changes=[{effect:gene_nockout,target:G1}]", "gene_knockout?"),
+    ("+system=gene_network +scenario=knockout system.outptu=G4", "did you mean system.output"),
+    ("+system=gene_network +scenario=knockout system.levels=[[4]]", "expected [hours, level] each, such as [[4, 0.3]"),
+    (
+        "+system=gene_network +scenario=knockout engine=mujoco",
+        "cannot simulate a gene network; it takes engine=kinetics",
+    ),
+    ("+scenario=8 engine=kinetics", "cannot simulate a robot; it takes engine=pybullet or engine=mujoco"),
+    ("+system=gene_network +scenario=knockout robot=quadruped", "which takes the place of the robot"),
+    ("+system=gene_network +scenario=knockout hardware.address=127.0.0.1:1", "the cells of +system=gene_network"),
+    ("task=trial +system=gene_network", "it is for task=recover, the others know robots only"),
     ("+scenario=8 evaluator=rey", "there are: auto, ray, serial"),
     ("+scenario=8 metric=rolling", "there are: distance, rolling_mean"),
     ("+scenario=8 robot=quadrupd", "there are: linear_stage, mjcf, quadruped, quadruped_lab,"),

@@ -81,7 +81,7 @@ def test_version_is_ours(cli):
 
 def test_choices_that_have_a_setting():
     assert options_with("evaluator.workers") == ["evaluator=auto", "evaluator=ray"]
-    assert options_with("budget.steps") == ["budget=paper", "budget=quick"]
+    assert options_with("budget.steps") == ["budget=gene_network", "budget=paper", "budget=quick"]
     assert options_with("seed") == []
 
 
