@@ -29,14 +29,17 @@ import mujoco
 import numpy as np
 import yaml
 from benchmarks.arm6 import DRIVE, LINKS, RATE_HZ, urdf
+from rich.console import Console
 from scipy.optimize import least_squares
 
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.search.search import quiet
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.measurements import load
+from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.ways import way_of
 from ee_dist.trials.log import Array
 
@@ -218,7 +221,8 @@ def main() -> int:
     seen, unseen = (problem(out, use, files[use]) for use in ("fitted", "held"))
     three = by_hand(seen)
     began = time.process_time()
-    found = improve(seen, pool_of(seen))
+    with SearchProgress(Console(), quiet) as progress:
+        found = improve(seen, pool_of(seen), progress=progress)
     print(f"\n{'':58s}  values  fitted  never seen (mrad)")
     rows = [(r.name, r.terms) for r in found.ladder]
     rows += [("improve, in the end", found.terms), ("three shared numbers by least squares", three)]
