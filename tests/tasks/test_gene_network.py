@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
@@ -10,10 +12,12 @@ from schemas import validated
 from ee_dist.effects.catalogue import apply, from_dict
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.kinetics.engine import KineticsEngine
+from ee_dist.evaluation.ray_session import stop_ray
 from ee_dist.networks.dream4 import dream4
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.reader import ANY, read_run
 from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
+from ee_dist.tasks.wiring import close_evaluators
 
 NETWORK = ("+system=gene_network", "+scenario=knockout")
 SMALL = (
@@ -22,7 +26,15 @@ SMALL = (
 )  # fmt: skip
 
 
-def test_a_run_leaves_what_a_robots_run_leaves_and_one_digest_wherever_it_runs(cli):
+@pytest.fixture
+def own_ray() -> Iterator[None]:
+    """Ray, which stays for the next run of a process, is ended with the test: others begin without it."""
+    yield
+    close_evaluators()
+    stop_ray()
+
+
+def test_a_run_leaves_what_a_robots_run_leaves_and_one_digest_wherever_it_runs(cli, own_ray):
     outcome = cli(*SMALL)
     assert outcome.status == 0, outcome.err
     summary = outcome.summary()
