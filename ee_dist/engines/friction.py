@@ -55,9 +55,8 @@ class Friction:
             "dry": p["coulomb"] + p["brake"],
         }
         self.table = np.stack([derived[n] if n in derived else p[n] for n in RUBBING])
-        self.last_speed: Array | None = None
-        self.last_torque = np.zeros(inertia.shape)
-        self.last_give: Array | None = None
+        self.last: tuple[Array, Array, Array | None] | None = None
+        """Speed, torque and give of the last step."""
 
     @staticmethod
     def rows(p: Mapping[str, Array]) -> NDArray[np.bool_]:
@@ -81,20 +80,19 @@ class Friction:
         if uses["stribeck"] or uses["stribeck_load"]:
             # NumPy's own exponential: a compiled one may differ in its last bit.
             fading = np.exp(-np.abs(speed) / p["stribeck_speed"])
+        last_speed, last_torque, last_give = self.last or (none, none, None)
         found = np.empty(shape)
         _rub(
             self.table, self.per_step, self.rubbing, self.loaded, torque, motor, speed, fading,
             one if enabled is None else np.ascontiguousarray(np.broadcast_to(enabled, shape)),
-            none if give is None else give,
-            none if self.last_speed is None else self.last_speed,
-            none if self.last_speed is None else self.last_torque,
-            none if self.last_give is None else self.last_give, self.last_speed is not None, found,
+            none if give is None else give, last_speed, last_torque, none if last_give is None else last_give,
+            self.last is not None, found,
         )  # fmt: skip
         return found
 
     def record(self, torque: Array, speed: Array, give: Array | None = None) -> None:
         """Remember the torque that the step is made with."""
-        self.last_speed, self.last_torque, self.last_give = speed, torque, give
+        self.last = speed, torque, give
 
 
 RUBBING = (

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from ee_dist.engines.drivers import Controllers, command_scaling, scaling
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.sensing import LIFTED, TOUCHING, SensingPath
 from ee_dist.robots.model import Robot, RobotError
+from ee_dist.robots.system import System
 from ee_dist.trials.log import Array, SensorLog, State, start_of
 
 POSE_KINDS = frozenset({"height", "roll", "pitch", "x", "y"})
@@ -91,16 +93,11 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
             bodies.step(pulled, force(step, truth), drive.give)
     assert begin is not None and truth.base_pose is not None
     travel = truth.base_pose[:, 0] - begin[:, 0]
-    times: Array = np.arange(steps, dtype=np.float64) * dt
-    units = tuple(s.unit for s in first.sensors)
     return [
-        SensorLog(
-            times_s=times.copy(),
-            sensors=sensors[:, i].copy(),
-            commands=commands[:, i].copy(),
-            sensor_names=first.sensor_names,
-            sensor_units=units,
-            motor_names=first.motor_names,
+        log_of(
+            first,
+            sensors[:, i],
+            commands[:, i],
             base_pose=None if poses is None else poses[:, i].copy(),
             joints=None if joints is None else joints[:, i].copy(),
             torques=None if torques is None else torques[:, i].copy(),
@@ -109,6 +106,20 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
         )
         for i in range(count)
     ]
+
+
+def log_of(model: System, sensors: Array, commands: Array, **more: Any) -> SensorLog:
+    """The log of one of a batch, from its channels (T, S) and commands (T, M), of which it keeps copies."""
+    times: Array = np.arange(len(sensors), dtype=np.float64) * model.time_step_s
+    return SensorLog(
+        times_s=times,
+        sensors=sensors.copy(),
+        commands=commands.copy(),
+        sensor_names=model.sensor_names,
+        sensor_units=tuple(s.unit for s in model.sensors),
+        motor_names=model.motor_names,
+        **more,
+    )
 
 
 Cut = Callable[[Sequence[Rollout]], Sequence[Sequence[int]]]
@@ -121,22 +132,33 @@ def up_to(largest: int) -> Cut:
 
 
 def in_batches(rollouts: Sequence[Rollout], place: Callable[[Sequence[Rollout]], Bodies], cut: Cut) -> list[SensorLog]:
+    """Run robots in batches of one shape, the bodies of each placed for it, and return the logs in the order asked."""
+
+    def placed(batch: Sequence[Rollout]) -> list[SensorLog]:
+        bodies = place(batch)
+        try:
+            return run(batch, bodies)
+        finally:
+            bodies.close()
+
+    return by_shape([_started(r) for r in rollouts], shape_of, cut, placed)
+
+
+def by_shape(
+    rollouts: Sequence[Rollout],
+    shape: Callable[[Rollout], Hashable],
+    cut: Cut,
+    run_batch: Callable[[Sequence[Rollout]], Sequence[SensorLog]],
+) -> list[SensorLog]:
     """Sort rollouts into batches of one shape, run each, and return the logs in the order asked."""
-    groups: dict[tuple[object, ...], list[int]] = {}
-    rollouts = [_started(r) for r in rollouts]
+    groups: dict[Hashable, list[int]] = {}
     for i, r in enumerate(rollouts):
-        groups.setdefault(shape_of(r), []).append(i)
+        groups.setdefault(shape(r), []).append(i)
     logs: dict[int, SensorLog] = {}
     for members in groups.values():
         for chosen in cut([rollouts[i] for i in members]):
             part = [members[k] for k in chosen]
-            batch = [rollouts[i] for i in part]
-            bodies = place(batch)
-            try:
-                found = run(batch, bodies)
-            finally:
-                bodies.close()
-            logs.update(zip(part, found, strict=True))
+            logs.update(zip(part, run_batch([rollouts[i] for i in part]), strict=True))
     return [logs[i] for i in range(len(rollouts))]
 
 

@@ -11,15 +11,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ee_dist.networks.model import Gene, GeneNetwork
-from ee_dist.recording.records import RunRecord, TrialRecord
+from ee_dist.recording.records import RunRecord
 from ee_dist.recovery.expression import wanted_levels
 from ee_dist.recovery.kinds import subject_of
 from ee_dist.viewing import blueprint, channels, palette, search_scene, story
 from ee_dist.viewing.channels import Shot
 from ee_dist.viewing.palette import Rgb
-from ee_dist.viewing.search_scene import SAID
-from ee_dist.viewing.stream import interval_s, log_digest, recording, starts_of, times
-from ee_dist.viewing.text import document
+from ee_dist.viewing.stream import recording, times
 
 APPLICATION = "ee_dist"
 GRAPH = "network"
@@ -33,25 +31,15 @@ SHIFT_SPAN = (-1.1, 1.1)
 def write_network_rrd(run: RunRecord, path: str | Path) -> None:
     """Write a run as an ``.rrd`` with its blueprint. Equal runs give equal recordings but for rerun's own row ids."""
     network: GeneNetwork = run.robot
-    trials = [t for t in story.hardware_trials(run) if len(t.log)]
-    said = {(t.source, t.index): t for t in run.trials if len(t.log)}
-    beside = [[said[s, t.index] for s in SAID if (s, t.index) in said] for t in trials]
-    starts = starts_of([(t.index, [t.log, *(m.log for m in models)]) for t, models in zip(trials, beside, strict=True)])
-    models = [SAID[s] for s in SAID if any((s, t.index) in said for t in trials)]
-    identity = [network.digest, repr(sorted(run.metadata.items())), *(log_digest(t.log) for t in run.trials)]
-    layout = _blueprint(run, network, trials, starts)
-    with recording(path, APPLICATION, identity, story.title_of(run), layout) as stream:
-        for place, text in (("texts/result", story.result_text(run)), ("texts/details", story.details_text(run))):
-            stream.log(place, document(text), static=True)
-        if trials:
-            shots = [
-                Shot(t.name, s, t.log, {SAID[m.source].key: m.log for m in own})
-                for t, s, own in zip(trials, starts, beside, strict=True)
-            ]
-            subject = subject_of(network)
-            labels = [f"{t.name}: {subject.measure(subject.value(t.log))}" for t in trials]
-            _send_graph(stream, network, run, trials, starts)
-            channels.send_sensors(stream, shots, models, [])
+    course = search_scene.course_of(run)
+    layout = search_scene.layout(run, course, _levels(network, course.end_s) if course.trials else None)
+    with recording(path, APPLICATION, search_scene.identity_of(run), story.title_of(run), layout) as stream:
+        search_scene.send_texts(stream, run)
+        if course.trials:
+            shots, subject = course.shots, subject_of(network)
+            labels = [f"{t.name}: {subject.measure(subject.value(t.log))}" for t in course.trials]
+            _send_graph(stream, network, run, course.starts)
+            channels.send_sensors(stream, shots, course.models, [])
             _send_wanted(stream, network, shots)
             channels.send_commands(stream, shots)
             channels.send_trial_lane(stream, shots, labels)
@@ -65,25 +53,19 @@ def _send_wanted(stream: rr.RecordingStream, network: GeneNetwork, shots: Sequen
     stream.log(place, rr.SeriesLines(colors=palette.TOUCHING, names=WANTED_NAME, widths=2.0), static=True)
 
 
-def _send_graph(
-    stream: rr.RecordingStream,
-    network: GeneNetwork,
-    run: RunRecord,
-    trials: Sequence[TrialRecord],
-    starts: Sequence[float],
-) -> None:
+def _send_graph(stream: rr.RecordingStream, network: GeneNetwork, run: RunRecord, starts: Sequence[float]) -> None:
     """Genes on a ring and arrows from regulators. In each trial violet: what was believed to have changed before it."""
     names = network.gene_names
     turn = 2 * math.pi / len(names)
     places = [(RING * math.sin(k * turn), -RING * math.cos(k * turn)) for k in range(len(names))]
     believed = story.beliefs(run)
     colours: list[Rgb] = []
-    for k, _ in enumerate(trials):
+    for k in range(len(starts)):
         # The first belief is that of the diagnosis after the second trial, and is acted on in the third.
         record = believed.get(k - 2)
         changed = {g for t in (record.terms if record else ()) for g in t.target.split(">")[-1:]}
         colours += [_colour(network, g, changed) for g in network.genes]
-    count = len(trials)
+    count = len(starts)
     nodes = rr.GraphNodes.columns(
         node_ids=list(names) * count,
         positions=places * count,
@@ -112,18 +94,8 @@ def _colour(network: GeneNetwork, gene: Gene, changed: set[str]) -> Rgb:
     return palette.MEASURED if gene.name in {s.target for s in network.sensors} else palette.GROUND
 
 
-def _blueprint(
-    run: RunRecord, network: GeneNetwork, trials: Sequence[TrialRecord], starts: Sequence[float]
-) -> rrb.Blueprint:
-    text = rrb.Tabs(
-        rrb.TextDocumentView(origin="/texts/result", name="Result"),
-        rrb.TextDocumentView(origin="/texts/details", name="Details"),
-        active_tab=0,
-    )
-    search = search_scene.search_views(run)
-    if not trials:
-        return blueprint.framed(rrb.Horizontal(*search, text))
-    end_s = starts[-1] + interval_s(trials[-1].log)
+def _levels(network: GeneNetwork, end_s: float) -> rrb.Container:
+    """Levels, graph and stimuli."""
     axis = blueprint.fixed_axis(0.0, end_s)
     output = network.wanted.sensor
     first = blueprint.plot(
@@ -136,9 +108,4 @@ def _blueprint(
     ]
     graph = rrb.GraphView(origin=f"/{GRAPH}", name="Who regulates whom; violet: believed to have changed")
     stimuli = blueprint.plot("/commands", "Stimuli (shift of the basal activation)", axis, span=SHIFT_SPAN)
-    left = rrb.Vertical(first, rrb.Horizontal(graph, rrb.Vertical(*others, stimuli)), row_shares=[2, 5])
-    right = rrb.Vertical(text, *search, row_shares=[18, 5, 5][: 1 + len(search)])
-    whole = rrb.Vertical(
-        rrb.Horizontal(left, right, column_shares=[5, 3]), blueprint.chapters(end_s), row_shares=[10, 1]
-    )
-    return blueprint.framed(whole)
+    return rrb.Vertical(first, rrb.Horizontal(graph, rrb.Vertical(*others, stimuli)), row_shares=[2, 5])

@@ -15,6 +15,7 @@ from ee_dist.engines.contract import EngineError, Rollout
 from ee_dist.engines.drivers import Controllers
 from ee_dist.engines.kinetics.rates import advance
 from ee_dist.engines.kinetics.tables import numbers_of, structure_key, structure_of
+from ee_dist.engines.loop import by_shape, log_of, up_to
 from ee_dist.engines.sensing import SensingPath
 from ee_dist.networks.model import GeneNetwork
 from ee_dist.trials.log import Array, SensorLog
@@ -41,15 +42,7 @@ class KineticsEngine:
 
     def rollout(self, rollouts: Sequence[Rollout]) -> list[SensorLog]:
         """Logs in the order asked. Raises EngineError for what is no gene network, and for what drives only bodies."""
-        groups: dict[Hashable, list[int]] = {}
-        for i, r in enumerate(rollouts):
-            groups.setdefault(_shape_of(r), []).append(i)
-        logs: dict[int, SensorLog] = {}
-        for members in groups.values():
-            for k in range(0, len(members), self.largest_batch):
-                part = members[k : k + self.largest_batch]
-                logs.update(zip(part, self._run([rollouts[i] for i in part]), strict=True))
-        return [logs[i] for i in range(len(rollouts))]
+        return by_shape(rollouts, _shape_of, up_to(self.largest_batch), self._run)
 
     def close(self) -> None:
         self._rests.clear()
@@ -70,19 +63,7 @@ class KineticsEngine:
             sensors[step], commands[step] = reported, command
             if step < steps - 1:
                 batch.step(command, first.time_step_s)
-        times: Array = np.arange(steps, dtype=np.float64) * first.time_step_s
-        units = tuple(s.unit for s in first.sensors)
-        return [
-            SensorLog(
-                times_s=times.copy(),
-                sensors=sensors[:, i].copy(),
-                commands=commands[:, i].copy(),
-                sensor_names=first.sensor_names,
-                sensor_units=units,
-                motor_names=first.motor_names,
-            )
-            for i in range(len(networks))
-        ]
+        return [log_of(first, sensors[:, i], commands[:, i]) for i in range(len(networks))]
 
     def _rest(self, networks: Sequence[GeneNetwork]) -> Array:
         """Levels (B, 2, G) at which the networks stand without stimulus."""
