@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import shlex
-import signal
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -28,18 +26,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(autouse=True)
-def impatience() -> Iterator[None]:
-    """What is no mistake would begin hours of work: a row that does not come back fails."""
-
-    def enough(*_: object) -> None:
-        raise AssertionError("no mistake was found in it: it began to work")
-
-    before = signal.signal(signal.SIGALRM, enough)
-    signal.alarm(60)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
+# What is no mistake would begin hours of work: a row that does not come back fails.
+pytestmark = pytest.mark.timeout(60)
 
 
 def check(status: int, err: str, said: str) -> None:

@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-from itertools import cycle
 from pathlib import Path
 
 import pytest
@@ -22,7 +21,6 @@ from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
 from ee_dist.viewing.story import told
 
-METRICS = ("rolling_mean", "distance")
 KEYS = {
     "format", "task", "version", "config_digest", "result_digest", "seed", "engine", "wall_s", "cpu_s", "scenario",
     "metric", "distance_m", "hypotheses", "fitness", "diagnosis_error", "truth", "recovered_fraction", "evaluations",
@@ -180,52 +178,3 @@ def test_view_rebuilds_the_scene_from_the_mcap_alone(finished, cli, tmp_path):
     assert outcome.status == 0, outcome.err
     (scene,) = outcome.folder.glob("logs/view/*/alone.rrd")
     assert scene.stat().st_size > 10_000
-
-
-@pytest.mark.parametrize(("scenario", "metric"), [*zip(range(1, 14), cycle(METRICS), strict=False), (8, METRICS[0])])
-def test_every_scenario_runs_with_either_metric(cli, scenario, metric):
-    outcome = cli(
-        f"+scenario={scenario}", f"metric={metric}", "evaluator=serial", "budget=quick", "budget.population=4",
-        "budget.generations=1", "budget.diagnosis_population=4", "budget.diagnosis_generations=1", "budget.crossovers=1",
-        "budget.compensating_trials=1", "budget.steps=62", "budget.tournament=2",
-    )  # fmt: skip
-    assert outcome.status == 0, outcome.err
-    assert outcome.summary()["scenario"] == scenario
-
-
-def test_a_sweep_gives_each_job_its_own_folder(cli, tiny):
-    outcome = cli("-m", "+scenario=1,9", "seed=0,1", "evaluator=serial", *tiny, "budget.compensating_trials=1")
-    assert outcome.status == 0, outcome.err
-    summaries = [json.loads((run / "summary.json").read_text()) for run in outcome.runs()]
-    assert {(s["scenario"], s["seed"]) for s in summaries} == {(1, 0), (1, 1), (9, 0), (9, 1)}
-    assert len({s["result_digest"] for s in summaries}) == 4
-    names = [run.name for run in outcome.runs()]
-    assert sum("scenario-1" in name for name in names) == sum("scenario-9" in name for name in names) == 2
-    assert not [name for name in names if set("'+ ") & set(name)], "a shell must take them as they are"
-
-
-def test_the_runs_of_a_sweep_go_side_by_side_with_the_same_digests(cli, tiny):
-    sweep = ["-m", "+scenario=1,9", "evaluator=serial", *tiny, "budget.compensating_trials=1"]
-    digests = []
-    for launcher in ([], ["hydra/launcher=joblib", "hydra.launcher.n_jobs=2"]):
-        outcome = cli(*sweep, *launcher)
-        assert outcome.status == 0, outcome.err
-        summaries = [json.loads((run / "summary.json").read_text()) for run in outcome.runs()]
-        digests.append({(s["scenario"], s["result_digest"]) for s in summaries})
-    assert digests[0] == digests[1]
-    assert len(digests[0]) == 2
-
-
-@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
-def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny, engine):
-    base = ["+scenario=3", f"engine={engine}", *tiny, "budget.compensating_trials=1"]
-    same = [
-        ["evaluator=serial"],
-        ["evaluator=serial", "evaluator.cache=false", "evaluator.chunk=3"],
-        ["evaluator=ray", "evaluator.workers=1"],
-        ["evaluator=ray", "evaluator.workers=2", "evaluator.chunk=1"],
-        ["evaluator=ray", "evaluator.workers=3", "evaluator.cache=false"],
-    ]
-    digests = {cli(*base, *extra).summary()["result_digest"] for extra in same}
-    assert len(digests) == 1
-    assert cli(*base, "evaluator=serial", "seed=1").summary()["result_digest"] not in digests
