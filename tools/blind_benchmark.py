@@ -6,7 +6,7 @@ Every tenth robot is untouched (``--untouched``). An effect whose whole mark on 
 too small and is left out of the scores. ``--withhold`` takes the drawn effect out of the catalogue: right is then
 ``unexplained``, or an effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``.
 ``--robot`` and ``--by`` take another robot and another way of comparing. ``--by every`` judges each case by every way, of the
-same trials: effects are then drawn among those that can show in all of them.
+same trials: effects are then drawn among those that all of them can tell.
 ``--cross-engine`` tries the robot in the other engine, after calibrating the model on an untouched robot there.
 ``--workers`` runs cases side by side; a case is the same whoever runs it.
 """
@@ -119,10 +119,11 @@ class Bench:
         return self.known.model
 
     @cached_property
-    def families(self) -> frozenset[str]:
-        """Families of effects that show in all ways."""
+    def told(self) -> frozenset[str]:
+        """Names of the candidates that all ways can tell."""
         trials = measured(self.engine, self.robot, (), [self.args.seed, 999_998])
-        return frozenset.intersection(*(self.problem(trials, by).families for by in self.ways))
+        pools = (pool_of(self.problem(trials, by)) for by in self.ways)
+        return frozenset.intersection(*(frozenset(c.name for c in pool) for pool in pools))
 
     def problem(self, trials: Sequence[MeasuredTrial], by: str) -> Problem:
         known = replace(self.known, trials=tuple(trials))
@@ -153,7 +154,7 @@ class Bench:
         if (index + 1) % self.args.untouched or self.args.two or self.args.withhold:
             for _ in range(2 if self.args.two else 1):
                 chosen, hidden_term = draw(self.robot, rng)
-                while len(self.ways) > 1 and chosen.effect.family not in self.families:
+                while len(self.ways) > 1 and chosen.name not in self.told:
                     chosen, hidden_term = draw(self.robot, rng)
                 drawn.append(chosen)
                 hidden = (*hidden, hidden_term)

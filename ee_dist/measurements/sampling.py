@@ -17,6 +17,8 @@ EVEN = 0.02
 """Steps that differ by less than this share of their median count as even."""
 LONGEST = 1e7
 """Rows of one trial: a thousand a second for nearly three hours."""
+MOST_AT_ONCE = 13
+"""Samples of which one is kept in a single step."""
 GAP = 5.0
 """Steps longer than this many medians are gaps."""
 
@@ -127,10 +129,14 @@ def decimated(values: Array, keep_every: int) -> Array:
     """Every n-th sample after an anti-alias filter (Chebyshev I, order 8, 0.05 dB, at 0.8 of the new Nyquist frequency,
     forward and backward), along the first axis; the last sample is kept when n divides the length.
 
-    This is the convention of MATLAB's ``decimate``, with which the published results on EMPS were made.
+    This is the convention of MATLAB's ``decimate``, with which the published results on EMPS were made. Beyond
+    ``MOST_AT_ONCE`` such a filter is numerically none: it is then done in steps.
     """
     if keep_every <= 1:
         return values
+    if keep_every > MOST_AT_ONCE:
+        step = next((k for k in range(10, 1, -1) if keep_every % k == 0), MOST_AT_ONCE)
+        return decimated(decimated(values, step), keep_every // step)
     b, a = _anti_alias(keep_every)
     smooth = scipy.signal.filtfilt(b, a, values, axis=0, padlen=min(len(values) - 1, 3 * 8))
     first = keep_every - (keep_every * int(np.ceil(len(values) / keep_every)) - len(values)) - 1

@@ -44,11 +44,14 @@ class Balance:
 
     def __init__(self, motion: Motion, keep_every: int) -> None:
         self.motion, self.keep_every = motion, keep_every
-        self._kept: dict[tuple[object, ...], Array | None] = {}
+        self.rest = decimated(motion.rest.astype(float), keep_every) > 0.5
+        """(rows, M): where a joint did not move."""
+        self._kept: dict[tuple[object, ...], tuple[Array, Array] | None] = {}
         self._most = max(MOST_VALUES * keep_every // max(len(motion.torque), 1), 64)
 
-    def __call__(self, robot: Robot) -> Array | None:
-        """(rows, M) of ``left_over``, decimated; None where a model leaves the finite numbers."""
+    def __call__(self, robot: Robot) -> tuple[Array, Array] | None:
+        """(rows, M) of ``left_over``, decimated: with friction that holds what rests, and without it; None where a model
+        leaves the finite numbers."""
         asked, needed = self.motion.needed(robot)
         inertia = felt_inertia(robot)
         laws = {d.joint: tuple(law for law in robot.laws if law.joint == d.joint) for d in robot.drives}
@@ -61,17 +64,21 @@ class Balance:
             if len(self._kept) + len(missing) > self._most:
                 self._kept.clear()
                 missing = list(range(len(keys)))
-            left = left_over(robot, self.motion, needed, missing)
-            whole = np.asarray(np.isfinite(left).all(axis=0))
-            kept = decimated(np.where(whole, left, 0.0), self.keep_every)
+            held, free = left_over(robot, self.motion, needed, missing)
+            whole = np.asarray(np.isfinite(held).all(axis=0))
+            kept = decimated(np.where(whole, held, 0.0), self.keep_every)
+            loose = kept if free is held else decimated(np.where(whole, free, 0.0), self.keep_every)
             for i, k in enumerate(missing):
-                self._kept[keys[k]] = kept[:, i] if whole[i] else None
-        columns = [self._kept[key] for key in keys]
-        return None if any(c is None for c in columns) else np.stack(columns, axis=1)  # type: ignore[arg-type]
+                self._kept[keys[k]] = (kept[:, i], loose[:, i]) if whole[i] else None
+        columns = [c for key in keys if (c := self._kept[key]) is not None]
+        if len(columns) < len(keys):
+            return None
+        return np.stack([c[0] for c in columns], axis=1), np.stack([c[1] for c in columns], axis=1)
 
 
-def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]) -> Array:
-    """(T, J) at some joints: what the drives gave, less what the motion needed (T, M), in terms of the measured force."""
+def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]) -> tuple[Array, Array]:
+    """(T, J) at some joints: what the drives gave, less what the motion needed (T, M), in terms of the measured force; and the
+    same without friction at what rests (the very same array where that makes no difference)."""
     drives = [robot.drives[k] for k in joints]
     q, qd, qdd, given = (
         np.ascontiguousarray(a[:, joints]) for a in (motion.position, motion.speed, motion.acceleration, motion.torque)
@@ -91,6 +98,7 @@ def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]
         context = LawContext({n: np.full(len(q), v) for n, v in law.values}, INSTANT_S)
         context.position, context.speed, context.torque = q[:, k], qd[:, k], torque[:, k]
         torque[:, k] += find_law(law.name)(context)
+    free = torque
     if Friction.rows(p).any():
         # What rests goes on resting through the instant: friction takes what it must, up to its limit.
         rubbed = np.where(motion.rest[:, joints], -qdd * INSTANT_S, qd)
@@ -106,10 +114,12 @@ def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]
             # What rests is held by whatever it takes: there the measured force has no say.
             slope = np.where(motion.rest[:, joints], 1.0, np.maximum(slope, LEAST_SLOPE))
             after = needed + (after - needed) / slope
-        torque = after
+        free, torque = np.where(motion.rest[:, joints], torque, after), after
     # In terms of what was measured: a weak motor, or friction that is a share of the motor's own force, would otherwise
     # shrink the residual along with the force.
-    return np.asarray((torque - needed) / np.maximum(through, 1e-3))
+    through = np.maximum(through, 1e-3)
+    held = np.asarray((torque - needed) / through)
+    return held, held if free is torque or not motion.rest[:, joints].any() else np.asarray((free - needed) / through)
 
 
 def _rubs(drive: Drive) -> bool:

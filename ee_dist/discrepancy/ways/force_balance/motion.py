@@ -42,6 +42,13 @@ class Processing:
     def filter_for(self, step_s: float) -> LowPass:
         return self.low_pass or LowPass(cutoff_hz=PASSED / step_s)
 
+    def differentiated(self, joints: Array, step_s: float) -> tuple[Array, Array, Array]:
+        """Positions, speeds and accelerations, (T, M) each, of readings (T, M), without the rows dropped."""
+        smooth, cut = self.filter_for(step_s), slice(self.drop_rows, None)
+        position = np.stack([smooth(q, step_s) for q in joints.T], axis=1)
+        speed = np.gradient(position, step_s, axis=0)
+        return position[cut], speed[cut], np.gradient(speed, step_s, axis=0)[cut]
+
 
 @dataclass(eq=False)
 class Moved:
@@ -91,7 +98,7 @@ class Motion:
 
 def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
     """Raises MeasurementError where the log lacks positions or torques, or is too short."""
-    joints = _positions(log, robot)
+    joints = positions_of(log, robot)
     torques = motor_torques(log, robot)
     if joints is None or torques is None:
         what = "joint positions" if joints is None else "torques of the drives"
@@ -105,15 +112,9 @@ def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
     if len(log) < processing.drop_rows + 10 * processing.keep_every:
         raise MeasurementError(f"the log of {robot.name} has only {len(log)} rows: too few for the filters")
     dt = float(np.median(np.diff(log.times_s)))
-    smooth = processing.filter_for(dt)
-    position = np.stack([smooth(q, dt) for q in joints.T], axis=1)
-    speed = np.gradient(position, dt, axis=0)
-    acceleration = np.gradient(speed, dt, axis=0)
     cut = slice(processing.drop_rows, None)
     return Motion(
-        position[cut],
-        speed[cut],
-        acceleration[cut],
+        *processing.differentiated(joints, dt),
         np.array(torques[cut]),
         at_rest(joints, dt, processing)[cut],
         None if log.external is None else np.array(log.external[cut]),
@@ -125,10 +126,15 @@ def at_rest(joints: Array, dt: float, processing: Processing) -> Mask:
     not rise by more than their noise allows. A filter smears the moment in which a joint sticks; the readings do not."""
     rows = max(int(0.5 / processing.filter_for(dt).cutoff_hz / dt) // 2 * 2 + 1, 5)
     slope = scipy.signal.savgol_filter(joints, rows, 1, deriv=1, delta=dt, axis=0)
-    noise = np.maximum(np.sqrt(np.median(roughness(joints), axis=0) / 0.455), FINEST * np.ptp(joints, axis=0))
+    noise = np.maximum(noise_of(joints), FINEST * np.ptp(joints, axis=0))
     still = np.abs(slope) <= REST_NOISE * noise * math.sqrt(12.0 / rows**3) / dt
     # A reversal is slow for a moment too: rest lasts.
     return np.asarray(scipy.ndimage.binary_opening(still, np.ones((REST_WINDOWS * rows, 1), dtype=bool)))
+
+
+def noise_of(readings: Array) -> Array:
+    """(M,) standard deviation of the noise of readings (T, M) of something smooth."""
+    return np.asarray(np.sqrt(np.median(roughness(readings), axis=0) / 0.455))
 
 
 def motor_torques(log: SensorLog, robot: Robot) -> Array | None:
@@ -143,7 +149,7 @@ def motor_torques(log: SensorLog, robot: Robot) -> Array | None:
     return None if read is None else np.concatenate([(read[:-1] + read[1:]) / 2, read[-1:]])
 
 
-def _positions(log: SensorLog, robot: Robot) -> Array | None:
+def positions_of(log: SensorLog, robot: Robot) -> Array | None:
     """(T, M) as the sensors read them, noise and all; else as the log knows them; None without."""
     read = _channels(log, robot, "position")
     return log.joints if read is None else read

@@ -18,11 +18,11 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.discrepancy.ways.force_balance.balance import Balance
-from ee_dist.discrepancy.ways.force_balance.motion import Processing, motion_of
+from ee_dist.discrepancy.ways.force_balance.motion import Processing
+from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.effects.catalogue import Hypothesis, apply
-from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -46,16 +46,18 @@ class ForceBalance(Problem):
 
     def __init__(self, trials: Sequence[MeasuredTrial], robot: Robot, processing: Processing | None = None) -> None:
         self.robot, self.measured = robot, tuple(trials)
-        self.processing = processing or Processing()
-        self.motions = [motion_of(t.log, robot, self.processing) for t in trials]
         self.models = [apply(robot, t.setup) for t in trials]
+        ready = prepared(trials, self.models, processing or Processing())
+        self.processing, self.motions, self.size, self.motion_noise = (
+            ready.processing,
+            ready.motions,
+            ready.size,
+            ready.noise,
+        )
         self.balances = [Balance(m, self.processing.keep_every) for m in self.motions]
-        names = robot.motor_names
-        every = self.processing.keep_every
-        forces = [decimated(m.torque, every) for m in self.motions]
-        self.size = np.sqrt(np.mean(np.concatenate(forces) ** 2, axis=0))
-        if not self.size.all():
-            raise MeasurementError(f"{names[int(np.argmin(self.size))]}: its measured torque is zero throughout")
+        forces = [decimated(m.torque, self.processing.keep_every) for m in self.motions]
+        self.let_through = ready.noise.first
+        """(M,): variance of the force that noise of the positions makes, with the base model."""
         # One share for all drives, so that the sum of squares is the relative error of all of them.
         self.noise_share = max(self._noise(forces), LEAST_NOISE)
         self.scale = self.size * self.noise_share
@@ -68,15 +70,17 @@ class ForceBalance(Problem):
         )
 
     def _noise(self, forces: Sequence[Array]) -> float:
-        """Noise of the force, as a share of it: from second differences. What a model accounts for is no noise, so the
-        least of what the measured force shows and of what the model as it is leaves over."""
-        left = [balance(model) for model, balance in zip(self.models, self.balances, strict=True)]
+        """Noise of the force left over, as a share of the force: from second differences. What a model accounts for is no
+        noise, so the least of what the model as it is leaves over, and of what the measured force shows and noise of the
+        positions adds to it."""
+        both = [balance(model) for model, balance in zip(self.models, self.balances, strict=True)]
+        left = [None if b is None else b[1] for b in both]
         found = []
-        for series in (forces, left):
+        for series, more in ((forces, self.let_through), (left, 0.0)):
             whole = [s for s in series if s is not None]
             if len(whole) == len(series):
                 parts = [np.median(roughness(s / self.size), axis=0) / 0.455 for s in whole]
-                found.append(float(np.sqrt(np.mean(parts))))
+                found.append(float(np.sqrt(np.mean(parts) + np.mean(more / self.size**2))))
         return min(found)
 
     def natural(self, error: float) -> float:
@@ -130,8 +134,14 @@ class ForceBalance(Problem):
         out = np.zeros((len(hypotheses), len(self.segment_of)))
         for row, hypothesis in enumerate(hypotheses):
             for k in chosen:
-                kept = self.balances[k](apply(self.models[k], hypothesis))
-                out[row, self.slices[k]] = np.inf if kept is None else (kept / self.scale).ravel()
+                model = apply(self.models[k], hypothesis)
+                kept = self.balances[k](model)
+                if kept is None:
+                    out[row, self.slices[k]] = np.inf
+                    continue
+                left = resting(kept[0] / self.scale, kept[1] / self.scale, self.balances[k].rest)
+                less = (self.let_through - self.motion_noise.variance(model)) / self.scale**2
+                out[row, self.slices[k]] = with_energy(left, less).ravel()
         return out
 
     def series(self, hypothesis: Hypothesis) -> list[Series]:

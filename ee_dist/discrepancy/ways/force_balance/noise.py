@@ -1,0 +1,163 @@
+"""What the noise of measured positions does to a balance of forces: twice differentiated, it becomes force.
+
+That force is not the drives', and it grows with what is carried: a lighter model turns less of it into force, and would look
+better for that alone, as in every regression with errors on both sides (Fuller 1987, Measurement Error Models, chapter 1). So
+the energy of a model's residual is told as if it let through as much noise as the base model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.problem import Mask
+from ee_dist.discrepancy.ways.force_balance.motion import Motion, Processing, motion_of, noise_of, positions_of
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.sampling import LowPass, decimated
+from ee_dist.robots.inverse_dynamics import parameters, regressor
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+BEARABLE = 0.2
+"""Share of a drive's force that noise may make before positions are smoothed more."""
+HOPELESS = 1.0
+"""Share from which what is left is noise, whatever the model."""
+FEWEST_ROWS = 60
+"""Rows of forces that smoothing leaves at least."""
+BENT = 1.5
+"""Standard deviations of the noise beyond which a filter takes away motion, and not noise alone."""
+
+
+NOISE, PLAIN = 3.5, 7.0
+"""Standard deviations up to which a force may be noise, and from which it is none."""
+
+
+def resting(held: Array, free: Array, rest: Mask) -> Array:
+    """(rows, M) what is left, in standard deviations, where friction that holds what rests has (``held``) and has not
+    (``free``) its say. It takes noise along with all else, and would look right for that alone: of what it takes, what may be
+    noise stays, and one standard deviation of what cannot be."""
+    size = np.abs(free)
+    noise = np.where(size <= NOISE, size, np.interp(size, (NOISE, PLAIN), (NOISE, 1.0)))
+    return np.where(rest & (np.abs(held) < size), np.sign(free) * np.maximum(noise, np.abs(held)), held)
+
+
+def with_energy(left: Array, more: Array) -> Array:
+    """(rows, M) with ``more`` (M,) added to each square, which stays positive."""
+    return np.copysign(np.sqrt(np.maximum(left**2 + more, 0.0)), left)
+
+
+MOVING = 2
+"""Columns of a noise regressor beside those of the masses: acceleration and speed of the joint itself."""
+
+
+class MotionNoise:
+    """By drive: mean products (M, P, P) of the columns of a noise regressor, so that a model's noise is a quadratic form.
+
+    The columns are the inertial parameters, rotor inertia and viscous friction.
+    """
+
+    def __init__(
+        self,
+        trials: Sequence[MeasuredTrial],
+        models: Sequence[Robot],
+        motions: Sequence[Motion],
+        processing: Processing,
+    ) -> None:
+        sums, rows = 0.0, 0
+        for k, (trial, model, motion) in enumerate(zip(trials, models, motions, strict=True)):
+            noise = decimated(_added(trial, model, motion, processing, k), processing.keep_every)
+            sums = sums + np.einsum("tmp,tmq->mpq", noise, noise)
+            rows += len(noise)
+        self.products = np.asarray(sums) / rows
+        self.first = np.mean([self.variance(m) for m in models], axis=0)
+
+    def variance(self, robot: Robot) -> Array:
+        """(M,) of the force that noise makes at each drive, in terms of its measured force. A robot that has lost parts is told
+        by its first model's noise."""
+        masses, found = parameters(robot), np.empty(len(robot.drives))
+        if len(masses) + MOVING != self.products.shape[1]:
+            return self.first
+        for k, d in enumerate(robot.drives):
+            column = np.array([*masses, d.rotor_inertia, d.viscous])
+            through = max(d.strength * d.current_gain, 1e-3)
+            found[k] = column @ self.products[k] @ column / through**2
+        return found
+
+
+def _added(trial: MeasuredTrial, model: Robot, motion: Motion, processing: Processing, number: int) -> Array:
+    """(T, M, P): the regressor of the measured motion with noise of the same size once more, less without it."""
+    joints = positions_of(trial.log, model)
+    assert joints is not None
+    dt = float(np.median(np.diff(trial.log.times_s)))
+    drawn = np.random.default_rng([len(joints), number]).normal(size=joints.shape) * noise_of(joints)
+    position, speed, acceleration = processing.differentiated(drawn, dt)
+    moved = (motion.position + position, motion.speed + speed, motion.acceleration + acceleration)
+    more = regressor(model, *moved) - regressor(model, motion.position, motion.speed, motion.acceleration)
+    return np.concatenate([more, acceleration[:, :, None], speed[:, :, None]], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Measured motions, how they were processed, and what noise does to them; ``size`` (M,): root mean square of the force."""
+
+    processing: Processing
+    motions: list[Motion]
+    noise: MotionNoise
+    size: Array
+
+
+def prepared(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
+    """Motions smoothed as much as their noise asks for, and no more than the motion bears, unless a filter is given.
+
+    Raises MeasurementError where noise is all that would be left.
+    """
+    found = _tried(trials, models, processing)
+    if processing.low_pass is not None:
+        return found
+    while _share(found, models) > BEARABLE:
+        more = _smoother(trials, models, found)
+        if more is None:
+            break
+        found = _tried(trials, models, more)
+    share = _share(found, models)
+    if share > HOPELESS:
+        raise MeasurementError(
+            f"the noise of the measured positions, differentiated twice, makes forces of {100 * share:.0f} % of those measured: "
+            "too much for a balance of forces; compare by task.by=free_run or task.by=open_loop, or record finer positions"
+        )
+    return found
+
+
+def _tried(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
+    motions = [motion_of(t.log, model, processing) for t, model in zip(trials, models, strict=True)]
+    forces = np.concatenate([decimated(m.torque, processing.keep_every) for m in motions])
+    size = np.sqrt(np.mean(forces**2, axis=0))
+    if not size.all():
+        raise MeasurementError(f"{models[0].motor_names[int(np.argmin(size))]}: its measured torque is zero throughout")
+    return Prepared(processing, motions, MotionNoise(trials, models, motions, processing), size)
+
+
+def _share(found: Prepared, models: Sequence[Robot]) -> float:
+    return float(np.max(np.sqrt(found.noise.variance(models[0])) / found.size))
+
+
+def _smoother(trials: Sequence[MeasuredTrial], models: Sequence[Robot], found: Prepared) -> Processing | None:
+    """Half the bandwidth; None where that would leave too little of the rows, or take away motion. Forces lead the way: what
+    the positions' filter dampens would otherwise be missing from the motion and not from the force."""
+    old = found.processing
+    dt = float(np.median(np.diff(trials[0].log.times_s)))
+    slower = 1 if old.low_pass is None else 2
+    low_pass = LowPass(old.filter_for(dt).cutoff_hz / slower)
+    more = replace(old, low_pass=low_pass, drop_rows=slower * old.drop_rows, keep_every=2 * old.keep_every)
+    for trial, model in zip(trials, models, strict=True):
+        joints = positions_of(trial.log, model)
+        assert joints is not None
+        if len(joints) < more.drop_rows + FEWEST_ROWS * more.keep_every:
+            return None
+        away = joints[more.drop_rows :] - more.differentiated(joints, dt)[0]
+        if (np.sqrt(np.mean(away**2, axis=0)) > BENT * noise_of(joints)).any():
+            return None
+    return more
