@@ -131,6 +131,11 @@ class Problem(ABC):
         """What this way alone can say about what a model leaves, in lines for people."""
         return []
 
+    @property
+    def notes(self) -> list[str]:
+        """What of these measurements is not compared, or not as it was recorded, and why: every verb says so."""
+        return []
+
     @cached_property
     def trials(self) -> tuple[str, ...]:
         return tuple(t.name for t in self.measured)

@@ -186,7 +186,7 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     )
     sure += f"; the noise floor is {found.floor_source}."
     settled = ratio < CLOSE and not left
-    return Account(head, error, sure, tuple(lines), settled, CONTENT if settled else "")
+    return Account(head, error, sure, (*lines, *problem.notes), settled, CONTENT if settled else "")
 
 
 def _times(ratio: float) -> str:
@@ -263,7 +263,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     elif best is not None and best.tied_with:
         advice = PLANNED
     good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
-    return Account(head, error, sure, tuple(lines), good, advice)
+    return Account(head, error, sure, (*lines, *problem.notes), good, advice)
 
 
 def _error(problem: Problem) -> str:
@@ -368,7 +368,7 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         sure = f"How sure: {share}, judged on {last.held_out}{_rest(found.explained, settled)}"
         sure += f"{_ranges(found, [t for _, mine in phrases[:NAMED] if len(mine) == 1 for t in mine], robot)}{_told_from(steps)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
-    return Account(head, error, sure, tuple(lines), settled, advice)
+    return Account(head, error, sure, (*lines, *problem.notes), settled, advice)
 
 
 def added(found: Improvement) -> list[Term]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.evidence.judge import LUCK
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.examine import Effort
@@ -22,6 +23,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import from_entries, of_trial, to_entries
+from ee_dist.discrepancy.words import compare_account
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.contract import Engine
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
@@ -80,7 +82,9 @@ def test_how_most_sensors_are_is_not_what_is_wrong_with_one(mujoco: MuJoCoEngine
     names = {c.name for c in pool_of(p)}
     assert (f"sensor_dropout@{first}" in names, f"sensor_quantisation@{first}" in names) == (single, single)
     assert "sensor_noise@roll" in names and f"sensor_stuck@{first}" in names, "others are told by other marks"
-    assert len(p.remarks(())) == (0 if single else 1)
+    assert len(p.notes) == (0 if single else 1)
+    account = compare_account(p, compare(p, p.residuals([()])[0]), [])
+    assert set(p.notes) <= set(account.words), "every verb says so"
     left_out = p.residuals([()])[0]
     p.repeating = frozenset()
     assert (float(left_out @ left_out) == pytest.approx(float((p.residuals([()])[0] ** 2).sum()))) == single

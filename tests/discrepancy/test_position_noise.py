@@ -49,6 +49,14 @@ def test_what_is_hidden_is_found_all_the_same() -> None:
     assert samples()["pendulum"].hidden[0].name in [j.name for j in found.tied]
 
 
+def test_more_smoothing_than_usual_is_told() -> None:
+    assert pendulum(2e-4).notes == []
+    sample = samples()["stage"]
+    sample = replace(sample, robot=with_noise(sample.robot, 2e-3))
+    (note,) = problem_by("force_balance", measure(sample, ()), sample.robot).notes
+    assert "smoothed more than usual" in note
+
+
 def test_positions_that_say_nothing_of_forces_are_refused_and_why() -> None:
     with pytest.raises(MeasurementError, match=r"too much for a balance of forces; compare by task.by=free_run"):
         pendulum(0.05)

@@ -44,7 +44,7 @@ def account(tied: list[str], explained: float = 1.0) -> Account:
         tried=9,
         as_it_was=False,
     )
-    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="")
+    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[])
     return explain_account(problem, found, None)  # type: ignore[arg-type]
 
 
@@ -108,7 +108,7 @@ def compared(error: float, left: list[Leftover]) -> Account:
         error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={}, channels=[SimpleNamespace(name="a_b")]
     )  # fmt: skip
     problem = SimpleNamespace(
-        told=str, natural=lambda e: e**2, natural_name="error", natural_unit="mm", channels=("a_b",), trials=("sway",)
+        told=str, natural=lambda e: e**2, natural_name="error", natural_unit="mm", notes=[], channels=("a_b",), trials=("sway",)
     )
     return compare_account(problem, found, left)  # type: ignore[arg-type]
 
@@ -147,7 +147,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         held_out="motions that were not fitted",
     )  # fmt: skip
     start = SimpleNamespace(added=(), dropped=(), tied_with=[], error_heldout=5.0, held_out="", name="")
-    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="")
+    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[])
     for verdict, share, said in (
         (EXPLAINED, 1.0, "Nothing else is left above the noise."),
         (BETTER, 0.9979, "More than noise is left on motions that were not fitted: 99.7 % of"),

@@ -47,7 +47,8 @@ class ForceBalance(Problem):
     def __init__(self, trials: Sequence[MeasuredTrial], robot: Robot, processing: Processing | None = None) -> None:
         self.robot, self.measured = robot, tuple(trials)
         self.models = [apply(robot, t.setup) for t in trials]
-        ready = prepared(trials, self.models, processing or Processing())
+        self.asked = processing or Processing()
+        ready = prepared(trials, self.models, self.asked)
         self.processing, self.motions, self.size, self.motion_noise = (
             ready.processing,
             ready.motions,
@@ -169,6 +170,16 @@ class ForceBalance(Problem):
         for k, unit in enumerate(self.layout.units):
             lines += describe(self.remains(hypothesis, k), unit, "m" if unit == "N" else "rad")
         return lines
+
+    @property
+    def notes(self) -> list[str]:
+        if self.processing.keep_every <= self.asked.keep_every:
+            return []
+        step_s = float(np.median(np.diff(self.measured[0].log.times_s)))
+        return [
+            f"The positions are so noisy that they were smoothed more than usual: motion and forces above "
+            f"{0.5 / (self.processing.keep_every * step_s):.2g} Hz are not compared."
+        ]
 
     def noise_floor(self) -> tuple[float, str]:
         return 1.0, "estimated: second differences of the force"

@@ -138,7 +138,8 @@ class OpenLoop(Problem):
         members = members_of(self.robot, target, self.robot.sensor_names) or (target,)
         return not any(x.kind in self.repeating for x in self.robot.sensors if x.name in members)
 
-    def remarks(self, hypothesis: Hypothesis) -> list[str]:
+    @property
+    def notes(self) -> list[str]:
         return [
             f"Most {kind} sensors repeat readings more often than the model's (coarse steps, rows that were filled "
             "in): how often they do is not compared."
