@@ -48,10 +48,11 @@ class Everywhere:
 
 
 def everywhere(
-    search: Search, current: Current, own: int, pool: Sequence[Candidate], cuts: Sequence[Cut]
+    search: Search, current: Current, own: int, pool: Sequence[Candidate], cuts: Sequence[Cut], again: bool = False
 ) -> Everywhere | None:
     """On top of the current model, whose first ``own`` parts stay. None where it does not earn its place on the data held out
-    in each of ``cuts``."""
+    in each of ``cuts``. ``again``: after such effects were added, only from neutral: beside what was added since, and beside
+    whatever else promises most, for its twin may have been added."""
     as_it_is = search.on(current.hypothesis).base()
     without = [as_it_is for _ in cuts]
     if current.parts:
@@ -59,7 +60,7 @@ def everywhere(
         without = [cross_fit(search, [(model, current.u)], cut)[0].residual for cut in cuts]
     calm = search.among(calm_trials(search.problem, as_it_is))
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
-    found, places = look.kept(current), Model(current.parts).places
+    found, places = None if again else look.kept(current), Model(current.parts).places
     for keep in _instead(current, own):
         base = Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
         other = look.kept(base, more=not keep[own:])

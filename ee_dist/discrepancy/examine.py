@@ -24,6 +24,7 @@ from ee_dist.discrepancy.search.scan import Scanned, scan
 from ee_dist.discrepancy.search.screen import Screened, screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, slopes_at
+from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.groups import ALL_JOINTS
 from ee_dist.trials.log import Array
@@ -170,7 +171,10 @@ def under(
     models = [(Model((*current.parts, *p.parts)), np.concatenate([current.u, u])) for p, u in starts]
     without = base
     if len(current.u):
-        without = cross_fit(search, [(Model(current.parts), current.u)], cut)[0].residual
+        # Of many values, fits that know the slopes stay nearer to where all data put them than fits that do not: a useless
+        # effect would look right for that alone.
+        same = leading if len(current.u) >= LARGE else None
+        without = cross_fit(search, [(Model(current.parts), current.u)], cut, leading=same)[0].residual
     outcomes = cross_fit(search, models, cut, leading=leading)
     return ranked(
         [

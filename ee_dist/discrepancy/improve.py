@@ -35,7 +35,7 @@ from ee_dist.trials.log import Array
 FEW = 1
 """Effects that the search adds before it looks whether much is a little wrong everywhere, if the next one does not do."""
 OFTEN = 1
-"""How often all that is a little wrong everywhere is fitted anew after that."""
+"""How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it."""
 EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
 MOST = 24
@@ -74,7 +74,7 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             ladder.append(_rung(search, judged))
     else:
-        exchanges, looked, spread = 0, -1, 0
+        exchanges, looked, spread, anew = 0, -1, 0, 0
         stopped = f"{most} effects were added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             names = {c.name for c in current.parts}
@@ -85,10 +85,10 @@ def improve(
                 if kept is not None:
                     last, current = kept, Current(current.parts, values_of(current.parts, before))
             best = last.best
-            again = len(current.parts) != looked and spread <= OFTEN
-            if again and _many(search, last, len(current.parts) - own, spread > 0):
-                found = everywhere(search, current, own, pool, travelling(problem))
-                looked = len(current.parts)
+            ready = len(current.parts) != looked and anew < OFTEN and (not spread or _special(current, own))
+            if ready and _many(search, last, len(current.parts) - own, spread > 0):
+                found = everywhere(search, current, own, pool, travelling(problem), again=spread > 0)
+                looked, anew = len(current.parts), anew + (spread > 0)
                 if found is not None:
                     current, looked, spread = found.current, len(found.current.parts), spread + 1
                     ladder += found.rungs
@@ -121,6 +121,8 @@ def improve(
             current, rung.dropped = without_useless(
                 search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool)
             )
+            if len(current.u) >= LARGE:
+                _as_thoroughly(search, current, best.outcome.cut, rung)
             ladder.append(rung)
         if spread:
             current, gone = told_only(search, current, own, _cut(problem), len(pool))
@@ -134,6 +136,11 @@ def _examined(search: Search, current: Current, pool: Sequence[Candidate], effor
     if search.problem.rugged and len(current.u) >= LARGE:
         return examine(search.on(current.hypothesis), Current(), pool, effort)
     return examine(search, current, pool, effort)
+
+
+def _special(current: Current, own: int) -> bool:
+    """Whether something was added that is no small wrong everywhere."""
+    return any(not c.effect.everywhere for c in current.parts[own:])
 
 
 def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
@@ -174,6 +181,13 @@ def _refitted(
         cut.name,
         dropped=dropped,
     )
+
+
+def _as_thoroughly(search: Search, current: Current, cut: Cut, rung: Rung) -> None:
+    """Errors of a step from fits as thorough as those of all that is a little wrong everywhere, so that steps compare."""
+    (held,) = cross_fit(search, [(Model(current.parts), current.u)], cut)
+    rung.error_fit, rung.error_heldout = float(np.sqrt(held.seen)), error(held.residual)
+    rung.held = per_segment(search.problem, held.residual)
 
 
 def _asked(search: Search, current: Current, c: Candidate) -> Judged:

@@ -108,7 +108,13 @@ def compared(error: float, left: list[Leftover]) -> Account:
         error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={}, channels=[SimpleNamespace(name="a_b")]
     )  # fmt: skip
     problem = SimpleNamespace(
-        told=str, natural=lambda e: e**2, natural_name="error", natural_unit="mm", notes=[], channels=("a_b",), trials=("sway",)
+        told=str,
+        natural=lambda e: e**2,
+        natural_name="error",
+        natural_unit="mm",
+        notes=[],
+        channels=("a_b",),
+        trials=("sway",),
     )
     return compare_account(problem, found, left)  # type: ignore[arg-type]
 

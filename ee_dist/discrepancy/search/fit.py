@@ -40,8 +40,9 @@ def fit_all(
     if large:
         small = [i for i in range(len(starts)) if i not in large]
         found = dict(zip(small, fit_all(search, [starts[i] for i in small], mask, widths, prior), strict=True))
-        count = ITERATIONS if len(widths) > 2 else SHORT
-        fits = follow_valley(search, [starts[i] for i in large], chosen, prior, count, widths[:1])
+        far = len(widths) > 2
+        count = ITERATIONS if far else SHORT
+        fits = follow_valley(search, [starts[i] for i in large], chosen, prior, count, widths[:1], settled=not far)
         found |= dict(zip(large, fits, strict=True))
         return [found[i] for i in range(len(starts))]
     if not search.problem.rugged:

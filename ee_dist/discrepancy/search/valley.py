@@ -50,10 +50,11 @@ def follow_valley(
     prior: float = 0.0,
     iterations: int = ITERATIONS,
     widths: Sequence[float] = (WIDEST,),
+    settled: bool = False,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given, all in step: the best
-    of a descent from each of ``widths``. ``prior`` as in slopes.py; ``slopes`` of the results are those of the smooth residual,
-    weighed."""
+    of a descent from each of ``widths``, of which the last steps follow ever narrower slopes, unless the start is ``settled``
+    in a valley already. ``prior`` as in slopes.py; ``slopes`` of the results are those of the smooth residual, weighed."""
     whole, problem = search, search.problem
     needed = np.unique(problem.trial_of[mask]).tolist()
     search = search.among(needed if search.trials is None else [k for k in search.trials if k in set(needed)])
@@ -71,7 +72,7 @@ def follow_valley(
         _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
         moving = [run for run in moving if np.isfinite(run.energy)]
         _slopes(moving, search, mask)
-        _steps(moving, search, mask, prior, step)
+        _steps(moving, search, mask, prior, step, NARROWEST if not settled else np.inf)
         search.progress("fitting all together", (step + 1) / iterations)
     best = [min(runs[k : k + len(widths)], key=lambda r: r.energy) for k in range(0, len(runs), len(widths))]
     rows = np.array([run.residual for run in best])
@@ -123,7 +124,8 @@ def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
         run.slopes, run.weighed = np.stack(columns, axis=1), weight * smooth
 
 
-def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step: int) -> None:
+def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step: int, last: float) -> None:
+    """``last``: width from which a step that takes next to nothing ends the descent."""
     points = [(run, d, _step(run, prior, d)) for run in runs for d in run.damping * np.array(DAMPINGS)]
     rows = search.residuals([run.model.hypothesis(v) for run, _, v in points])
     count = len(DAMPINGS)
@@ -137,7 +139,7 @@ def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step:
         else:
             run.damping = min(100.0 * run.damping, 1e6)
         if before - run.energy < GAIN * before:
-            run.done = run.width <= NARROWEST
+            run.done = run.width <= last
             run.width = max(0.5 * run.width, NARROWEST)
         elif step % 2:
             run.width = max(0.7 * run.width, NARROWEST)
