@@ -172,14 +172,15 @@ class _Look:
         return [c for c in self.pool if c.name not in names]
 
     def steps(self, found: _Kept) -> Everywhere:
-        """One step a kind of effect, those that matter most first; kinds that help only together are one step."""
+        """One step a kind of effect, those that matter most first; kinds that help only together, or are better than the model
+        before only together, are one step."""
         search, problem, kept, own = self.search, self.search.problem, found.model, self.own
         places = Model(kept.parts).places
         names = {c.name for c in self.current.parts}
         gone = tuple(c.name for c in self.current.parts[own:] if c.name not in {p.name for p in kept.parts})
         # What the ladder has already is not shown as a step again.
         chosen = [k for k, c in enumerate(kept.parts) if k < own or c.name in names]
-        shown, energy = set(chosen), np.inf
+        shown, energy = set(chosen), next(float(r @ r) for cut, r in self.cuts if cut is found.cut)
         rungs: list[Rung] = []
         order = self._order(kept)
         for kind in order:

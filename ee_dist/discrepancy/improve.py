@@ -38,6 +38,8 @@ OFTEN = 1
 """How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it."""
 EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
+CLOSE = 1.3
+"""Error over the noise floor up to which no more than noise is left where no curve stands out."""
 MOST = 24
 """Effects that are added at most unless told otherwise."""
 NO_MORE = "no further effect earns its place: {why}"
@@ -105,7 +107,9 @@ def improve(
                     ladder.append(rung)
                     continue
                 nearest = last.judged[0].why_not if last.judged else LUCK
-                stopped = NO_MORE.format(why=nearest) if leftovers(problem, last.base) else NOTHING_LEFT
+                stopped = NO_MORE.format(why=nearest)
+                if _settled(leftovers(problem, last.base), ladder[-1].error_heldout, problem.noise_floor()[0]):
+                    stopped = NOTHING_LEFT
                 break
             model, start = best.model, best.u
             if len(model.parts) == len(best.proposal.parts):
@@ -301,6 +305,11 @@ def _finish(
 
 
 def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor: float) -> str:
-    if not left and error_after <= 1.3 * floor:
+    if _settled(left, error_after, floor):
         return EXPLAINED if changed else NOTHING_MISSING
     return BETTER if changed else UNEXPLAINED
+
+
+def _settled(left: Sequence[Leftover], error_after: float, floor: float) -> bool:
+    """Whether no more than noise is left: no curve stands out, nor all of them together."""
+    return not left and error_after <= CLOSE * floor
