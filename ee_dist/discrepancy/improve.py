@@ -125,7 +125,7 @@ def improve(
             current, rung.dropped = without_useless(
                 search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool)
             )
-            if len(current.u) >= LARGE:
+            if len(current.u) >= LARGE and not problem.rugged:
                 _as_thoroughly(search, current, best.outcome.cut, rung)
             ladder.append(rung)
         if spread:

@@ -29,10 +29,10 @@ FEWEST_ROWS = 60
 """Rows of forces that smoothing leaves at least."""
 BENT = 1.5
 """Standard deviations of the noise beyond which a filter takes away motion, and not noise alone."""
-
-
 NOISE, PLAIN = 3.5, 7.0
 """Standard deviations up to which a force may be noise, and from which it is none."""
+MOVING = 2
+"""Columns of a noise regressor beside those of the masses: acceleration and speed of the joint itself."""
 
 
 def resting(held: Array, free: Array, rest: Mask) -> Array:
@@ -47,10 +47,6 @@ def resting(held: Array, free: Array, rest: Mask) -> Array:
 def with_energy(left: Array, more: Array) -> Array:
     """(rows, M) with ``more`` (M,) added to each square, which stays positive."""
     return np.copysign(np.sqrt(np.maximum(left**2 + more, 0.0)), left)
-
-
-MOVING = 2
-"""Columns of a noise regressor beside those of the masses: acceleration and speed of the joint itself."""
 
 
 class MotionNoise:
