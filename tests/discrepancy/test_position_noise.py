@@ -52,7 +52,7 @@ def test_what_is_hidden_is_found_all_the_same() -> None:
 def test_more_smoothing_than_usual_is_told() -> None:
     assert pendulum(2e-4).notes == []
     sample = samples()["stage"]
-    sample = replace(sample, robot=with_noise(sample.robot, 2e-3))
+    sample = replace(sample, robot=with_noise(sample.robot, 4e-4))
     (note,) = problem_by("force_balance", measure(sample, ()), sample.robot).notes
     assert "smoothed more than usual" in note
 
