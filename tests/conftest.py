@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
 from ee_dist.effects import catalogue, laws
 from ee_dist.viewing.browser import BrowserError, HeadlessBrowser, chromium
+
+# How long an example takes says what else the machine does.
+settings.register_profile("without a clock", deadline=None)
+settings.load_profile("without a clock")
 
 
 @pytest.fixture(autouse=True)
