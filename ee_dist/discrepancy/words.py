@@ -91,7 +91,23 @@ def told(term: Term, robot: Robot | None = None) -> str:
 
 
 def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
+    if value < 0 and CATALOGUE[term.effect].parameter(key).on_top:
+        return f"{-value:.3g}{_unit(term, key, robot)} less than described"
     return f"{value:.3g}{_unit(term, key, robot)}"
+
+
+def _less(terms: Hypothesis) -> bool:
+    """Whether all of it is to be taken off what is described."""
+    main = [(CATALOGUE[t.effect].parameters[:1], t.values[:1]) for t in terms]
+    return all(p and v and p[0].on_top and v[0][1] < 0 for p, v in main)
+
+
+def _span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> str:
+    unit = _unit(term, key, robot)
+    if CATALOGUE[term.effect].parameter(key).on_top and low < 0:
+        more = f"{high:.3g}{unit} more" if high > 0 else f"{-high:.3g}{unit} less"
+        return f"{-low:.3g}{unit} less to {more} than described"
+    return f"{low:.3g} to {high:.3g}{unit}"
 
 
 def quantity(term: Term, key: str, robot: Robot | None = None) -> str:
@@ -150,7 +166,7 @@ def _range_of(terms: Hypothesis, robot: Robot | None) -> str:
     shown = []
     for key, _ in terms[0].values:
         low, high = (f(dict(t.values)[key] for t in terms) for f in (min, max))
-        shown.append(f"{quantity(terms[0], key, robot)} {low:.3g} to {_value(terms[0], key, high, robot)}".strip())
+        shown.append(f"{quantity(terms[0], key, robot)} {_span(terms[0], key, low, high, robot)}".strip())
     values = f" ({', '.join(shown)})" if shown else ""
     return f"{plain(terms[0].effect)} at {len(terms)} {where}{values}"
 
@@ -228,13 +244,15 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         advice = CONTENT
     elif found.verdict == EFFECT and best is not None:
         entry, last = CATALOGUE[best.terms[0].effect], best.error_heldout
-        head = f"Missing{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best)}."
+        less = _less(best.terms)
+        head = f"{'Too much' if less else 'Missing'}{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best)}."
         head += f" {NOTHING_ELSE}" if not found.left else " More than noise is left with it."
         error = _errors(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
         sure = f"How sure: it takes off {confidence(best)}{_rest(best.explained, not found.left)}"
         sure += f"; {_rivals(found.tried, best.tied_with)}."
         lines.append(entry.physics)
-        lines.append(f"Its mark in a residual: {entry.signature}")
+        turned = " Here the other way round: the model has too much of it." if less else ""
+        lines.append(f"Its mark in a residual: {entry.signature}{turned}")
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:

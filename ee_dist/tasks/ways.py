@@ -21,12 +21,14 @@ from ee_dist.tasks.wiring import ONE_JOINT, evaluator_of
 
 @dataclass(frozen=True)
 class Way:
-    """``make`` builds the problem; ``why`` is what speaks for it; ``moves``: whether it can follow a body that moves about."""
+    """``make`` builds the problem; ``why`` is what speaks for it; ``moves``: whether it can follow a body that moves about;
+    ``commanded``: whether it needs to know what the drives were told."""
 
     name: str
     why: str
     make: Callable[[Measurements, Config], Problem]
     moves: bool = False
+    commanded: bool = True
 
 
 def open_loop(measured: Measurements, config: Config) -> OpenLoop:
@@ -65,6 +67,7 @@ WAYS: dict[str, Way] = {
             "force_balance",
             "torques of the drives were recorded: they are set against what the motion needed, nothing is simulated",
             _force_balance,
+            commanded=False,
         ),
     )
 }
@@ -77,6 +80,14 @@ def _seen(measured: Measurements) -> bool:
     return positions and all(t.log.joints is not None for t in measured.trials)
 
 
+def _nothing_commanded(measured: Measurements, by: str) -> str:
+    silent = next(t.name for t in measured.trials if not np.isfinite(t.log.commands).all(axis=1).any())
+    return (
+        f"task.by={by}: trial {silent} holds no commands, so there is nothing to simulate it by; with torques of the drives "
+        "in the log task.by=force_balance compares it, otherwise import it with its commands"
+    )
+
+
 def known_way(by: str) -> None:
     """Raises ConfigError where there is no such way: to be said before logs are read."""
     one_of("task.by", by, (AUTO, *WAYS))
@@ -85,8 +96,8 @@ def known_way(by: str) -> None:
 def way_of(measured: Measurements, by: str) -> Way:
     """The way asked for; for ``auto`` the first that the channels allow. Raises ConfigError for one that cannot be."""
     known_way(by)
+    driven = all(np.isfinite(t.log.commands).all(axis=1).any() for t in measured.trials)
     if by == AUTO:
-        driven = all(np.isfinite(t.log.commands).all(axis=1).any() for t in measured.trials)
         torques = all(
             t.log.joints is not None and motor_torques(t.log, measured.robot) is not None for t in measured.trials
         )
@@ -96,6 +107,8 @@ def way_of(measured: Measurements, by: str) -> Way:
             # A controller may stand behind recorded torques (an arm's currents), so forces are balanced where they were measured.
             by = "free_run"
     way = WAYS[by]
+    if way.commanded and measured.trials and not driven:
+        raise ConfigError(_nothing_commanded(measured, by))
     if measured.robot.free_base and not way.moves:
         raise ConfigError(f"task.by={by}: {measured.robot.name} moves about; use task.by=open_loop")
     if measured.calibrated_by and measured.calibrated_by != by:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pytest
 from effect_robots import slider
@@ -11,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ee_dist.effects import CATALOGUE, EffectError, Parameter, Term, apply, effect, term
-from ee_dist.effects.catalogue import from_dict
+from ee_dist.effects.catalogue import find, from_dict
 from ee_dist.effects.targets import motors
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped import quadruped
+from ee_dist.robots.servo_pendulum import servo_pendulum
 
 QUADRUPED = quadruped()
 
@@ -81,8 +83,23 @@ def test_an_unknown_effect_names_the_nearest() -> None:
 def test_a_value_out_of_bounds_names_the_bounds() -> None:
     with pytest.raises(EffectError, match=r"motor_weak: loss = 1.2 lies outside \[0, 1\]"):
         term("motor_weak", "hip_front_left", loss=1.2)
-    with pytest.raises(EffectError, match=r"coulomb_friction: torque_nm = -1 lies outside \[0, inf\] N.m"):
-        term("coulomb_friction", "hip_front_left", torque_nm=-1.0)
+    with pytest.raises(EffectError, match=r"stribeck_friction: torque_nm = -1 lies outside \[0, inf\] N.m"):
+        term("stribeck_friction", "hip_front_left", torque_nm=-1.0, speed_rad_s=0.1)
+
+
+@pytest.mark.parametrize(
+    ("effect", "key", "law"),
+    [("coulomb_friction", "torque_nm", "coulomb"), ("viscous_friction", "damping_nm_s_rad", "viscous")],
+)
+def test_friction_that_is_described_can_be_taken_off_and_no_more(effect: str, key: str, law: str) -> None:
+    robot = servo_pendulum()
+    assert find(effect).bounds(robot, "servo")[key][0] == 0.0
+    rough = robot.map_drive("servo", lambda d: replace(d, **{law: 0.3}))
+    assert find(effect).bounds(rough, "servo")[key][0] == -0.3
+    assert getattr(apply(rough, (term(effect, "servo", **{key: -0.2}),)).drives[0], law) == pytest.approx(0.1)
+    assert getattr(apply(rough, (term(effect, "servo", **{key: -0.3}),)).drives[0], law) == 0.0
+    with pytest.raises(EffectError, match=rf"servo has 0.3 of {law} friction; 0.4 cannot be taken off it"):
+        apply(rough, (term(effect, "servo", **{key: -0.4}),))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])

@@ -146,6 +146,21 @@ def test_auto_takes_the_first_way_that_the_channels_allow(cli, imported):
     assert "By open_loop: commands were recorded" in said.out
 
 
+def test_a_log_of_torques_without_commands_is_compared_and_explained(cli, record, tmp_path):
+    """What arms led by a controller of their own record: where they were and what their motors gave."""
+    mapping = yaml.safe_load((record / "mapping.yaml").read_text())
+    del mapping["commands"]
+    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(mapping))
+    found, _ = run(cli, "task=import", f"measured={record}", f"task.mapping={tmp_path / 'mapping.yaml'}")
+    log = f"measured={found / 'measured.mcap'}"
+    explained, said = run(cli, "task=explain", log, SUSPECTS, *QUICK)
+    content = json.loads((explained / "summary.json").read_text())
+    assert content["way"] == "force_balance" and content["candidates"][0]["name"] == HIDDEN
+    told_alike(explained, said)
+    outcome = cli("task=compare", log, "task.by=open_loop", *QUICK)
+    assert outcome.status == 2 and outcome.err.count("\n") == 1 and "holds no commands" in outcome.err
+
+
 @pytest.mark.parametrize("by", WAYS)
 def test_a_sealed_trial_is_explained_improved_and_revealed(cli, by):
     plan = "task.excitations=['multisine:seconds=1.6,amplitude=0.2,seed=1','steps:seconds=1.6,amplitude=0.15,seed=2']"

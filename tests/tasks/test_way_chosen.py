@@ -12,7 +12,7 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
-from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
+from ee_dist.tasks.config import Config, ConfigError, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.ways import AUTO, way_of
 from ee_dist.trials.log import SensorLog
@@ -49,3 +49,17 @@ def test_where_torques_lead_the_model_starts_anew_and_slopes_are_trusted() -> No
     assert not free.rugged and held.rugged
     assert len(free.pieces) > 1 and len(held.pieces) == 1
     assert max(len(p.log) for p in free.pieces) * free.robot.time_step_s <= RESTART_S + 0.1
+
+
+def test_without_commands_forces_are_balanced_and_nothing_can_be_simulated() -> None:
+    """Arms led by a controller of their own are often recorded with torques and without what the controller was told."""
+    known = measured("position")
+    silent = replace(known.trials[0].log, commands=np.full_like(known.trials[0].log.commands, np.nan))
+    torques = 0.01 * np.sin(silent.times_s)[:, None]
+    with_torques = replace(known, trials=(MeasuredTrial("a", replace(silent, torques=torques)),))
+    assert way_of(with_torques, AUTO).name == "force_balance"
+    for by in ("open_loop", "free_run"):
+        with pytest.raises(ConfigError, match=rf"task.by={by}: trial a holds no commands, .*task.by=force_balance"):
+            way_of(with_torques, by)
+    with pytest.raises(ConfigError, match="trial a holds no commands"):
+        way_of(replace(known, trials=(MeasuredTrial("a", silent),)), AUTO)

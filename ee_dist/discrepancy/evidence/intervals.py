@@ -20,6 +20,7 @@ FEW = 3
 """Trials from which they are the pieces that vary; with fewer, segments are."""
 NOT_DETERMINED = "not determined by these data"
 BOUND = "at its bound: the range is too small, or the effect is another"
+NONE_LEFT = "at its bound: next to none is left of what was described"
 NEUTRAL = "not told from neutral"
 
 
@@ -50,7 +51,7 @@ def parameters(problem: Problem, fit: Fit) -> list[ParameterReport]:
             if not np.isfinite(half) or half > max(abs(rooms[k]), 1e-12):
                 flag = NOT_DETERMINED
             elif abs(u[k]) > AT_BOUND:
-                flag = BOUND
+                flag = NONE_LEFT if u[k] < 0 and c.effect.parameters[k].on_top else BOUND
             elif abs(u[k]) < s[k]:
                 flag = NEUTRAL
             out.append(ParameterReport(index, name, value, value - half, value + half, flag))

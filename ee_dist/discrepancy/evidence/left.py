@@ -18,6 +18,8 @@ VARIES = 1.0
 EVENT = 170.0
 """Energy of a few values that come a row early or late, at a contact or a reversal: a model good to the noise still misses
 some. It is granted where the scale of a channel is wider than its noise."""
+MANY = 1000
+"""Standard deviations beyond which a number says no more."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class Leftover:
 
     def __str__(self) -> str:
         shape = "slow" if self.trend else "quick"
-        return f"{self.channel} during {self.trial} ({shape}, {self.z:.0f} standard deviations above noise)"
+        far = f"{self.z:.0f}" if self.z < MANY else f"more than {MANY}"
+        return f"{self.channel} during {self.trial} ({shape}, {far} standard deviations above noise)"
 
 
 def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[Leftover]:

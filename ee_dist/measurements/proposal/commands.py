@@ -51,7 +51,9 @@ def add_commands(v: View) -> None:
     else:
         units = _position_command_units(v, chosen.block) if kind == "position" else speed_units(v, chosen.block)
     if units.sure == UNKNOWN:
-        v.out.ask(f"commands ({chosen.block.name}): {units.why}; write the unit into the mapping")
+        v.out.ask(
+            f"commands ({chosen.block.name}): {units.why}; write the unit into the mapping, or take these commands out of it"
+        )
     level = SURE if chosen.block.reading.command else LIKELY
     v.add("commands", names, chosen.block, units, chosen.why, level)
 
