@@ -150,14 +150,15 @@ def motion(kind: str, rng: np.random.Generator) -> tuple[Array, Array]:
     return t, np.clip(q * begin**2 * (3 - 2 * begin), -1.5, 1.5)
 
 
-def write(out: Path, seed: int) -> dict[str, list[str]]:
+def write(out: Path, seed: int, rough: bool) -> dict[str, list[str]]:
     """The user's files: a URDF, what it cannot say, and five logs."""
     out.mkdir(parents=True, exist_ok=True)
     (out / "arm.urdf").write_text(urdf(), encoding="utf-8")
     joints = [f"joint_{k + 1}" for k in range(N)]
     sensors = [{"name": f"{j}_position", "kind": "position", "target": j} for j in joints]
     entry = {"urdf": "arm.urdf", "time_step_s": 1 / RATE_HZ, "has_floor": False, "sensors": sensors}
-    entry["drives"] = {j: dict(DRIVE) for j in joints}
+    more = {"coulomb": 0.4, "viscous": 0.3, "rotor_inertia": 2 * DRIVE["rotor_inertia"]} if rough else {}
+    entry["drives"] = dict.fromkeys(joints, DRIVE | more)
     (out / "arm.yaml").write_text(yaml.safe_dump(entry), encoding="utf-8")
     arm = Arm(seed)
     files: dict[str, list[str]] = {"fitted": [], "held": []}
@@ -196,9 +197,10 @@ def mrad(compared: Problem, terms: Hypothesis) -> float:
 
 def by_hand(compared: Problem) -> Hypothesis:
     """Three numbers that all joints share, by least squares."""
+    drive = compared.robot.drives[0]
 
     def terms(x: Array) -> Hypothesis:
-        friction, rotor, late = np.abs(x)
+        friction, rotor, late = np.abs(x) - (drive.coulomb, 0.9 * drive.rotor_inertia * (drive.coulomb > 0), 0.0)
         return (
             term("coulomb_friction", "all_joints", torque_nm=float(friction)),
             term("rotor_inertia", "all_joints", added_kg_m2=float(rotor)),
@@ -214,10 +216,13 @@ def by_hand(compared: Problem) -> Hypothesis:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--rough", action="store_true", help="the description has much too much friction, and rotors twice as heavy"
+    )
     parser.add_argument("--out", type=Path, default=Path("logs/servo_arm"))
     args = parser.parse_args()
     out = args.out.resolve()
-    files = write(out, args.seed)
+    files = write(out, args.seed, args.rough)
     seen, unseen = (problem(out, use, files[use]) for use in ("fitted", "held"))
     three = by_hand(seen)
     began = time.process_time()

@@ -57,8 +57,8 @@ class Parameter:
     meaning: str = ""
     resolution: float = 0.0
     """Smallest change worth telling apart in a report."""
-    on_top: bool = False
-    """Whether the value comes on top of what the robot is described with: below zero there is less of it than described."""
+    on_top: str = ""
+    """The number of a drive that the value comes on top of: below zero there is less of it than described."""
 
 
 Transform = Callable[[Any, str, Mapping[str, float]], Any]

@@ -9,6 +9,7 @@ from dataclasses import replace
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.described import with_more
 from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import (
     motors,
@@ -18,7 +19,7 @@ from ee_dist.effects.targets import (
     powered,
     supply,
 )
-from ee_dist.robots.model import Drive, Robot, RobotError
+from ee_dist.robots.model import Drive, Robot
 
 MOTORS = "Hughes and Drury 2013, Electric Motors and Drives, chapter 3"
 
@@ -206,7 +207,7 @@ def _rotors(robot: Robot, target: str) -> dict[str, Range]:
             0.0,
             "rotor inertia at the joint on top of nominal",
             1e-4,
-            on_top=True,
+            on_top="rotor_inertia",
         ),
     ),
     physics="The spinning rotor behind the gear is heavier than modelled: it resists acceleration, not position.",
@@ -216,10 +217,4 @@ def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     everywhere=True,
 )
 def rotor_inertia(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    def heavier(drive: Drive) -> Drive:
-        total = drive.rotor_inertia + values["added_kg_m2"]
-        if total < 0:
-            raise RobotError(f"the rotor of {target} has {drive.rotor_inertia:g} kg.m^2; less than none is left")
-        return replace(drive, rotor_inertia=total)
-
-    return robot.map_drive(target, heavier)
+    return with_more(robot, target, "rotor_inertia", values["added_kg_m2"])

@@ -8,17 +8,16 @@ from dataclasses import replace
 
 from ee_dist.effects import scales
 from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.described import with_more
 from ee_dist.effects.scales import Range, always
 from ee_dist.effects.targets import motors
-from ee_dist.robots.model import Drive, Robot, RobotError
+from ee_dist.robots.model import Drive, Robot
 from ee_dist.robots.ranges import drive_of
 
 SURVEY = "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7)"
 SERVOS = (
     "Duclusaud, Passault, Padois and Ly 2025, Extended Friction Models for the Physics Simulation of Servo Actuators"
 )
-LEAST = 1e-9
-"""Share of what is taken off friction that may be too much by rounding."""
 DRY_SHARE = 0.5
 """Of its torque limit, how much a drive may lose to dry friction in the range worth trying: at 1 it would not move."""
 
@@ -29,21 +28,6 @@ def _viscous(robot: Robot, target: str) -> float:
 
 def _viscous_range(robot: Robot, target: str) -> dict[str, Range]:
     return {"damping_nm_s_rad": (-drive_of(robot, target).viscous, _viscous(robot, target))}
-
-
-def _with(robot: Robot, target: str, law: str, more: float) -> Robot:
-    """The robot with so much more of one law of friction, or less: a description may have too much of it. Raises RobotError
-    where less than none would be left."""
-
-    def changed(drive: Drive) -> Drive:
-        total = getattr(drive, law) + more
-        if total < -LEAST * abs(more):
-            raise RobotError(
-                f"{target} has {getattr(drive, law):g} of {law} friction; {-more:g} cannot be taken off it"
-            )
-        return replace(drive, **{law: max(total, 0.0)})
-
-    return robot.map_drive(target, changed)
 
 
 @effect(
@@ -59,7 +43,7 @@ def _with(robot: Robot, target: str, law: str, more: float) -> Robot:
             0.0,
             "torque for each unit of speed, on top of nominal",
             0.002,
-            on_top=True,
+            on_top="viscous",
         ),
     ),
     physics="Grease and bearings resist in proportion to speed.",
@@ -69,7 +53,7 @@ def _with(robot: Robot, target: str, law: str, more: float) -> Robot:
     everywhere=True,
 )
 def viscous_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return _with(robot, target, "viscous", values["damping_nm_s_rad"])
+    return with_more(robot, target, "viscous", values["damping_nm_s_rad"])
 
 
 def _dry_range(robot: Robot, target: str) -> dict[str, Range]:
@@ -89,7 +73,7 @@ def _dry_range(robot: Robot, target: str) -> dict[str, Range]:
             0.0,
             "friction torque, the same at every speed, on top of nominal",
             0.005,
-            on_top=True,
+            on_top="coulomb",
         ),
     ),
     physics="Dry friction: a torque of constant size against the motion, which holds the joint once it is at rest.",
@@ -100,7 +84,7 @@ def _dry_range(robot: Robot, target: str) -> dict[str, Range]:
     everywhere=True,
 )
 def coulomb_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return _with(robot, target, "coulomb", values["torque_nm"])
+    return with_more(robot, target, "coulomb", values["torque_nm"])
 
 
 _SPEED = Parameter("speed_rad_s", "rad/s", 1e-6, math.inf, 0.1, "speed at which the excess has fallen to 37 %", 0.01)

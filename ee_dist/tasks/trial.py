@@ -20,6 +20,7 @@ from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.measured_trial import driver_of
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, apply, find, from_dict, term
+from ee_dist.effects.described import not_too_much
 from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recording.records import HARDWARE, TrialRecord
@@ -160,7 +161,9 @@ def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypoth
         raise ConfigError(
             f"hidden={asked}: give effect@target, random, or a list such as [{{effect: ..., target: ...}}]"
         )
-    return tuple(from_dict(e) if isinstance(e, Mapping) else _by_name(robot, str(e)) for e in asked)
+    terms = tuple(from_dict(e) if isinstance(e, Mapping) else _by_name(robot, str(e)) for e in asked)
+    not_too_much(robot, terms)
+    return terms
 
 
 def _by_name(robot: Robot, text: str) -> Term:

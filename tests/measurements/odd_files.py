@@ -141,6 +141,9 @@ def cases() -> list[Case]:
              | spread("current{}", tau / 0.2)), hints=Hints(gains=(0.2, 0.2, 0.2))),
         Case("no header, with the order said", csv({"a": t} | spread("q{}", q) | spread("w{}", w) | spread("g{}", g)
              | spread("tau{}", tau / 0.2), header=False), hints=Hints(joints=JOINTS, gains=(0.2, 0.2, 0.2))),
+        Case("no header, position and speed of each joint in turn", csv({"a": t} | {f"{n}{j}": v[:, j] for j in range(3)
+             for n, v in (("q", q), ("w", w))} | spread("g{}", g) | spread("tau{}", tau / 0.2), header=False),
+             hints=Hints(joints=JOINTS, gains=(0.2, 0.2, 0.2))),
         Case("desired as d, with its speeds", csv({"t": t} | spread("q{}", q) | spread("qd{}", w) | spread("q{}_d", g)
              | spread("qd{}_d", np.gradient(g, t, axis=0)) | spread("tau{}", tau))),
         Case("a controller's own names", csv({"Timestamp (ms)": 1e3 * t} | spread("Axis {} actual position (°)", DEG * q)

@@ -183,3 +183,18 @@ def test_nothing_unknown_goes_without_a_question(tmp_path: Path) -> None:
     absurd = base | odd_files.spread("vel{}", m["w"]) | odd_files.spread("tau{} (Nm)", 60 * m["tau"])
     (question,) = proposal_for(odd_files.csv(absurd)(tmp_path), odd_files.robot(), Hints()).questions
     assert "times what the motion needs in N.m" in question
+
+
+@pytest.mark.parametrize(("size", "question"), [(1.0, ""), (odd_files.DEG, "degrees, or many turns in rad")])
+def test_joints_that_turn_on_and_on_are_in_radians_or_it_is_asked(tmp_path: Path, size: float, question: str) -> None:
+    """A continuous joint of a URDF has its stops a hundred turns away: a motion is small beside that in any unit."""
+    arm = odd_files.robot()
+    free = replace(arm, joints=tuple(replace(j, lower=-628.0, upper=628.0) for j in arm.joints))
+    m = odd_files.arrays()
+    table = {"t": m["t"]} | odd_files.spread("q{}", size * m["q"]) | odd_files.spread("cmd{}", size * m["g"])
+    proposal = proposal_for(odd_files.csv(table | odd_files.spread("tau{}", m["tau"]))(tmp_path), free, Hints())
+    if question:
+        assert any(question in q for q in proposal.questions)
+    else:
+        found = {c.name: c.entry for c in proposal.choices}
+        assert [found[f"{j}_position"]["unit"] for j in odd_files.JOINTS] == ["rad"] * 3

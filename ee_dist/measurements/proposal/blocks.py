@@ -13,6 +13,16 @@ from ee_dist.measurements.table import Recorded, Table
 from ee_dist.trials.log import Array
 
 BY_NAME, BY_NUMBER, BY_PLACE, ONLY = "by name", "by number", "by place", "only one"
+MIXED = 6
+"""Columns a joint up to which two orders one behind the other are looked at,"""
+CLEARLY = 0.3
+"""and by how much of a correlation they must hang together better than one order does."""
+ROWS_APART = 0.01
+"""Seconds between rows, where a mean over some rows is wanted and nobody has looked at the time yet."""
+NEARLY = 12
+"""Power of a correlation: 0.99 counts 0.89, and 0.9 counts 0.28."""
+ALIKE = 0.5
+"""Share of one another that the ratios of speed and change of position have at all joints, or it is chance."""
 _GENERAL = frozenset(["joint", "link", "motor", "axis", "drive", "servo", "arm", "robot", "j"])
 
 
@@ -146,20 +156,36 @@ def _made(table: Table, columns: tuple[str, ...], reading: Reading, how: str, se
 def _by_place(
     table: Table, mute: list[str], series: dict[str, Array], joints: Sequence[str], order: Sequence[str] | None
 ) -> list[Block]:
-    """Blocks of columns whose names say nothing: runs of one column a joint, or joint after joint, whichever hangs together."""
+    """Blocks of columns whose names say nothing: runs of one column a joint, or joint after joint, or first the one and then the
+    other, whichever hangs together."""
     size = len(order or joints)
     if size < 2:
         silent = Reading(None, None, None, None, "", False, False)
         return [_made(table, (a,), silent, ONLY, series) for a in mute]
     if not mute or len(mute) % size:
         return []
-    count = len(mute) // size
-    runs = [mute[k * size : (k + 1) * size] for k in range(count)]
-    strides = [mute[k::count] for k in range(count)]
-    chosen = max((runs, strides), key=lambda split: _ties(split, series)) if count > 1 else runs
+    chosen = _hanging_together(mute, size, series)
     silent = Reading(None, None, None, None, "", False, False)
     places = [list(order or joints).index(j) for j in joints] if order is None or set(joints) <= set(order) else []
     return [_made(table, tuple(part[p] for p in places), silent, BY_PLACE, series) for part in chosen if places]
+
+
+def _hanging_together(mute: list[str], size: int, series: dict[str, Array]) -> list[list[str]]:
+    count = len(mute) // size
+    runs = [mute[k * size : (k + 1) * size] for k in range(count)]
+    if count == 1:
+        return runs
+    plain = [runs, [mute[k::count] for k in range(count)]]
+    best = max(plain, key=lambda split: _ties(split, series))
+    if count > MIXED:
+        return best
+    # Such as position and speed of each joint in turn, and behind them what each motor gave.
+    mixed = [[*(mute[k : size * first : first] for k in range(first)), *runs[first:]] for first in range(2, count)] + [
+        [*runs[:last], *(mute[size * last + k :: count - last] for k in range(count - last))]
+        for last in range(1, count - 1)
+    ]
+    other = max(mixed, key=lambda split: _ties(split, series), default=best)
+    return other if _ties(other, series) > _ties(best, series) + CLEARLY else best
 
 
 def _ties(split: list[list[str]], series: dict[str, Array]) -> float:
@@ -170,6 +196,17 @@ def _ties(split: list[list[str]], series: dict[str, Array]) -> float:
     for k, one in enumerate(split):
         for other in split[k + 1 :]:
             a, b = (np.stack([series[c] for c in part], axis=1) for part in (one, other))
-            total += max(abs(relation(a, b).correlation), abs(relation(b, np.gradient(a, axis=0)).correlation),
-                         abs(relation(a, np.gradient(b, axis=0)).correlation))  # fmt: skip
+            # Joints move alike by chance: only what is nearly the same, or nearly its change, counts.
+            total += max(abs(relation(a, b).correlation), _change(a, b), _change(b, a)) ** NEARLY
     return total
+
+
+def _change(a: Array, b: Array) -> float:
+    """How far ``b`` (T, J) is the change of ``a`` (T, J), by one number for all joints that move."""
+    from ee_dist.measurements.proposal.signals import derivative
+
+    found = [derivative(a[:, [k]], b[:, [k]], ROWS_APART) for k in range(a.shape[1])]
+    slopes = [r.slope for r in found if r.slope]
+    if not slopes or min(slopes) * max(slopes) <= 0 or min(map(abs, slopes)) < ALIKE * max(map(abs, slopes)):
+        return 0.0
+    return min(abs(r.correlation) for r in found if r.slope)

@@ -23,6 +23,8 @@ NEAR = 0.35
 """Ratios within this share of one between two units are that."""
 LOOSE = 4.0
 """A soft drive goes only part of the way to its command: so far from one its ratio may be, and is no other unit yet."""
+TURNS_ON = 4 * math.pi
+"""rad: what a joint that turns on and on moves by, if nothing else is known."""
 GRIPPERS = ("gripper", "jaw", "finger", "claw")
 
 
@@ -64,12 +66,16 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
     if stated is not None:
         return UnitChoice((), UNKNOWN, f"the name says {stated}, which is no unit of a joint's position")
     span = np.ptp(block.values, axis=0)
-    lively = [u for u in fits if (span * UNITS[u][1] > STILL * np.where(np.isfinite(reach), reach, math.pi)).any()]
+    # Of a joint that turns on and on, or has no stops in the file, a motion is large beside a turn or two.
+    room = np.minimum(reach, [TURNS_ON if j.kind == "hinge" else math.pi for j in joints])
+    lively = [u for u in fits if (span * UNITS[u][1] > STILL * room).any()]
     if not lively:
         return UnitChoice(
             (), UNKNOWN, f"numbers to {seen.max():.4g} fit no unit of {allowed[0]} within the joints' limits"
         )
-    best = lively[0]
+    best, turning = lively[0], reach > TURNS_ON
+    if best == "rad" and "deg" in lively and turning.any() and seen[turning].max() > TURNS_ON:
+        return UnitChoice((), UNKNOWN, f"numbers to {seen[turning].max():.4g}: degrees, or many turns in rad")
     excluded = [u for u in allowed[:2] if u not in lively]
     if best != allowed[0]:
         return _all(block, best, SURE if len(lively) == 1 or best == allowed[1] else LIKELY,
@@ -97,7 +103,7 @@ def _all(block: Block, unit: str, sure: str, why: str) -> UnitChoice:
 
 def _reach(joint: Joint) -> float:
     reach = max(abs(joint.lower), abs(joint.upper))
-    return reach if reach > 0 and math.isfinite(reach) else 4 * math.pi if joint.kind == "hinge" else math.inf
+    return reach if reach > 0 and math.isfinite(reach) else TURNS_ON if joint.kind == "hinge" else math.inf
 
 
 def _lerobot(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitChoice:
