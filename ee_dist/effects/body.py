@@ -30,7 +30,7 @@ def part_lost(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     family="body",
     targets=parts,
     parameters=(Parameter("change", "1", -0.9, 3.0, 0.0, "change of mass as a share of the nominal mass", 0.02),),
-    ranges=always(change=(-0.5, 3.0)),
+    ranges=always(change=(-0.8, 3.0)),
     physics="A part is heavier or lighter than the model says; its inertia scales with its mass.",
     signature="Torques and sag grow with the acceleration and the tilt of the part; nothing changes at rest if it is carried "
     "by the structure.",
