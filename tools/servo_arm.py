@@ -48,6 +48,8 @@ STEP_S, SECONDS = 0.0005, 8.0
 ENCODER = 2 * np.pi / 4096
 REACH = np.array([1.0, 0.5, 0.6, 0.8, 1.0, 0.8])
 """rad: how far each joint goes."""
+SOLID = 2.5
+"""How much heavier a part that is described as solid is than one that was printed."""
 FITTED, HELD = ("sines", "steps", "slow"), ("reaches", "sines")
 
 
@@ -150,14 +152,15 @@ def motion(kind: str, rng: np.random.Generator) -> tuple[Array, Array]:
     return t, np.clip(q * begin**2 * (3 - 2 * begin), -1.5, 1.5)
 
 
-def write(out: Path, seed: int, rough: bool) -> dict[str, list[str]]:
+def write(out: Path, seed: int, described: str) -> dict[str, list[str]]:
     """The user's files: a URDF, what it cannot say, and five logs."""
     out.mkdir(parents=True, exist_ok=True)
-    (out / "arm.urdf").write_text(urdf(), encoding="utf-8")
+    heavier = SOLID if described == "solid" else 1.0
+    (out / "arm.urdf").write_text(urdf(heavier), encoding="utf-8")
     joints = [f"joint_{k + 1}" for k in range(N)]
     sensors = [{"name": f"{j}_position", "kind": "position", "target": j} for j in joints]
     entry = {"urdf": "arm.urdf", "time_step_s": 1 / RATE_HZ, "has_floor": False, "sensors": sensors}
-    more = {"coulomb": 0.4, "viscous": 0.3, "rotor_inertia": 2 * DRIVE["rotor_inertia"]} if rough else {}
+    more = {"coulomb": 0.4, "viscous": 0.3, "rotor_inertia": 2 * DRIVE["rotor_inertia"]} if described == "rough" else {}
     entry["drives"] = dict.fromkeys(joints, DRIVE | more)
     (out / "arm.yaml").write_text(yaml.safe_dump(entry), encoding="utf-8")
     arm = Arm(seed)
@@ -217,12 +220,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
-        "--rough", action="store_true", help="the description has much too much friction, and rotors twice as heavy"
+        "--described",
+        choices=("nearly", "rough", "solid"),
+        default="nearly",
+        help="rough: with much too much friction, and rotors twice as heavy; solid: with parts 2.5 times as heavy",
     )
     parser.add_argument("--out", type=Path, default=Path("logs/servo_arm"))
     args = parser.parse_args()
     out = args.out.resolve()
-    files = write(out, args.seed, args.rough)
+    files = write(out, args.seed, args.described)
     seen, unseen = (problem(out, use, files[use]) for use in ("fitted", "held"))
     three = by_hand(seen)
     began = time.process_time()

@@ -23,11 +23,12 @@ RATE_HZ = 100.0
 DRIVE = {"kp": 17.8, "kd": 0.3, "torque_limit": 2.9, "speed_limit": 6.0, "rotor_inertia": 0.02}
 
 
-def urdf() -> str:
+def urdf(heavier: float = 1.0) -> str:
     """The body: a chain of six revolute joints, each link a rod along x (the first along z)."""
     parts = ["<robot name='desk_arm_6'><link name='base'/>"]
     parent, at = "base", "0 0 0.05"
-    for k, (name, mass, length, axis) in enumerate(LINKS):
+    for k, (name, stated, length, axis) in enumerate(LINKS):
+        mass = heavier * stated
         across = mass * length**2 / 12 + 1e-5
         middle = f"0 0 {length / 2}" if k == 0 else f"{length / 2} 0 0"
         parts.append(
