@@ -73,13 +73,20 @@ def geometry(robot: Robot) -> tuple[object, ...]:
 
 
 def gravity_regressor(robot: Robot, position: Array) -> Array:
-    """(3, T, M, 10 P): what gravity of 1 m/s^2 along x, y and z of the floor adds to a ``regressor``, which is linear in it."""
+    """(3, T, M, 4 P): what gravity of 1 m/s^2 along x, y and z of the floor adds to the columns of a ``regressor`` that have
+    weight, ``weights`` of its parameters; it is linear in it, and inertia about a part's frame weighs nothing."""
     still = np.zeros_like(position)
     down = robot.with_world(gravity_m_s2=1.0, tilt_x_rad=0.0, tilt_y_rad=0.0)
     # gravity() points along -z without a tilt, along x and along -y with a quarter of a turn about y and about x.
     along = (down.with_world(tilt_y_rad=math.pi / 2), down.with_world(tilt_x_rad=math.pi / 2), down)
     signs = (1.0, -1.0, -1.0)
-    return np.stack([s * regressor(r, position, still, still) for s, r in zip(signs, along, strict=True)])
+    return np.stack([s * weights(regressor(r, position, still, still)) for s, r in zip(signs, along, strict=True)])
+
+
+def weights(columns: Array) -> Array:
+    """(..., 4 P) of (..., 10 P): each part's mass, and its mass times centre."""
+    apart = columns.reshape(*columns.shape[:-1], -1, 10)[..., :4]
+    return np.ascontiguousarray(apart).reshape(*columns.shape[:-1], -1)
 
 
 def regressor(robot: Robot, position: Array, speed: Array, acceleration: Array) -> Array:

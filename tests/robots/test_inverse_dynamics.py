@@ -15,7 +15,15 @@ from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.one_joint import OneJointEngine, fits
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.robots.describe import load_robot
-from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, joint_torques, regressor
+from ee_dist.robots.inverse_dynamics import (
+    geometry,
+    gravity,
+    gravity_regressor,
+    joint_torques,
+    parameters,
+    regressor,
+    weights,
+)
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.quadruped import quadruped
@@ -95,6 +103,9 @@ def test_gravity_adds_what_is_linear_in_it() -> None:
     q, v, a = rng.normal(size=(3, 4, len(robot.drives)))
     tilted = robot.with_world(tilt_x_rad=0.2, tilt_y_rad=-0.3)
     pull = np.tensordot(gravity(tilted) - gravity(robot), gravity_regressor(robot, q), 1)
-    np.testing.assert_allclose(regressor(robot, q, v, a) + pull, regressor(tilted, q, v, a), atol=1e-9)
+    level, tipped = regressor(robot, q, v, a), regressor(tilted, q, v, a)
+    np.testing.assert_allclose(weights(level) + pull, weights(tipped), atol=1e-9)
+    masses = parameters(robot)
+    np.testing.assert_allclose(level @ masses + pull @ weights(masses), tipped @ masses, atol=1e-9)
     assert geometry(robot) == geometry(tilted.with_part("forearm", mass_kg=3.0).with_joint("elbow", freedom=0.5))
     assert geometry(robot) != geometry(robot.with_joint("elbow", axis=(1.0, 0.0, 0.0)))

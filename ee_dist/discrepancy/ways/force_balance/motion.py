@@ -13,12 +13,12 @@ from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import LowPass
 from ee_dist.robots.instruments import MOTOR_TORQUE
-from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, parameters, regressor
+from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, parameters, regressor, weights
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
-KEPT = 4
-"""Geometries whose regressors are kept."""
+ROOM = 150_000_000
+"""Bytes of regressors that are kept for a motion, if there are more than two geometries."""
 PASSED = 1 / 20
 """Cut-off of the positions' low-pass as a share of their rate: above it, differences twice over are mostly noise."""
 REST_NOISE = 3.0
@@ -52,8 +52,8 @@ class Processing:
 
 @dataclass(eq=False)
 class Moved:
-    """The regressor (T, M, 10 P) of one geometry along a motion, under gravity ``pull`` (3,); what other gravity adds to it
-    for each m/s^2 along x, y, z, once that is asked for."""
+    """The regressor (T, M, 10 P) of one geometry along a motion, under gravity ``pull`` (3,); what other gravity adds to what
+    has weight of it (3, T, M, 4 P) for each m/s^2 along x, y, z, once that is asked for."""
 
     all_of_it: Array
     pull: Array
@@ -80,10 +80,12 @@ class Motion:
         depends on geometry and gravity is computed once for each."""
         shape, pull, masses = geometry(robot), gravity(robot), parameters(robot)
         if shape not in self.known:
-            if len(self.known) >= KEPT:
+            found = regressor(robot, self.position, self.speed, self.acceleration)
+            while len(self.known) >= max(2, ROOM // found.nbytes):
                 self.known.pop(next(iter(self.known)))
-            self.known[shape] = Moved(regressor(robot, self.position, self.speed, self.acceleration), pull)
-        known = self.known[shape]
+            self.known[shape] = Moved(found, pull)
+        # The one asked for last goes last: what most hypotheses share stays.
+        known = self.known[shape] = self.known.pop(shape)
         # Most hypotheses change the drives alone.
         asked = masses.tobytes() + pull.tobytes()
         if known.last is None or known.last[0] != asked:
@@ -91,7 +93,7 @@ class Motion:
             if (pull != known.pull).any():
                 if known.by_pull is None:
                     known.by_pull = gravity_regressor(robot, self.position)
-                torque = torque + np.tensordot(pull - known.pull, known.by_pull @ masses, 1)
+                torque = torque + np.tensordot(pull - known.pull, known.by_pull @ weights(masses), 1)
             known.last = asked, torque
         return (shape, asked), known.last[1]
 
