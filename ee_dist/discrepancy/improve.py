@@ -128,8 +128,9 @@ def improve(
             if len(current.u) >= LARGE and not problem.rugged:
                 _as_thoroughly(search, current, best.outcome.cut, rung)
             ladder.append(rung)
-        if spread:
-            current, gone = told_only(search, current, own, _cut(problem), len(pool))
+        if spread or (len(current.parts) - own > 1 and not problem.rugged):
+            # Of two that leave the same mark the values may be anything, and one of them says it all.
+            current, gone = told_only(search, current, own, _cut(problem), len(pool), not spread)
             if gone:
                 ladder.append(_refitted(search, current, "without what these data do not tell from neutral", gone))
     return _finish(search, current, ladder, as_it_is, stopped, last)

@@ -139,9 +139,12 @@ def _allowed(problem: Problem, energy: float, cut: Cut, tried: int) -> float:
     return max(luck, 0.5 * WORTH * max(energy - float(problem.floor.sum()), 0.0))
 
 
-def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int) -> tuple[Current, tuple[str, ...]]:
-    """The model without the terms whose intervals hold neutral, and their names: one after the other, the least told first, for
-    what one of two alike leaves makes the other plain; as many of them as held-out data allow. The first ``own`` parts stay."""
+def told_only(
+    search: Search, current: Current, own: int, cut: Cut, tried: int, open_only: bool = False
+) -> tuple[Current, tuple[str, ...]]:
+    """The model without the terms whose intervals hold neutral (``open_only``: of which some value may be anything), and their
+    names: one after the other, the least told first, for what one of two alike leaves makes the other plain; as many of them
+    as held-out data allow. The first ``own`` parts stay."""
     gone: list[tuple[str, ...]] = []
     models: list[Current] = []
     while True:
@@ -150,6 +153,8 @@ def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int) 
         half, places = half_widths(search.problem, fit), fit.model.places
         told = [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in places]
         units = _units(fit.model, own, len(told))
+        if open_only:
+            units = [unit for unit in units if any(np.max(half[places[k]], initial=0.0) > 1.0 for k in unit)]
         least = min(units, key=lambda unit: max(told[k] for k in unit), default=[])
         if not least or max(told[k] for k in least) >= 1.0:
             break

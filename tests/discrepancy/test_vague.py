@@ -13,7 +13,9 @@ from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.evidence.holdout import HeldOut, windows
 from ee_dist.discrepancy.evidence.judge import VAGUE, judge, ranked
+from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.pruning import told_only
 from ee_dist.discrepancy.search.candidates import Proposal, candidate
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -87,3 +89,19 @@ def test_friction_by_load_is_found_at_its_size() -> None:
     model = Model(tuple(candidate(robot, "load_friction", m) for m in robot.motor_names))
     fit = fit_one(Search(problem), model, [np.full(2, 0.1)])  # type: ignore[arg-type]
     assert [t.values[0][1] for t in fit.hypothesis] == pytest.approx([0.3, 0.3], rel=0.1)
+
+
+def test_of_two_with_the_same_mark_one_stays_and_says_it_all() -> None:
+    sample = samples()["arm"]
+    problem = problem_by("open_loop", measure(sample, (term("zero_offset", "elbow", offset_rad=0.1),)), sample.robot)
+    zero, torque, friction = (
+        candidate(sample.robot, e, "elbow") for e in ("zero_offset", "offset_torque", "viscous_friction")
+    )
+    # Within so little either may be anything, if the other makes up for it.
+    torque = replace(torque, bounds=tuple((0.2 * low, 0.2 * high) for low, high in torque.bounds))
+    search, parts = Search(problem), (zero, torque, friction)
+    fit = fit_one(search, Model(parts), [np.array([0.15, 0.5, 0.01])])
+    left, gone = told_only(search, Current(parts, fit.u), 0, windows(problem), 100, open_only=True)
+    assert gone == ("offset_torque@elbow",)
+    assert zero.values(left.u[:1])["offset_rad"] == pytest.approx(0.1, abs=0.01), "it says it all"
+    assert told_only(search, left, 0, windows(problem), 100, open_only=True)[1] == ()

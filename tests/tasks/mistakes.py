@@ -275,7 +275,8 @@ MODELS: Rows = (
     ("task=export model=place.yaml", "place.yaml: viscous_friction cannot act on 'elbow' of"),
     ("task=export model=parameter.yaml", "parameter.yaml: viscous_friction has no parameter 'damping'; it"),
     ("task=export model=value.yaml", "must be a number (N.m.s/rad), not 'much'"),
-    ("task=export model=bounds.yaml", "bounds.yaml: viscous_friction: damping_nm_s_rad = -5 lies"),
+    ("task=export model=bounds.yaml", "bounds.yaml: motor_weak: loss = 5 lies outside [0, 1]"),
+    ("task=export model=less.yaml", "servo is described with 0 N.m.s/rad of it; 5 cannot be taken off"),
     ("task=export model=nan.yaml", "must be a number (N.m.s/rad), not nan"),
     ("task=export model=nameless.yaml", "nameless.yaml: an entry without 'effect': {'target': 'servo'}"),
     ("task=export model=word.yaml", "word.yaml: an effect is written {effect: ..., target: ...,"),
@@ -293,7 +294,7 @@ MODELS: Rows = (
     ("task=export model=model.yaml to=", "there are: mjcf, urdf, yaml, python"),
     ("task=export model=model.yaml to=sdf", "did you mean urdf?"),
     ("task=compare measured=trial.mcap model=effect.yaml", "did you mean viscous_friction or coulomb_friction or"),
-    ("task=improve measured=trial.mcap model=bounds.yaml effect=auto", "lies outside [0, inf]"),
+    ("task=improve measured=trial.mcap model=bounds.yaml effect=auto", "lies outside [0, 1]"),
     ("task=improve measured=trial.mcap model=key.yaml effect=auto", "there are: robot, effects"),
     ("task=explain measured=trial.mcap model=deep.yaml", "nested deeper than 64 levels"),
 )
