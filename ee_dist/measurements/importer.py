@@ -17,6 +17,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.clocks import Clocked, check_grid
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
+from ee_dist.measurements.need import beside_need, torques_needed
 from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, grid, held, linear, smoothed
@@ -25,6 +26,7 @@ from ee_dist.measurements.suspicious import (
     speed_suspicion,
     suspicions,
     time_suspicion,
+    torque_suspicion,
     unit_suspicion,
 )
 from ee_dist.measurements.table import Recorded
@@ -85,6 +87,7 @@ class _Import:
         joints = None
         if all(m in positions for m in self.robot.motor_names):
             joints = np.stack([positions[m] for m in self.robot.motor_names], axis=1)
+            self._look_at_torques(torques, joints)
         log = SensorLog(
             times_s=self.at_s,
             sensors=np.stack([self.channels[n] for n in self.robot.sensor_names], axis=1),
@@ -282,11 +285,21 @@ class _Import:
         for k, drive in enumerate(self.robot.drives):
             obeyed = np.isfinite(commands[:, k])
             if drive.joint in position_of and obeyed.sum() > 10 and command_kind(drive) == "position":
-                note = command_suspicion(drive.joint, commands[obeyed, k], position_of[drive.joint][obeyed])
-                if note:
-                    self.report.suspicious.append(note)
+                found = command_suspicion(
+                    drive.joint, commands[obeyed, k], position_of[drive.joint][obeyed], self.step_s
+                )
+                self._judge(found, self.mapping.commands.get(drive.joint))
 
-    def _judge(self, found: tuple[str, bool] | None, column: Column | Estimated) -> None:
+    def _look_at_torques(self, torques: Array | None, joints: Array) -> None:
+        """Torques beside what the motion needs. Raises MeasurementError for a unit that cannot be."""
+        needed = None if torques is None else torques_needed(self.robot, joints, self.step_s)
+        if torques is None or needed is None:
+            return
+        units = torque_units(self.robot)
+        for m, beside in zip(self.robot.motor_names, beside_need(torques, needed, self.step_s), strict=True):
+            self._judge(torque_suspicion(f"torque of {m}", beside, units[m]), self.mapping.torques[m])
+
+    def _judge(self, found: tuple[str, bool] | None, column: Column | Estimated | None) -> None:
         if found is None:
             return
         note, certain = found

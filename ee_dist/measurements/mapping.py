@@ -20,6 +20,8 @@ from ee_dist.robots.untrusted import UntrustedError, yaml_of
 
 LONGEST_S = 60.0
 """Leads and means beyond this are a slip of the unit."""
+READ_ALIKE = ("unit", "sign", "scale", "offset", "signed_bits")
+"""What a column has that stands for two channels, at both."""
 UNKNOWN = "???"
 """Stands in a proposed mapping where only a person can know."""
 
@@ -207,17 +209,24 @@ def mapping_of(data: Any, file: Path) -> Mapping:
 
 
 def _check_once(mapping: Mapping) -> None:
-    """One column is one channel, but for a torque, which may be sensed or commanded and also balanced.
+    """One column is one channel, but for a torque, which may be sensed or commanded and also balanced, read alike.
 
     Raises MeasurementError naming both.
     """
-    seen: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    seen: dict[tuple[str, str], list[tuple[str, str, Column]]] = {}
     for group, name, column in mapping.columns():
         others = seen.setdefault((column.table, column.column), [])
         for other in others:
             if group == other[0] or "torques" not in (group, other[0]):
-                raise MeasurementError(_same(mapping, column, other, (group, name)))
-        others.append((group, name))
+                raise MeasurementError(_same(mapping, column, other[:2], (group, name)))
+            differing = [k for k in READ_ALIKE if getattr(column, k) != getattr(other[2], k)]
+            if differing:
+                told = " and ".join(shown(getattr(c, differing[0])) for c in (other[2], column))
+                raise MeasurementError(
+                    f"{mapping.source}: column {quoted(column.column)} is {other[0]} {other[1]} and {group} {name}, but with "
+                    f"{differing[0]} {told}; it is one signal: say the same at both"
+                )
+        others.append((group, name, column))
 
 
 def _same(mapping: Mapping, column: Column, one: tuple[str, str], two: tuple[str, str]) -> str:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.measurements import signals
 from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
 
@@ -17,6 +20,11 @@ FAR, STILL, LIVELY = 3.0, 0.03, 0.15
 small, where in another unit it would be above the third."""
 RATIOS = tuple(r**k for r in (180 / np.pi, 1000.0, 30 / np.pi, 2 * np.pi) for k in (1, -1))
 """Between units of speed: degrees and radians, milli and one, turns a minute or a second and radians."""
+
+POSITION_RATIOS = tuple(r**k for r in (180 / np.pi, 1000.0) for k in (1, -1))
+"""Between units of position that are taken for one another: degrees and radians, milli and one."""
+OTHER_UNIT, OTHER_SIZE = 4.0, 20.0
+"""A soft drive goes only part of the way to its command, and a model may be off by a lot: beyond these it is another unit."""
 
 
 def suspicions(name: str, values: Array) -> list[str]:
@@ -112,18 +120,46 @@ def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> 
             False,
         )
     if correlation > 0.8 and not 0.5 < slope < 2.0:
-        certain = correlation > 0.9 and any(abs(slope / r - 1) < 0.1 for r in RATIOS)
+        certain = correlation > 0.9 and _between_units(slope, RATIOS)
         return f"{name}: is {slope:.3g} times the change of its position: another unit of one of the two?", certain
     return None
 
 
-def command_suspicion(name: str, command: Array, position: Array) -> str | None:
-    """Whether a joint runs away from its commands: a swapped sign of one of the two."""
+def command_suspicion(name: str, command: Array, position: Array, step_s: float) -> tuple[str, bool] | None:
+    """Whether a joint runs away from its commands, or they are in another unit than its position: a sentence, and whether it
+    is certain (a ratio between two units) enough to stop."""
     a, b = command - command.mean(), position - position.mean()
     size = float(np.sqrt((a @ a) * (b @ b)))
     if size > 0 and float(a @ b) / size < -0.5:
-        return f"{name}: moves against its command (correlation {float(a @ b) / size:.2f}): a swapped sign?"
+        return f"{name}: moves against its command (correlation {float(a @ b) / size:.2f}): a swapped sign?", False
+    ahead = signals.lead(command[:, None], position[:, None], step_s)
+    if ahead.correlation > 0.9 and not 1 / OTHER_UNIT < ahead.slope < OTHER_UNIT:
+        note = f"{name}: its commands are {ahead.slope:.3g} times its positions: another unit of one of the two?"
+        return note, _between_units(ahead.slope, POSITION_RATIOS)
     return None
+
+
+def torque_suspicion(name: str, beside: signals.Relation, unit: str) -> tuple[str, bool] | None:
+    """Whether a torque or force in ``unit`` is one, by how it goes with what the motion needs: a sentence, and whether it is
+    certain (a thousand times too much or too little) enough to stop. A model may be off by a lot."""
+    size = abs(beside.slope)
+    if beside.correlation < -0.7 and 0.5 < size < 2:
+        return (
+            f"{name}: runs against what the motion needs (correlation {beside.correlation:.2f}): a swapped sign? "
+            "set 'sign: -1' wherever the column is named"
+        ), False
+    if abs(beside.correlation) > 0.9 and not 1 / OTHER_SIZE < size < OTHER_SIZE:
+        certain = any(0.5 < size / r < 2 for r in (1e3, 1e-3))
+        cure = f"say unit: m{unit}" if certain and size > 1 else f"another unit than {unit}"
+        return (
+            f"{name}: is {size:.3g} times what the motion needs by the model: {cure}, or masses that are off?",
+            certain,
+        )
+    return None
+
+
+def _between_units(ratio: float, ratios: Sequence[float]) -> bool:
+    return any(abs(ratio / r - 1) < 0.1 for r in ratios)
 
 
 def _longest_run(values: Array) -> tuple[int, int]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from hydra.errors import HydraException, OverrideParseException
 
+from ee_dist.basics.names import listed_or, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import EffectError, loaded_plugins
 from ee_dist.engines.contract import EngineError
@@ -17,7 +18,7 @@ from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, abandon
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError, known_settings, unknown_key
-from ee_dist.tasks.help import options_with
+from ee_dist.tasks.help import options_with, settings_of
 from ee_dist.trials.excitation import ExcitationError
 from ee_dist.trials.hardware import HardwareError
 from ee_dist.trials.log import LogError
@@ -26,6 +27,8 @@ __all__ = ("USER_ERRORS", "RayLostError", "abandon_evaluators", "defect", "hydra
 
 _LONGEST = 300
 """Characters of an error that nobody foresaw: some libraries put whole arrays into theirs."""
+ALIKE = 0.6
+"""Likeness from which a setting of any verb is proposed."""
 _FILES = {
     ".urdf": "robot=urdf robot.urdf={}",
     ".xml": "robot=mjcf robot.file={}",
@@ -127,7 +130,7 @@ def _absent(name: str) -> str:
     if name == "scenario":
         return "scenario: there is none yet; add it with a plus sign: +scenario=8"
     if name.startswith("task."):
-        return f"{name}: this verb has no such setting; 'python -m ee_dist task=VERB --help' lists those of a verb"
+        return f"{name}: this verb has no such setting; {_elsewhere(name)}"
     if name in known_settings():
         group, having = name.partition(".")[0], options_with(name)
         there = (
@@ -137,3 +140,18 @@ def _absent(name: str) -> str:
         )
         return f"{name}: the chosen {group} has no such setting; {there}"
     return str(unknown_key("", name, known_settings(), "'python -m ee_dist task=VERB --help' lists them"))
+
+
+def _elsewhere(name: str) -> str:
+    """What a setting of a verb may have meant: one that another verb has, or one that is called much like it."""
+    having = options_with(name)
+    if having:
+        return f"{listed_or(having)} {'has' if len(having) == 1 else 'have'} it"
+    group, _, key = name.partition(".")
+    # Some stand beside the verb, not below it.
+    known = {k: k for k in known_settings() if "." not in k} | {
+        k.removeprefix(f"{group}."): k for k in settings_of(group)
+    }
+    alike = [known[k] for k in nearest(key, known, ALIKE)]
+    everywhere = "'python -m ee_dist task=VERB --help' lists those of a verb"
+    return f"did you mean {listed_or(alike)}? {everywhere}" if alike else everywhere

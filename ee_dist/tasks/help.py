@@ -217,9 +217,18 @@ def _shown(value: Any) -> str:
 
 def options_with(setting: str) -> list[str]:
     """``evaluator=ray`` for ``evaluator.workers``: the choices that have a setting."""
-    group, _, key = setting.partition(".")
-    files = sorted((config_folder() / group).glob("*.yaml")) if key else []
-    return [f"{group}={p.stem}" for p in files if any(s.key == setting for s in settings_in(p, group))]
+    group = setting.partition(".")[0]
+    return [f"{group}={name}" for name, keys in _by_choice(group).items() if setting in keys]
+
+
+def settings_of(group: str) -> list[str]:
+    """All settings that any choice of a group has, with the group's name before them."""
+    return sorted({key for keys in _by_choice(group).values() for key in keys})
+
+
+def _by_choice(group: str) -> dict[str, list[str]]:
+    files = sorted((config_folder() / group).glob("*.yaml")) if group else []
+    return {p.stem: [s.key for s in settings_in(p, "" if group == "task" else group)] for p in files}
 
 
 def _default(conf: Path, group: str) -> str:

@@ -17,6 +17,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError, one_of
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.wiring import ONE_JOINT, evaluator_of
+from ee_dist.trials.log import SensorLog
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,13 @@ def _seen(measured: Measurements) -> bool:
     return positions and all(t.log.joints is not None for t in measured.trials)
 
 
+def _driven(log: SensorLog) -> bool:
+    """Whether the log tells at any time what all drives were told."""
+    return bool(np.isfinite(log.commands).all(axis=1).any())
+
+
 def _nothing_commanded(measured: Measurements, by: str) -> str:
-    silent = next(t.name for t in measured.trials if not np.isfinite(t.log.commands).all(axis=1).any())
+    silent = next(t.name for t in measured.trials if not _driven(t.log))
     return (
         f"task.by={by}: trial {silent} holds no commands, so there is nothing to simulate it by; with torques of the drives "
         "in the log task.by=force_balance compares it, otherwise import it with its commands"
@@ -96,7 +102,7 @@ def known_way(by: str) -> None:
 def way_of(measured: Measurements, by: str) -> Way:
     """The way asked for; for ``auto`` the first that the channels allow. Raises ConfigError for one that cannot be."""
     known_way(by)
-    driven = all(np.isfinite(t.log.commands).all(axis=1).any() for t in measured.trials)
+    driven = all(_driven(t.log) for t in measured.trials)
     if by == AUTO:
         torques = all(
             t.log.joints is not None and motor_torques(t.log, measured.robot) is not None for t in measured.trials

@@ -15,6 +15,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
 from ee_dist.measurements.mapping import mapping_of, read_mapping
 from ee_dist.measurements.readers import Options, read
+from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
@@ -27,6 +28,12 @@ def pendulum() -> Robot:
 def table(rows: int = 1115) -> pd.DataFrame:
     t = np.arange(rows) * 0.005
     return pd.DataFrame({"t": t, "q": np.sin(3 * t), "w": 3 * np.cos(3 * t), "g": np.sin(3 * t + 0.03)})
+
+
+def needed(frame: pd.DataFrame) -> np.ndarray:
+    """Torque (T,) in N.m that the pendulum needs for its swing, of ``table``."""
+    q, speed, acceleration = (np.array(x)[:, None] for x in (frame["q"], frame["w"], -9 * frame["q"]))
+    return joint_torques(pendulum(), q, speed, acceleration)[:, 0]
 
 
 GOOD: dict[str, Any] = {
@@ -101,6 +108,15 @@ def q(**changes: Any) -> dict[str, Any]:
             {"sensors": GOOD["sensors"] | {"speed": {"column": "w", "unit": "deg/s"}}},
             "0.0175 times the change of its position",
         ),
+        ({"commands": {"servo": {"column": "g", "unit": "deg"}}}, "servo: its commands are 0.0175 times its positions"),
+        (
+            {"torques": {"servo": {"column": "g", "unit": "N.m"}}},
+            "column 'g' is commands servo and torques servo, but with unit 'rad' and 'N.m'; it is one signal",
+        ),
+        (
+            {"torques": {"servo": {"column": "milli", "unit": "N.m"}}},
+            "torque of servo: is 9.. times what the motion needs .* say unit: mN.m, .*sure: true",
+        ),
         ({"torques": {"servo": {"column": "g2", "unit": "A"}}}, "a current is a torque only through the motor's gain"),
         ({"torques": {"other": {"column": "g2", "unit": "N.m"}}}, "torques: servo_pendulum has no 'other'"),
     ],
@@ -108,10 +124,23 @@ def q(**changes: Any) -> dict[str, Any]:
 def test_wrong_numbers_are_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
     frame = table()
     frame["g2"] = frame["g"]
+    frame["milli"] = 1000 * needed(frame)
     frame.to_csv(tmp_path / "a.csv", index=False)
     with pytest.raises(MeasurementError, match=message) as caught:
         import_file(tmp_path / "a.csv", mapping_of(GOOD | changes, Path("map.yaml")), pendulum())
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("sign", "said"), [(1, []), (-1, ["runs against what the motion needs"])])
+def test_a_torque_of_the_other_sign_is_told(tmp_path: Path, sign: int, said: list[str]) -> None:
+    frame = table()
+    frame["tau"] = sign * needed(frame)
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    told = mapping_of(GOOD | {"torques": {"servo": {"column": "tau", "unit": "N.m"}}}, Path("m"))
+    _, report = import_file(tmp_path / "a.csv", told, pendulum())
+    found = [s for s in report.suspicious if "torque" in s]
+    assert len(found) == len(said)
+    assert all(word in note for word, note in zip(said, found, strict=True))
 
 
 def test_what_was_refused_passes_once_it_is_said_to_be_sure(tmp_path: Path) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
     command_suspicion,
     speed_suspicion,
     suspicions,
     time_suspicion,
+    torque_suspicion,
     unit_suspicion,
 )
 
@@ -24,7 +26,7 @@ def test_good_signals_raise_no_suspicion() -> None:
     assert time_suspicion(0.01, 20, "s") is None
     assert unit_suspicion("x", WAVE, -1.5, 1.5, "rad") is None
     assert speed_suspicion("w", 2 * np.cos(2 * T), WAVE, 0.01) is None
-    assert command_suspicion("j", WAVE, np.sin(2 * T - 0.3)) is None
+    assert command_suspicion("j", WAVE, np.sin(2 * T - 0.3), 0.01) is None
 
 
 @pytest.mark.parametrize(
@@ -47,4 +49,37 @@ def test_units_and_signs() -> None:
     assert "deg" in str(unit_suspicion("x", 57 * WAVE, -1.5, 1.5, "rad"))
     assert "swapped sign" in str(speed_suspicion("w", -2 * np.cos(2 * T), WAVE, 0.01))
     assert "another unit" in str(speed_suspicion("w", 114 * np.cos(2 * T), WAVE, 0.01))
-    assert "swapped sign" in str(command_suspicion("j", -WAVE, WAVE))
+    assert "swapped sign" in str(command_suspicion("j", -WAVE, WAVE, 0.01))
+
+
+@pytest.mark.parametrize(
+    ("factor", "certain"), [(180 / np.pi, True), (np.pi / 180, True), (1000.0, True), (8.0, False)]
+)
+def test_commands_in_another_unit_than_the_positions(factor: float, certain: bool) -> None:
+    note, stops = command_suspicion("j", factor * WAVE, np.sin(2 * T - 0.3), 0.01) or ("", None)
+    assert f"{factor:.3g} times its positions" in note
+    assert stops is certain
+
+
+def test_a_soft_drive_is_in_the_same_unit() -> None:
+    assert command_suspicion("j", WAVE, 0.4 * np.sin(2 * T - 0.3), 0.01) is None
+
+
+@pytest.mark.parametrize(
+    ("correlation", "slope", "word", "certain"),
+    [
+        (0.99, 1000.0, "say unit: mN.m", True),
+        (0.99, 0.001, "another unit than N.m", True),
+        (0.99, 50.0, "50 times what the motion needs", False),
+        (-0.95, -1.1, "sign: -1", False),
+    ],
+)
+def test_torques_that_cannot_be(correlation: float, slope: float, word: str, certain: bool) -> None:
+    note, stops = torque_suspicion("torque of j", Relation(correlation, slope), "N.m") or ("", None)
+    assert word in note
+    assert stops is certain
+
+
+@pytest.mark.parametrize(("correlation", "slope"), [(0.95, 1.2), (0.95, 4.0), (0.3, 900.0), (-0.9, -6.0), (0.0, 0.0)])
+def test_a_model_that_is_off_makes_no_torque_suspicious(correlation: float, slope: float) -> None:
+    assert torque_suspicion("torque of j", Relation(correlation, slope), "N.m") is None

@@ -76,7 +76,9 @@ COMPOSITION: Rows = (
         "evaluator.workers: the chosen evaluator has no such setting;",
     ),
     ("+scenario=8 engine.threads=2", "engine.threads: the chosen engine has no such setting;"),
-    ("task=compare task.bye=free_run", "task.bye: this verb has no such setting; 'python -m ee_dist"),
+    ("task=compare task.bye=free_run", "task.bye: this verb has no such setting; did you mean task.by?"),
+    ("task=import task.maping=x", "task.maping: this verb has no such setting; did you mean task.mapping?"),
+    ("task=compare task.mapping=x", "task.mapping: this verb has no such setting; task=import has it"),
     ("+scenario=8 robot.urdf=x.urdf", "robot.urdf: the chosen robot has no such setting; robot=mjcf"),
     ("+scenario=8 seed=1=2", "settings are written key=value, signs within quotes: key=\"'a=b'\""),
     ("+scenario=8 seed=", "expected a whole number"),
@@ -384,6 +386,7 @@ LOGS: Rows = (
 IMPORTS: Rows = (
     ("task=import", "measured=: which file? name one, several as [a.csv,b.csv], or a"),
     ("task=import measured=nowhere.csv", "nowhere.csv: no such file"),
+    ("task=import measured=nowhere", "nowhere: no such file or folder"),
     ("task=import measured=nothing", "expected .csv, .txt, .tsv, .dat, .parquet, .pq, .json, .jsonl,"),
     ("task=import measured=/dev/zero", "expected .csv, .txt, .tsv, .dat, .parquet, .pq, .json, .jsonl,"),
     ("task=import measured=t.csv task.mapping=/dev/zero", "/dev/zero: not an ordinary file"),

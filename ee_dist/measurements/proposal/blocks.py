@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.words import OTHER, TIME, Reading, read_name, tokens, unit_word
+from ee_dist.measurements.signals import derivative, relation
 from ee_dist.measurements.table import Recorded, Table
 from ee_dist.trials.log import Array
 
@@ -23,6 +25,8 @@ NEARLY = 12
 """Power of a correlation: 0.99 counts 0.89, and 0.9 counts 0.28."""
 ALIKE = 0.5
 """Share of one another that the ratios of speed and change of position have at all joints, or it is chance."""
+SILENT = Reading(None, None, None, None, "", False, False)
+"""What a name says that says nothing."""
 _GENERAL = frozenset(["joint", "link", "motor", "axis", "drive", "servo", "arm", "robot", "j"])
 
 
@@ -60,8 +64,6 @@ def joint_words(joints: Sequence[str]) -> dict[str, frozenset[str]]:
 
 def series_of(table: Table) -> dict[str, Array]:
     """Every column of finite numbers, by address."""
-    from ee_dist.measurements.errors import MeasurementError
-
     found: dict[str, Array] = {}
     for address in table.addresses():
         try:
@@ -160,14 +162,12 @@ def _by_place(
     other, whichever hangs together."""
     size = len(order or joints)
     if size < 2:
-        silent = Reading(None, None, None, None, "", False, False)
-        return [_made(table, (a,), silent, ONLY, series) for a in mute]
+        return [_made(table, (a,), SILENT, ONLY, series) for a in mute]
     if not mute or len(mute) % size:
         return []
     chosen = _hanging_together(mute, size, series)
-    silent = Reading(None, None, None, None, "", False, False)
     places = [list(order or joints).index(j) for j in joints] if order is None or set(joints) <= set(order) else []
-    return [_made(table, tuple(part[p] for p in places), silent, BY_PLACE, series) for part in chosen if places]
+    return [_made(table, tuple(part[p] for p in places), SILENT, BY_PLACE, series) for part in chosen if places]
 
 
 def _hanging_together(mute: list[str], size: int, series: dict[str, Array]) -> list[list[str]]:
@@ -190,8 +190,6 @@ def _hanging_together(mute: list[str], size: int, series: dict[str, Array]) -> l
 
 def _ties(split: list[list[str]], series: dict[str, Array]) -> float:
     """How well each column of a block hangs together with the column at its place in another block."""
-    from ee_dist.measurements.proposal.signals import relation
-
     total = 0.0
     for k, one in enumerate(split):
         for other in split[k + 1 :]:
@@ -203,8 +201,6 @@ def _ties(split: list[list[str]], series: dict[str, Array]) -> float:
 
 def _change(a: Array, b: Array) -> float:
     """How far ``b`` (T, J) is the change of ``a`` (T, J), by one number for all joints that move."""
-    from ee_dist.measurements.proposal.signals import derivative
-
     found = [derivative(a[:, [k]], b[:, [k]], ROWS_APART) for k in range(a.shape[1])]
     slopes = [r.slope for r in found if r.slope]
     if not slopes or min(slopes) * max(slopes) <= 0 or min(map(abs, slopes)) < ALIKE * max(map(abs, slopes)):

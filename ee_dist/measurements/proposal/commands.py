@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ee_dist.measurements.proposal import signals
+from ee_dist.measurements import signals
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.speeds import speed_units

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from ee_dist.measurements.proposal import signals
+from ee_dist.measurements import signals
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.units import UnitChoice, by_ratio

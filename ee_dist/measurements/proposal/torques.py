@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ee_dist.measurements.proposal import signals
+from ee_dist.measurements import signals
+from ee_dist.measurements.need import beside_need, torques_needed
 from ee_dist.measurements.proposal.blocks import BY_NUMBER, BY_PLACE, Block
 from ee_dist.measurements.proposal.model import FIT, LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.units import UnitChoice
@@ -15,12 +16,8 @@ from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, TORQUE
 from ee_dist.measurements.units import UNITS
 from ee_dist.robots.instruments import MOTOR_TORQUE
-from ee_dist.robots.inverse_dynamics import joint_torques
-from ee_dist.robots.model import RobotError
 from ee_dist.trials.log import Array
 
-WINDOW_S = 0.06
-"""Of the means through which torques are compared with what the motion needs."""
 ROUGHER = 1.15
 """What was measured is rougher than what was asked for, by this factor or more."""
 LEAST_SEEN = 0.5
@@ -29,41 +26,21 @@ CLEARLY, WELL = 0.3, 0.3
 """Another order of the joints is asked for if it leaves less than this share of what the robot's leaves, and of all."""
 
 
-def torques_needed(v: View, places: list[int] | None = None) -> tuple[Array, Array] | None:
-    """Torques (T, J) that the motion needs by the model without friction, and its speeds; None where it cannot say.
-    ``places``: the column that each joint has instead of its own."""
-    if not v.units.entries or v.robot.free_base:
+def _needed(v: View, places: list[int] | None = None) -> tuple[Array, Array] | None:
+    """What the motion needs; ``places``: the column that each joint has instead of its own."""
+    if not v.units.entries:
         return None
-    step = v.step(v.position.block)
-    q = signals.smooth(v.metric(), max(3, round(WINDOW_S / step)))
-    q = q if places is None else q[:, places]
-    speed = signals.change(q, step, WINDOW_S)
-    try:
-        found = joint_torques(v.robot, q, speed, signals.change(speed, step, WINDOW_S))
-    except (RobotError, np.linalg.LinAlgError):
-        return None
-    return (found, speed) if np.isfinite(found).all() else None
+    q = v.metric()
+    return torques_needed(v.robot, q if places is None else q[:, places], v.step(v.position.block))
 
 
 def _beside_need(v: View, block: Block, places: list[int] | None = None) -> list[signals.Relation] | None:
     """How a block goes with what the motion needs, joint by joint, friction left aside; None where that is not known."""
-    needed = v.needed if places is None else torques_needed(v, places)
-    if needed is None:
-        return None
+    needed = v.needed if places is None else _needed(v, places)
     values = v.on(v.position.block, block)
-    if values is None:
+    if needed is None or values is None:
         return None
-    need, speed = needed
-    values = values if places is None else values[:, places]
-    width = max(3, round(WINDOW_S / v.step(v.position.block)))
-    for _ in range(3):
-        values = signals.smooth(values, width)
-    found = []
-    for k in range(values.shape[1]):
-        own = speed[:, k]
-        friction = np.stack([own, np.tanh(own / (0.05 * np.abs(own).max() + 1e-12))], axis=1)
-        found.append(signals.beside(values[:, k], need[:, k], friction))
-    return found
+    return beside_need(values if places is None else values[:, places], needed, v.step(v.position.block))
 
 
 def _check_order(v: View, block: Block) -> None:
@@ -90,7 +67,7 @@ def add_torques(v: View) -> None:
     """The torque sensors and the torques of the drives, where a block is the one or the other."""
     sensed = [net or motor for net, motor in zip(v.sensor_names("torque"), v.sensor_names(MOTOR_TORQUE), strict=True)]
     found = []
-    v.needed = torques_needed(v)
+    v.needed = _needed(v)
     for b in v.blocks:
         named = b.reading.kind in (TORQUE, CURRENT) and not b.reading.weak
         if b.used or b.reading.command or not v.moves(b) or not (named or (b.how == BY_PLACE and v.hints.gains)):

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.measurements import signals
 from ee_dist.measurements.alignment import match, one_epoch
-from ee_dist.measurements.proposal import signals
 from ee_dist.measurements.proposal.blocks import BY_NAME, BY_NUMBER, BY_PLACE, Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.time import TimeChoice

@@ -61,6 +61,8 @@ def kind_of(path: Path) -> str | None:
 def read(path: str | Path, options: Options = Options()) -> tuple[Recorded, ...]:  # noqa: B008
     """The trials of a recording. Raises MeasurementError in one line, naming the file, for all that cannot be read."""
     file = Path(path)
+    if not file.exists():
+        raise MeasurementError(f"{file}: no such file or folder")
     chosen = options.kind or kind_of(file)
     if chosen not in READERS and file.is_dir():
         raise MeasurementError(

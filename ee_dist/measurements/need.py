@@ -1,0 +1,41 @@
+"""What a measured motion needs of its drives by the model, and how torques or currents go with it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ee_dist.measurements import signals
+from ee_dist.robots.inverse_dynamics import joint_torques
+from ee_dist.robots.model import Robot, RobotError
+from ee_dist.trials.log import Array
+
+WINDOW_S = 0.06
+"""Of the means through which torques are compared with what the motion needs."""
+
+
+def torques_needed(robot: Robot, position: Array, step_s: float) -> tuple[Array, Array] | None:
+    """Torques (T, J) that a motion (T, J) of the driven joints needs by the model without friction, and its speeds; None where
+    the model cannot say, as for a base that moves about."""
+    if robot.free_base:
+        return None
+    q = signals.smooth(position, max(3, round(WINDOW_S / step_s)))
+    speed = signals.change(q, step_s, WINDOW_S)
+    try:
+        found = joint_torques(robot, q, speed, signals.change(speed, step_s, WINDOW_S))
+    except (RobotError, np.linalg.LinAlgError):
+        return None
+    return (found, speed) if np.isfinite(found).all() else None
+
+
+def beside_need(values: Array, needed: tuple[Array, Array], step_s: float) -> list[signals.Relation]:
+    """How torques or currents (T, J) go with what the motion needs, joint by joint, friction left aside."""
+    need, speed = needed
+    width = max(3, round(WINDOW_S / step_s))
+    for _ in range(3):
+        values = signals.smooth(values, width)
+    found = []
+    for k in range(values.shape[1]):
+        own = speed[:, k]
+        friction = np.stack([own, np.tanh(own / (0.05 * np.abs(own).max() + 1e-12))], axis=1)
+        found.append(signals.beside(values[:, k], need[:, k], friction))
+    return found
