@@ -7,7 +7,8 @@ dry friction is twice what it should be.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -38,6 +39,8 @@ OFTEN = 1
 """How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it."""
 EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
+RETURNS = 2
+"""How often an effect may have been dropped and yet be looked at again: what came later may be dropped in turn."""
 CLOSE = 1.3
 """Error over the noise floor up to which no more than noise is left where no curve stands out."""
 MOST = 24
@@ -57,16 +60,23 @@ def improve(
     effort: Effort = STANDARD_EFFORT,
     most: int = MOST,
     progress: Progress = quiet,
+    climbed: Callable[[Rung], None] | None = None,
 ) -> Improvement:
     """Add ``wanted`` (an empty list: fit only what the model has), or (None) whatever of ``pool`` earns its place, to the
-    model ``before``; fit everything anew."""
+    model ``before``; fit everything anew. ``climbed`` hears of every step of the ladder when it is taken."""
     as_it_is = problem.residuals([before])[0]
     if not np.isfinite(as_it_is).all():
         raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
     search, current = begin(problem, before, progress)
     ladder = [_start("the model as it was", before, as_it_is, problem)]
+
+    def climb(rung: Rung) -> None:
+        ladder.append(rung)
+        if climbed is not None:
+            climbed(rung)
+
     if current.parts:
-        ladder.append(_refitted(search, current))
+        climb(_refitted(search, current))
     last: Examined | None = None
     own = len(current.parts)
     if wanted is not None:
@@ -74,13 +84,12 @@ def improve(
         for c in wanted:
             judged = _asked(search, current, c)
             current = Current(judged.model.parts, judged.u)
-            ladder.append(_rung(search, judged))
+            climb(_rung(search, judged))
     else:
         exchanges, looked, spread, anew = 0, -1, 0, 0
         stopped = f"{most} effects were added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
-            names = {c.name for c in current.parts}
-            others = [c for c in pool if c.name not in names]
+            others = _offered(pool, current, ladder)
             last = _examined(search, current, others, effort)
             if own and len(current.parts) == own:
                 kept = as_it_was(search, last, before, as_it_is, others, effort)
@@ -93,7 +102,8 @@ def improve(
                 looked, anew = len(current.parts), anew + (spread > 0)
                 if found is not None:
                     current, looked, spread = found.current, len(found.current.parts), spread + 1
-                    ladder += found.rungs
+                    for rung in found.rungs:
+                        climb(rung)
                     continue
             if best is None:
                 exchanged = None
@@ -104,7 +114,7 @@ def improve(
                     exchanged = _exchanged(search, current, ladder, own, pool, effort)
                 if exchanged is not None:
                     current, rung = exchanged
-                    ladder.append(rung)
+                    climb(rung)
                     continue
                 nearest = last.judged[0].why_not if last.judged else LUCK
                 stopped = NO_MORE.format(why=nearest)
@@ -127,13 +137,21 @@ def improve(
             )
             if len(current.u) >= LARGE and not problem.rugged:
                 _as_thoroughly(search, current, best.outcome.cut, rung)
-            ladder.append(rung)
+            climb(rung)
         if spread or (len(current.parts) - own > 1 and not problem.rugged):
             # Of two that leave the same mark the values may be anything, and one of them says it all.
             current, gone = told_only(search, current, own, _cut(problem), len(pool), not spread)
             if gone:
-                ladder.append(_refitted(search, current, "without what these data do not tell from neutral", gone))
+                climb(_refitted(search, current, "without what these data do not tell from neutral", gone))
     return _finish(search, current, ladder, as_it_is, stopped, last)
+
+
+def _offered(pool: Sequence[Candidate], current: Current, ladder: Sequence[Rung]) -> list[Candidate]:
+    """What may be added: what is not there yet, and was not dropped as often as that. Two that stand in for one another would
+    take turns to the end."""
+    names = {c.name for c in current.parts}
+    dropped = Counter(name for rung in ladder for name in rung.dropped)
+    return [c for c in pool if c.name not in names and dropped[c.name] < RETURNS]
 
 
 def _examined(search: Search, current: Current, pool: Sequence[Candidate], effort: Effort) -> Examined:

@@ -23,6 +23,7 @@ from typing import Any
 
 import psutil
 
+from ee_dist.basics.arithmetic import SETTINGS
 from ee_dist.evaluation.ray_watch import Watch
 
 
@@ -158,7 +159,9 @@ def start_ray(address: str | None, workers: int) -> None:
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.CRITICAL}
     if address:
         _knock(address)
-        options |= {"address": address, "runtime_env": {"env_vars": ONE_THREAD}}
+        # On machines of a cluster libraries are to compute as they do here.
+        alike = {name: os.environ[name] for name in SETTINGS if name in os.environ}
+        options |= {"address": address, "runtime_env": {"env_vars": {**alike, **ONE_THREAD}}}
         environment: dict[str, str] = {}
     else:
         cores = os.cpu_count() or 1

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from ee_dist.discrepancy.account import Account, compare_account
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, compare_account
 from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.results.commands import asked

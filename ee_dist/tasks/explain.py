@@ -8,11 +8,11 @@ from pathlib import Path
 
 from rich.console import Console
 
+from ee_dist.discrepancy.account import Account, explain_account
 from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.search import Progress, quiet
-from ee_dist.discrepancy.words import Account, explain_account
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,7 +97,9 @@ def run(config: Config, options: Options, out: Path) -> None:
     for line in (*(f"note: {n}" for n in notes), *text.splitlines()):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     console.print(
-        f"wrote {out / options.output}: {len(found)} trial(s) of {robot.name}", highlight=False, soft_wrap=True
+        f"wrote {os.path.relpath(out / options.output)}: {len(found)} trial(s) of {robot.name}",
+        highlight=False,
+        soft_wrap=True,
     )
 
 
@@ -141,13 +144,14 @@ def written(proposal: Proposal, config: Config, files: list[Path], out: Path, co
     names = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
     path = out / MAPPING
     write_whole(path, as_yaml(proposal, robot_source(config), names))
-    console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+    shown = os.path.relpath(path)
+    console.print(f"wrote {shown}", highlight=False, markup=False, soft_wrap=True)
     if proposal.questions:
         more = f" (and {len(proposal.questions) - 1} more)" if len(proposal.questions) > 1 else ""
         raise MeasurementError(
-            f"{names}: what the file cannot say{more}: {proposal.questions[0]}; then again with task.mapping={path}"
+            f"{names}: what the file cannot say{more}: {proposal.questions[0]}; then again with task.mapping={shown}"
             if "task." not in proposal.questions[0]
-            else f"{names}: what the file cannot say{more}: {proposal.questions[0]} (the rest is in {path})"
+            else f"{names}: what the file cannot say{more}: {proposal.questions[0]} (the rest is in {shown})"
         )
     return read_mapping(path)
 

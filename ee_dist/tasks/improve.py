@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,16 +12,17 @@ import yaml
 from rich.console import Console
 
 from ee_dist.basics.files import write_whole
+from ee_dist.discrepancy.account import Account, improve_account
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve
-from ee_dist.discrepancy.ladder import Improvement
+from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import to_entries
-from ee_dist.discrepancy.words import Account, improve_account
+from ee_dist.discrepancy.words import placed
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError
@@ -28,6 +30,7 @@ from ee_dist.tasks.measurements import Measurements, load
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import asked
+from ee_dist.tasks.results.labels import step_phrase
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
 from ee_dist.tasks.results.story import links
@@ -79,7 +82,10 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         if options.calibrate:
             found, calibration = calibrated(measured, config, pool, wanted, options.most, progress)
         else:
-            found = improve(problem, pool, measured.model, wanted, most=options.most, progress=progress)
+            climbed = telling(problem, progress)
+            found = improve(
+                problem, pool, measured.model, wanted, most=options.most, progress=progress, climbed=climbed
+            )
     account = improve_account(problem, found)
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
@@ -103,6 +109,16 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         show_candidates(console, problem, refused, "Tried on top of it, and refused")
     show_account(console, account, out, following)
     return problem, found, account
+
+
+def telling(problem: Problem, progress: SearchProgress) -> Callable[[Rung], None]:
+    """Says every step of the ladder when it is taken, as the table at the end will."""
+
+    def climbed(rung: Rung) -> None:
+        gone = f", without {', '.join(map(placed, rung.dropped))}" if rung.added and rung.dropped else ""
+        progress.note(f"{step_phrase(rung, problem)}{gone}: {problem.told(rung.error_heldout)} on data held out")
+
+    return climbed
 
 
 def effects_of(asked: Any, robot: Robot) -> list[Candidate] | None:

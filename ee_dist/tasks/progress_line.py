@@ -50,3 +50,9 @@ class SearchProgress:
         if another or long:
             self.said, self.short = now, not long
             self.console.print(f"{now - self.began:6.0f} s  {ahead if long else what}", style="dim", highlight=False)
+
+    def note(self, text: str) -> None:
+        """A line that stays: something was found on the way."""
+        self.console.print(
+            f"{time.monotonic() - self.began:6.0f} s  {text}", highlight=False, markup=False, soft_wrap=True
+        )

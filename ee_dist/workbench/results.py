@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ee_dist.discrepancy.account import Account, above, confidence
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, above, confidence, placed, told_all
+from ee_dist.discrepancy.words import placed, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.tasks.results.tables import TIED_STANDING, standing
 from ee_dist.workbench.bench import Step

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from ee_dist.discrepancy.account import compare_account
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.evidence.judge import LUCK
 from ee_dist.discrepancy.evidence.left import leftovers
@@ -23,7 +24,6 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import from_entries, of_trial, to_entries
-from ee_dist.discrepancy.words import compare_account
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.contract import Engine
 from ee_dist.engines.mujoco.engine import MuJoCoEngine

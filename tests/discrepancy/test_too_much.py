@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from way_samples import measure, problem_by, samples
 
+from ee_dist.discrepancy.account import explain_account, improve_account
 from ee_dist.discrepancy.evidence.intervals import NONE_LEFT
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.search.candidates import parse
-from ee_dist.discrepancy.words import explain_account, improve_account, told_all
+from ee_dist.discrepancy.words import told_all
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.model import Robot
 

@@ -6,20 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from ee_dist.discrepancy.account import Account, compare_account, explain_account, improve_account
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.words import (
-    Account,
-    compare_account,
-    explain_account,
-    improve_account,
-    phrase,
-    plain,
-    told,
-    told_all,
-)
+from ee_dist.discrepancy.words import phrase, plain, told, told_all
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped

@@ -138,6 +138,8 @@ def test_every_verb_by_every_way(cli, imported, by):
     again = json.loads((found / "summary.json").read_text())
     assert again["error"] < 0.5 * compared["error"]
     assert again["model_terms"] == improved["model_terms"]
+    told = [line for line in said.out.splitlines() if line.endswith(" on data held out")]
+    assert len(told) == len(improved["ladder"]) - 1
 
 
 def test_auto_takes_the_first_way_that_the_channels_allow(cli, imported):

@@ -7,7 +7,7 @@ from typing import TypeVar
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import placed
+from ee_dist.discrepancy.words import phrase, placed
 from ee_dist.trials.log import Array
 
 MODEL = "model"
@@ -38,6 +38,11 @@ def axis_of(problem: Problem) -> str:
 def step_name(r: Rung) -> str:
     """A step of the ladder: what was added, or, of the first, the model itself."""
     return placed(r.name) if r.added or r.held_out != "nothing was fitted" else f"the {MODEL}"
+
+
+def step_phrase(r: Rung, problem: Problem) -> str:
+    """The same with the values of what was added."""
+    return phrase(r.added, problem.robot) or step_name(r)
 
 
 def trial_name(problem: Problem, trial: int) -> str:

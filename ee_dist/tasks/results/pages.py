@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ee_dist.discrepancy.account import Account, added
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, added, phrase, plain
+from ee_dist.discrepancy.words import phrase, plain
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
 from ee_dist.tasks.results.commands import command

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ee_dist.discrepancy.account import Account, above
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
-from ee_dist.discrepancy.words import Account, above, placed, told_all
+from ee_dist.discrepancy.words import placed, told_all
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, trial_name, unit_of, worst_trials

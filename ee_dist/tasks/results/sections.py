@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ee_dist.discrepancy.account import above
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import above, percent, placed, plain, told_all
+from ee_dist.discrepancy.words import percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, trial_name, worst_trials
 from ee_dist.tasks.results.tables import standing

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ee_dist.discrepancy.account import Account
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
@@ -13,7 +14,6 @@ from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.fitted import Model
-from ee_dist.discrepancy.words import Account
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.summary import hypothesis_list
 

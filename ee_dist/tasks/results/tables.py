@@ -9,15 +9,16 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from ee_dist.discrepancy.account import Account
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import Account, percent, phrase, plain, told_all
+from ee_dist.discrepancy.words import percent, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.results.commands import command
-from ee_dist.tasks.results.labels import step_name, worst_trials
+from ee_dist.tasks.results.labels import step_phrase, worst_trials
 from ee_dist.tasks.results.values import kinds_of, within
 
 TIED_STANDING = "tied with the best"
@@ -70,10 +71,7 @@ def standing(c: Judged, best: Judged) -> str:
 
 
 def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
-    rows = [
-        (phrase(r.added, problem.robot) or step_name(r), problem.told(r.error_fit), problem.told(r.error_heldout))
-        for r in found.ladder
-    ]
+    rows = [(step_phrase(r, problem), problem.told(r.error_fit), problem.told(r.error_heldout)) for r in found.ladder]
     table = _table(f"The ladder: {problem.natural_name}", (("step", False), ("fitted", True), ("held out", True)), rows)
     table.add_section()
     table.add_row("noise floor", "", problem.told(found.noise_floor))

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from ee_dist.discrepancy.account import compare_account
 from ee_dist.discrepancy.compare import by_trial
 from ee_dist.discrepancy.evidence.left import leftovers
-from ee_dist.discrepancy.words import compare_account
 from ee_dist.workbench import charts
 from ee_dist.workbench.pages.curves import Curves
 from ee_dist.workbench.pages.robot import RobotPanel
