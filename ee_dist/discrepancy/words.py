@@ -8,6 +8,8 @@ import re
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.robots.model import Robot
 
+DIGITS, MOST_DIGITS = 3, 8
+"""Of the ends of an interval."""
 MANY = 3
 """Places of one effect from which their values are told as a range: each has its line in a table."""
 
@@ -49,11 +51,18 @@ def is_less(terms: Hypothesis) -> bool:
 
 
 def span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> str:
-    unit = _unit(term, key, robot)
+    """An interval, with as many digits as its ends need to differ."""
+    unit, (a, b) = _unit(term, key, robot), apart(low, high)
     if CATALOGUE[term.effect].parameter(key).on_top and low < 0:
-        more = f"{high:.3g}{unit} more" if high > 0 else f"{-high:.3g}{unit} less"
-        return f"{-low:.3g}{unit} less to {more} than described"
-    return f"{low:.3g} to {high:.3g}{unit}"
+        more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
+        return f"{a.removeprefix('-')}{unit} less to {more} than described"
+    return f"{a} to {b}{unit}"
+
+
+def apart(low: float, high: float) -> tuple[str, str]:
+    """Two numbers with three digits, or with as many as they need to differ."""
+    written = ((f"{low:.{digits}g}", f"{high:.{digits}g}") for digits in range(DIGITS, MOST_DIGITS))
+    return next((pair for pair in written if pair[0] != pair[1]), (f"{low:.{DIGITS}g}", f"{high:.{DIGITS}g}"))
 
 
 def quantity(term: Term, key: str, robot: Robot | None = None) -> str:

@@ -22,7 +22,6 @@ from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import to_entries
-from ee_dist.discrepancy.words import placed
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError
@@ -115,8 +114,7 @@ def telling(problem: Problem, progress: SearchProgress) -> Callable[[Rung], None
     """Says every step of the ladder when it is taken, as the table at the end will."""
 
     def climbed(rung: Rung) -> None:
-        gone = f", without {', '.join(map(placed, rung.dropped))}" if rung.added and rung.dropped else ""
-        progress.note(f"{step_phrase(rung, problem)}{gone}: {problem.told(rung.error_heldout)} on data held out")
+        progress.note(f"{step_phrase(rung, problem)}: {problem.told(rung.error_heldout)} on data held out")
 
     return climbed
 

@@ -11,7 +11,7 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.words import phrase, plain, told, told_all
+from ee_dist.discrepancy.words import phrase, plain, span, told, told_all
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped
@@ -174,3 +174,19 @@ def test_units_are_told_behind_values_and_not_in_names():
     assert told(term("coulomb_friction", "servo", torque_nm=0.1), servo) == "coulomb friction at servo (torque 0.1 N.m)"
     soft = told(term("elastic_transmission", "carriage", compliance_rad_nm=1e-4), stage)
     assert soft == "elastic transmission at carriage (compliance 0.0001 m/N)"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [
+        (0.1, 0.2, "0.1 to 0.2"),
+        (0.1118, 0.1124, "0.1118 to 0.1124"),
+        (0.3, 0.3, "0.3 to 0.3"),
+        (-0.000569, -0.000259, "0.000569 less to 0.000259 less than described"),
+        (-0.01, 0.02, "0.01 less to 0.02 more than described"),
+    ],
+)
+def test_the_ends_of_an_interval_differ(low: float, high: float, said: str) -> None:
+    unit = " kg.m^2"
+    found = span(term("rotor_inertia", "servo", added_kg_m2=0.1), "added_kg_m2", low, high, None)
+    assert found.replace(unit, "") == said

@@ -41,8 +41,9 @@ def step_name(r: Rung) -> str:
 
 
 def step_phrase(r: Rung, problem: Problem) -> str:
-    """The same with the values of what was added."""
-    return phrase(r.added, problem.robot) or step_name(r)
+    """The same with the values of what was added, and with what went for it."""
+    gone = f"; without {', '.join(map(placed, r.dropped))}" if r.added and r.dropped else ""
+    return (phrase(r.added, problem.robot) or step_name(r)) + gone
 
 
 def trial_name(problem: Problem, trial: int) -> str:
