@@ -48,9 +48,11 @@ from ee_dist.tasks.folder import (
     shown,
 )
 from ee_dist.tasks.help import answer
+from ee_dist.tasks.sweep import Jobs
 from ee_dist.tasks.unfinished import can_go_on, finished, unfinished
 
 MISTAKE, DEFECT = 2, 1
+_jobs = Jobs()
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -65,6 +67,7 @@ def run(composed: DictConfig) -> None:
         check_used(list(hydra_settings.overrides.task), str(composed.task.name))
         how = handling(composed)
         if how.resume is not None and resumed(out, config, options, how.overwrite):
+            _jobs.well += 1
             return
         free = how.overwrite or how.resume is not None
         with (
@@ -72,16 +75,17 @@ def run(composed: DictConfig) -> None:
             unfinished(out, config, options, how.resume is not None),
         ):
             module.run(config, options, out)
+        _jobs.well += 1
     except RayLostError as error:
         remove_made()
         _lost(str(error), out)
     except USER_ERRORS as error:
         remove_made()
         onward = "" if isinstance(error, ConfigError) else _how_to_go_on(out)
-        sys.exit(_complain(f"{error}{onward}"))
+        _broken(f"{error}{onward}", out)
     except OmegaConfBaseException as error:
         remove_made()
-        sys.exit(_complain(plain(error)))
+        _broken(plain(error), out)
     except OSError as error:
         remove_made()
         sys.exit(_complain(_unwritten(error) + _how_to_go_on(out)))
@@ -91,9 +95,19 @@ def run(composed: DictConfig) -> None:
     except Exception as error:
         if (left := leaving.asked()) is not None:
             _stopped(left, out)
-        sys.exit(_complain(defect(error, out), DEFECT))
+        _broken(defect(error, out), out, DEFECT)
     except KeyboardInterrupt as stop:
         _stopped(stop, out)
+
+
+def _broken(text: str, out: Path, status: int = MISTAKE) -> None:
+    """One line of what was wrong with a run; the end of it, and of all, unless others of a sweep may do better."""
+    _complain(text, status)
+    alone = HydraConfig.get().mode != RunMode.MULTIRUN or multiprocessing.parent_process() is not None
+    if alone or not _jobs.goes_on:
+        sys.exit(status)
+    _jobs.folder = _whole(out)
+    _jobs.broken.append((out, status))
 
 
 def _stopped(stop: KeyboardInterrupt, out: Path) -> NoReturn:
@@ -169,6 +183,7 @@ def main() -> int:
     # Rerun's own log would add lines to a complaint that is made in one.
     os.environ.setdefault("RUST_LOG", "off")
     leaving.arm()
+    _jobs.well, _jobs.broken = 0, []
     sys.argv[1:] = quoted(sys.argv[1:])
     try:
         told = answer(sys.argv[1:])
@@ -179,6 +194,8 @@ def main() -> int:
         check_sweep(sys.argv[1:])
         folder = config_folder()
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()
+        if _jobs.broken:
+            return _complain(_jobs.account(), _jobs.status)
     except (*USER_ERRORS, Refused) as error:
         return _complain(str(error))
     except HydraException as error:

@@ -32,6 +32,18 @@ def test_a_sweep_gives_each_job_its_own_folder(cli, tiny):
     assert not [name for name in names if set("'+ ") & set(name)], "a shell must take them as they are"
 
 
+def test_a_run_that_goes_wrong_does_not_stop_the_sweep(cli, tiny):
+    """The others are made; the end says which is missing, and what makes it."""
+    once = ("budget.compensating_trials=1", "hydra.sweep.dir=logs/all")
+    outcome = cli("-m", "+scenario=9", "seed=0,-1,1", "evaluator=serial", *tiny, *once)
+    assert outcome.status == 2
+    assert [json.loads((run / "summary.json").read_text())["seed"] for run in outcome.runs()] == [0, 1]
+    first, last = outcome.err.strip().splitlines()
+    assert "seed=-1" in first
+    assert "1 of 3 runs ended early: logs/all/" in last
+    assert "resume=logs/all" in last
+
+
 def test_the_runs_of_a_sweep_go_side_by_side_with_the_same_digests(cli, tiny):
     sweep = ["-m", "+scenario=1,9", "evaluator=serial", *tiny, "budget.compensating_trials=1"]
     digests = []
