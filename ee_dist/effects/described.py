@@ -1,12 +1,13 @@
-"""What an effect takes off a description, and that it is no more than was described."""
+"""What effects make of a description: nothing that cannot be, and no more taken off than was described."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from ee_dist.effects.catalogue import EffectError, Hypothesis, find
+from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, find
 from ee_dist.effects.groups import members_of
-from ee_dist.robots.model import Drive, Robot
+from ee_dist.robots.model import Drive, Robot, RobotError
+from ee_dist.robots.numbers import checked
 from ee_dist.robots.ranges import drive_of
 from ee_dist.robots.system import System
 
@@ -23,10 +24,19 @@ def with_more(robot: Robot, target: str, law: str, value: float) -> Robot:
     return robot.map_drive(target, changed)
 
 
-def not_too_much(robot: System, terms: Hypothesis) -> None:
-    """Raises EffectError for a value, as somebody wrote it, that takes off more than the robot is described with."""
+def check_written(robot: System, terms: Hypothesis) -> None:
+    """Raises EffectError for a value, as somebody wrote it, that takes off more than the robot is described with, or makes of it
+    what no robot can be."""
     if not isinstance(robot, Robot):
         return
+    _not_too_much(robot, terms)
+    try:
+        checked(apply(robot, terms), "with these effects")
+    except RobotError as error:
+        raise EffectError(str(error)) from None
+
+
+def _not_too_much(robot: Robot, terms: Hypothesis) -> None:
     for t in terms:
         entry, values = find(t.effect), dict(t.values)
         for p in entry.parameters:

@@ -18,7 +18,7 @@ import yaml
 from ee_dist.basics.files import write_whole
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
-from ee_dist.effects.described import not_too_much
+from ee_dist.effects.described import check_written
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.serial import robot_to_dict
@@ -55,7 +55,7 @@ def read_model(path: str | Path) -> ModelFile:
     try:
         terms = tuple(from_dict(e) for e in entries)
         apply(robot, terms)
-        not_too_much(robot, terms)
+        check_written(robot, terms)
     except EffectError as error:
         raise EffectError(f"{file}: {error}") from None
     return ModelFile(robot, terms, data["robot"], file.parent)

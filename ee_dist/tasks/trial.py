@@ -20,7 +20,7 @@ from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.measured_trial import driver_of
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, apply, find, from_dict, term
-from ee_dist.effects.described import not_too_much
+from ee_dist.effects.described import check_written
 from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recording.records import HARDWARE, TrialRecord
@@ -162,7 +162,7 @@ def hypothesis(asked: Any, robot: Robot, seed: np.random.SeedSequence) -> Hypoth
             f"hidden={asked}: give effect@target, random, or a list such as [{{effect: ..., target: ...}}]"
         )
     terms = tuple(from_dict(e) if isinstance(e, Mapping) else _by_name(robot, str(e)) for e in asked)
-    not_too_much(robot, terms)
+    check_written(robot, terms)
     return terms
 
 

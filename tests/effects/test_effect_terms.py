@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from ee_dist.effects import CATALOGUE, EffectError, Parameter, Term, apply, effect, term
 from ee_dist.effects.catalogue import find, from_dict
-from ee_dist.effects.described import not_too_much
+from ee_dist.effects.described import check_written
 from ee_dist.effects.targets import motors
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped import quadruped
@@ -102,7 +102,7 @@ def test_friction_that_is_described_can_be_taken_off_and_no_more(effect: str, ke
     more = term(effect, "servo", **{key: -0.4})
     assert getattr(apply(rough, (more,)).drives[0], law) == 0.0, "two effects of a search may take off the same"
     with pytest.raises(EffectError, match=r"servo is described with 0.3 .* of it; 0.4 cannot be taken off"):
-        not_too_much(rough, (more,))
+        check_written(rough, (more,))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])
@@ -133,7 +133,7 @@ def test_taking_away_more_rotor_than_there_is_is_refused() -> None:
     with pytest.raises(
         EffectError, match=r"rotor_inertia at hip_front_left .*described with 0.012 .*1 cannot be taken off"
     ):
-        not_too_much(QUADRUPED, (term("rotor_inertia", "hip_front_left", added_kg_m2=-1.0),))
+        check_written(QUADRUPED, (term("rotor_inertia", "hip_front_left", added_kg_m2=-1.0),))
 
 
 @pytest.mark.parametrize(

@@ -278,6 +278,7 @@ MODELS: Rows = (
     ("task=export model=parameter.yaml", "parameter.yaml: viscous_friction has no parameter 'damping'; it"),
     ("task=export model=value.yaml", "must be a number (N.m.s/rad), not 'much'"),
     ("task=export model=bounds.yaml", "bounds.yaml: motor_weak: loss = 5 lies outside [0, 1]"),
+    ("task=export model=huge.yaml", "with these effects: drives: servo: coulomb: 1e+300; expected 0 to 1e+09"),
     ("task=export model=less.yaml", "servo is described with 0 N.m.s/rad of it; 5 cannot be taken off"),
     ("task=export model=nan.yaml", "must be a number (N.m.s/rad), not nan"),
     ("task=export model=nameless.yaml", "nameless.yaml: an entry without 'effect': {'target': 'servo'}"),

@@ -157,6 +157,7 @@ def texts() -> dict[str, str]:
         "parameter.yaml": SERVO % "{effect: viscous_friction, target: servo, damping: 0.005}",
         "value.yaml": SERVO % "{effect: viscous_friction, target: servo, damping_nm_s_rad: much}",
         "bounds.yaml": SERVO % "{effect: motor_weak, target: servo, loss: 5}",
+        "huge.yaml": SERVO % "{effect: coulomb_friction, target: servo, torque_nm: 1.0e+300}",
         "less.yaml": SERVO % "{effect: viscous_friction, target: servo, damping_nm_s_rad: -5}",
         "nan.yaml": SERVO % "{effect: viscous_friction, target: servo, damping_nm_s_rad: .nan}",
         "nameless.yaml": SERVO % "{target: servo}",
