@@ -27,8 +27,15 @@ Curve = Sequence[tuple[int, float]]
 """(trials on the body so far, best distance in m) of each generation."""
 
 
-def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) -> go.Figure:
-    """Mean forward distance intact, after the change and at the last trial for each case, every run as a dot."""
+def distances(
+    summaries: Sequence[dict[str, Any]], metric: str, tests: Tests, also: Sequence[dict[str, Any]] = (),
+    last: str = "last trial",
+) -> go.Figure:  # fmt: skip
+    """Mean forward distance intact, after the change and at the last trial for each case, every run as a dot.
+
+    Runs of ``also`` are not drawn, but the axis has room for them: figures of several metrics are then of one scale. ``last``:
+    what the last trial is called.
+    """
     groups: dict[int, list[dict[str, Any]]] = defaultdict(list)
     for s in summaries:
         groups[s["scenario"]].append(s)
@@ -44,11 +51,11 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
             x=at,
             y=means,
             width=0.25,
-            name=name,
+            name=(called := last if name == "last trial" else name),
             marker_color=colour,
             opacity=0.75,
             error_y={"array": spread, "width": 3, "color": "#7d8b9a"},
-            hovertemplate=f"{name}: %{{y:.2f}} m<extra></extra>",
+            hovertemplate=f"{called}: %{{y:.2f}} m<extra></extra>",
         )
         figure.add_scatter(
             x=[a for a, v in zip(at, values, strict=True) for _ in v],
@@ -56,10 +63,13 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
             mode="markers",
             marker={"color": colour, "size": 5, "line": {"color": "#ffffff", "width": 0.5}},
             showlegend=False,
-            hovertemplate=f"{name}: %{{y:.2f}} m<extra></extra>",
+            hovertemplate=f"{called}: %{{y:.2f}} m<extra></extra>",
         )
         for v, mean, wide in zip(values, means, spread, strict=True):
             low, high = min(low, mean - wide, float(v.min())), max(high, mean + wide, float(v.max()))
+    for s in also:
+        values_m = [_distance(s["distance_m"], name) for name in STAGES]
+        low, high = min(low, *values_m), max(high, *values_m)
     room = ROOM * ((high - low) or 1.0)
     said = [(i, tests[metric, c]) for i, c in enumerate(cases) if tests.get((metric, c))]
     for i, told in said:
@@ -92,21 +102,35 @@ def _turned(count: int, angle: int) -> dict[str, object]:
 
 
 def dominants(summaries: Sequence[dict[str, Any]]) -> go.Figure:
-    """New bests found so far in the diagnosis passes, mean over passes and runs, for each metric."""
-    figure, longest = go.Figure(), 0
+    """New bests found so far in the diagnosis passes for each metric: the mean of all runs, and in the band the middle half of
+    the runs (each the mean of its passes)."""
+    figure, longest, most = go.Figure(), 0, 0.0
     for k, metric in enumerate(sorted({s["metric"] for s in summaries})):
-        curves = [c for s in summaries if s["metric"] == metric for c in s["dominants"]["diagnosis"]]
-        shortest = min(map(len, curves))
-        mean = np.mean([c[:shortest] for c in curves], axis=0)
-        longest = max(longest, shortest)
-        name = METRICS.get(metric, metric)
-        line = {"color": LINES[k % len(LINES)], "width": 2}
-        figure.add_scatter(x=list(range(shortest)), y=[float(v) for v in mean], name=name, mode="lines", line=line)
+        runs = [_mean_curve(s["dominants"]["diagnosis"]) for s in summaries if s["metric"] == metric]
+        shortest = min(map(len, runs))
+        curves = np.array([c[:shortest] for c in runs])
+        low, high = np.quantile(curves, [0.25, 0.75], axis=0)
+        longest, most = (
+            max(longest, shortest),
+            max(most, float(high.max(initial=0.0)), float(curves.mean(axis=0).max())),
+        )
+        name, colour, at = METRICS.get(metric, metric), LINES[k % len(LINES)], list(range(shortest))
+        figure.add_scatter(x=[*at, *reversed(at)], y=[*map(float, high), *map(float, low[::-1])], fill="toself", mode="none",
+                           fillcolor=colour, opacity=0.18, showlegend=False, hoverinfo="skip", name=name)  # fmt: skip
+        line = {"color": colour, "width": 2.5}
+        mean = [float(v) for v in curves.mean(axis=0)]
+        figure.add_scatter(x=at, y=mean, name=name, mode="lines", line=line, hovertemplate="%{y:.1f}")
     styled(figure, 330)
     figure.update_layout(showlegend=True)
     figure.update_xaxes(title_text="generation", rangemode="tozero", dtick=1 if longest < 10 else None)
-    figure.update_yaxes(title_text="new bests so far", rangemode="tozero")
+    figure.update_yaxes(title_text="new bests so far", range=[0, (1 + ROOM) * (most or 1.0)])
     return figure
+
+
+def _mean_curve(passes: Sequence[Sequence[int]]) -> list[float]:
+    """Mean over the passes of a run, as long as the shortest."""
+    shortest = min(map(len, passes))
+    return [float(v) for v in np.mean([p[:shortest] for p in passes], axis=0)]
 
 
 def on_the_body(before: Curve, after: Curve) -> go.Figure:
@@ -123,7 +147,8 @@ def on_the_body(before: Curve, after: Curve) -> go.Figure:
 
 
 def _wrapped(text: str) -> str:
-    return "<br>".join(textwrap.wrap(text, LABEL))
+    # A per cent sign stays with its number.
+    return "<br>".join(textwrap.wrap(text.replace(" %", "\u00a0%"), LABEL))
 
 
 def _distance(distances_m: dict[str, Any], name: str) -> float:
