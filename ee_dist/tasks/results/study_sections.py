@@ -39,7 +39,7 @@ def last_name(rows: Rows) -> str:
 
 def head(rows: Rows) -> tuple[str, ...]:
     """Of the table of cases."""
-    return ("case", "runs", "intact (m)", "after (m)", "best (m)", f"{last_name(rows)} (m)", "restored", "right", "named",
+    return ("case", "runs", "intact (m)", "after (m)", "best (m)", f"{last_name(rows).removesuffix(' trial')} (m)", "restored", "right", "named",
             "doubt", "gain (m)", "rank corr.", "p", "least p")  # fmt: skip
 
 
