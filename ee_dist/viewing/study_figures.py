@@ -18,6 +18,8 @@ METRICS = {"rolling_mean": "diagnosed by rolling means", "distance": "diagnosed 
 LINES = ("#3b7dd8", "#e08a1e", "#7a5bd0", "#2f9e6e")
 LABEL = 13
 """Characters of a line of a case's name below its bars."""
+MANY, SHORT_LABEL = 10, 10
+"""Of more cases than this the lines have fewer characters."""
 ROOM = 0.12
 """Free share of the axis beyond the farthest bar with its spread."""
 
@@ -75,7 +77,8 @@ def distances(
     for i, told in said:
         figure.add_annotation(x=i, y=high + room / 5, yanchor="bottom", text=told, showarrow=False)
     styled(figure, 430)
-    full = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}") for c in cases]
+    width = LABEL if len(cases) <= MANY else SHORT_LABEL
+    full = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}", width) for c in cases]
     # On a narrow page a case has room for its number alone, and what the test says stands upright.
     short = [str(c) for c in cases] if len(cases) > 3 else full
     upright = -90 if len(cases) > 3 else 0
@@ -146,9 +149,9 @@ def on_the_body(before: Curve, after: Curve) -> go.Figure:
     return figure
 
 
-def _wrapped(text: str) -> str:
+def _wrapped(text: str, width: int) -> str:
     # A per cent sign stays with its number.
-    return "<br>".join(textwrap.wrap(text.replace(" %", "\u00a0%"), LABEL))
+    return "<br>".join(textwrap.wrap(text.replace(" %", "\u00a0%"), width))
 
 
 def _distance(distances_m: dict[str, Any], name: str) -> float:

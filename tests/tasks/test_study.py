@@ -170,8 +170,9 @@ def test_the_first_lines_of_a_study_tell_what_how_sure_and_what_next():
 
 
 @pytest.mark.parametrize(("width", "dark"), [(1280, True), (400, False)], ids=["wide-dark", "narrow-light"])
-def test_the_page_of_a_study_is_quiet_and_fits(window, tmp_path, width, dark):
-    page = write_page(page_of(study_of(range(1, 11), range(3))), tmp_path / "report.html")
+@pytest.mark.parametrize("runs", [1, 3])
+def test_the_page_of_a_study_is_quiet_and_fits(window, tmp_path, width, dark, runs):
+    page = write_page(page_of(study_of(range(1, 14), range(runs))), tmp_path / "report.html")
     seen = window.look(page, width, dark=dark)
     assert seen.complaints == () and seen.asked == () and seen.overflow == 0
     overlapping = (

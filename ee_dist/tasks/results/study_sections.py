@@ -39,8 +39,9 @@ def last_name(rows: Rows) -> str:
 
 def head(rows: Rows) -> tuple[str, ...]:
     """Of the table of cases."""
-    return ("case", "runs", "intact (m)", "after (m)", "best (m)", f"{last_name(rows).removesuffix(' trial')} (m)", "restored", "right", "named",
-            "doubt", "gain (m)", "rank corr.", "p", "least p")  # fmt: skip
+    last = last_name(rows).removesuffix(" trial")
+    return ("case", "runs", "intact (m)", "after (m)", "best (m)", f"{last} (m)", "restored", "right", "named", "doubt",
+            "gain (m)", "rank corr.", "p", "least p")  # fmt: skip
 
 
 def p_text(line: Mapping[str, Any]) -> str:
@@ -87,7 +88,9 @@ def gain(test: Paired) -> str:
 def distance_section(metric: str, summaries: Rows, rows: Rows, lines: Rows) -> Section:
     """The paper's Fig. 7 of one metric; all metrics have one scale."""
     mine, last = [x for x in lines if x["metric"] == metric], last_name(rows)
-    tests = {(metric, x["scenario"]): p_text(x) for x in mine}
+    # Where nothing could be tested the heading says so, and nothing stands above the bars.
+    tested = any(math.isfinite(x["p_corrected"]) for x in mine)
+    tests = {(metric, x["scenario"]): p_text(x) for x in mine if tested}
     own = [s for s in summaries if s["metric"] == metric]
     figure = distances(own, metric, tests, summaries, last)
     return Section(_distance_heading(metric, mine, last), CAPTION, figure)
