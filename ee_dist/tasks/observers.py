@@ -1,12 +1,14 @@
-"""Passes what a run tells on to its recording, and keeps what its beliefs went through."""
+"""Passes what a run tells on to its recording, and keeps what its beliefs went through and what was measured."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from ee_dist.recording.records import EVOLVING, GenerationRecord, HypothesisRecord, TrialRecord
+from ee_dist.recording.records import EVOLVING, HARDWARE, GenerationRecord, HypothesisRecord, TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.recovery.observer import Observer
+from ee_dist.trials.log import SensorLog
 
 
 class Recorder(Observer):
@@ -38,3 +40,14 @@ class Beliefs(Observer):
             if r.pass_index == len(self.stages):
                 self.stages.append({})
             self.stages[r.pass_index][r.stage] = r.error
+
+
+class Measured(Observer):
+    """The trials on hardware in their order: what drove each, and its log."""
+
+    def __init__(self) -> None:
+        self.trials: list[tuple[Any, SensorLog]] = []
+
+    def trial(self, record: TrialRecord) -> None:
+        if record.source == HARDWARE:
+            self.trials.append((record.driver, record.log))

@@ -21,13 +21,15 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recording.records import DIAGNOSIS, POLISHED, REPAIR
 from ee_dist.recording.writer import RunWriter
+from ee_dist.recovery.doubt import Doubt, doubt
 from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.loop import Recovery, recover
+from ee_dist.recovery.metrics import RollingMean
 from ee_dist.recovery.observer import Observers
 from ee_dist.recovery.subject import Subject
 from ee_dist.tasks.compose import config_folder
 from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig, one_of
-from ee_dist.tasks.observers import Beliefs, Recorder
+from ee_dist.tasks.observers import Beliefs, Measured, Recorder
 from ee_dist.tasks.outcome import Gaits, Score, score
 from ee_dist.tasks.progress import PassProgress, starting
 from ee_dist.tasks.run_digest import ResultDigest
@@ -100,7 +102,7 @@ def run(config: Config, options: Options, out: Path) -> None:
                   f"{config.engine.name}.", highlight=False)  # fmt: skip
     path = out / "recovery.mcap"
     digest = ResultDigest()
-    beliefs, gaits = Beliefs(), Gaits(robot, hidden)
+    beliefs, gaits, measured = Beliefs(), Gaits(robot, hidden), Measured()
     passes = {REPAIR: plan.compensating_trials + 1, DIAGNOSIS: plan.compensating_trials}
     share = metric.steps(plan.steps) * plan.compensating_trials / 2
     weights = {
@@ -116,11 +118,24 @@ def run(config: Config, options: Options, out: Path) -> None:
     ):
         # Slow to load, and needed only later: done while the first controllers run.
         Thread(target=_load, args=("scipy.stats", "ee_dist.viewing.scenes"), daemon=True).start()
-        observer = Observers(Recorder(writer), digest, beliefs, gaits, progress)
+        observer = Observers(Recorder(writer), digest, beliefs, gaits, measured, progress)
         result = recover(robot, first, later, metric, plan, evaluator, search_seed, observer)
+        # After the search: nothing of it, nor of what it is said to have cost, depends on the doubt.
+        counts = evaluator.counts.copy()
+        yardstick = metric if isinstance(metric, RollingMean) else RollingMean()
+        (doubt_seed,) = seeds.spawn(1)
+        last = doubt(
+            robot,
+            result.hypotheses[-1],
+            measured.trials[:1],
+            measured.trials[1:],
+            yardstick,
+            evaluator,
+            config.noise,
+            doubt_seed,
+        )
         known = {} if truth is None else {"truth": json.dumps([t.as_dict() for t in truth])}
-        writer.finish({"result_digest": digest.hex, **known})
-    counts = evaluator.counts
+        writer.finish({"result_digest": digest.hex, "doubt": json.dumps(last.as_dict()), **known})
     hardware.close()
     refused = gaits.compensating if options.gaits == "walking" else ()
     final = score(result.intact, result.trials, result.hypotheses[-1], hidden, refused)
@@ -142,12 +157,13 @@ def run(config: Config, options: Options, out: Path) -> None:
         "restored": final.restored,
         "gaits": {"counted": options.gaits, "no_gait": [list(c) for c in gaits.cheats]},
         "diagnosis": None if truth is None else _diagnosis(final),
+        "doubt": last.as_dict(),
         "evaluations": {"asked": counts.asked, "simulated": counts.simulated, "steps": counts.steps,
                         "asked_steps": counts.asked_steps},
     })  # fmt: skip
     recording = drawn(path)
     wall, _ = watch.read()
-    _print(console, subject, result, truth, final, gaits.cheats)
+    _print(console, subject, result, truth, final, gaits.cheats, last)
     if config.budget.name == "quick":
         console.print(QUICK, highlight=False)
     saved = 1 - counts.simulated / max(counts.asked, 1)
@@ -186,6 +202,7 @@ def _print(
     truth: Hypothesis | None,
     final: Score,
     cheats: Sequence[tuple[str, ...]],
+    last: Doubt,
 ) -> None:
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("trial")
@@ -214,6 +231,7 @@ def _print(
         + ("" if truth is None else f" Diagnosis: {named}."),
         highlight=False,
     )
+    console.print(last.words, highlight=False)
 
 
 def _unwalked(cheats: Sequence[tuple[str, ...]], final: Score) -> str:

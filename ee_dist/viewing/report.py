@@ -22,13 +22,15 @@ LEAST_WIDE = 250
 
 @dataclass
 class Table:
-    """``numeric``: indices of columns set to the right. ``lead``: rows that stand out; ``pale``: rows that count less."""
+    """``numeric``: indices of columns set to the right. ``lead``: rows that stand out; ``pale``: rows that count less.
+    ``whole``: shown in its full height, however long it is."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     numeric: Sequence[int] = ()
     lead: Sequence[int] = ()
     pale: Sequence[int] = ()
+    whole: bool = False
 
 
 @dataclass

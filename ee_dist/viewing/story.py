@@ -18,6 +18,7 @@ from ee_dist.recording.records import (
     RunRecord,
     TrialRecord,
 )
+from ee_dist.recovery.doubt import Doubt, doubt_from
 from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.subject import Subject
 from ee_dist.robots.system import System
@@ -45,6 +46,14 @@ def truth_of(run: RunRecord) -> Hypothesis | None:
     if not text:
         return None
     return tuple(_term(entry) for entry in json.loads(text))
+
+
+def doubt_of(run: RunRecord) -> Doubt | None:
+    """Whether something is wrong that the last belief does not say; None where the recording does not tell."""
+    try:
+        return doubt_from(json.loads(run.metadata["doubt"]))
+    except (KeyError, TypeError, ValueError):
+        return None
 
 
 def _term(entry: dict[str, Any]) -> Term:
@@ -116,6 +125,8 @@ def finding(run: RunRecord) -> list[str]:
             f"; it foresaw {subject.measure(subject.value(foreseen.log))} for the last trial, which went {went}"
         )
     lines[-1] += "."
+    if doubt := doubt_of(run):
+        lines.append(f"**{doubt.words}**" if doubt.said else doubt.words)
     scenario = run.metadata.get("scenario", "")
     if scenario.isdigit() and int(scenario):
         lines.append(f"Next, how much of it is luck: `python -m ee_dist -m +scenario={scenario} seed=0,1,2`")
@@ -159,7 +170,7 @@ def result_text(run: RunRecord) -> str:
 def details_text(run: RunRecord) -> str:
     """Everything that the recording says about itself, for the tab behind the first one."""
     lines = ["# About this run", "", "| key | value |", "|---|---|"]
-    lines += [f"| {key} | {value} |" for key, value in sorted(run.metadata.items()) if key != "truth"]
+    lines += [f"| {key} | {value} |" for key, value in sorted(run.metadata.items()) if key not in ("truth", "doubt")]
     last = [h for h in run.hypotheses if h.final or h.stage != EVOLVING]
     for pass_index in sorted({h.pass_index for h in last}):
         lines += ["", f"## Diagnosis {pass_index + 1}: its last population, and what was made of the best", ""]

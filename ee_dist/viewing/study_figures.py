@@ -18,6 +18,8 @@ METRICS = {"rolling_mean": "diagnosed by rolling means", "distance": "diagnosed 
 LINES = ("#3b7dd8", "#e08a1e", "#7a5bd0", "#2f9e6e")
 LABEL = 13
 """Characters of a line of a case's name below its bars."""
+MANY, SHORT_LABEL = 10, 10
+"""Of more cases than this the lines have fewer characters."""
 ROOM = 0.12
 """Free share of the axis beyond the farthest bar with its spread."""
 
@@ -27,8 +29,15 @@ Curve = Sequence[tuple[int, float]]
 """(trials on the body so far, best distance in m) of each generation."""
 
 
-def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) -> go.Figure:
-    """Mean forward distance intact, after the change and at the last trial for each case, every run as a dot."""
+def distances(
+    summaries: Sequence[dict[str, Any]], metric: str, tests: Tests, also: Sequence[dict[str, Any]] = (),
+    last: str = "last trial",
+) -> go.Figure:  # fmt: skip
+    """Mean forward distance intact, after the change and at the last trial for each case, every run as a dot.
+
+    Runs of ``also`` are not drawn, but the axis has room for them: figures of several metrics are then of one scale. ``last``:
+    what the last trial is called.
+    """
     groups: dict[int, list[dict[str, Any]]] = defaultdict(list)
     for s in summaries:
         groups[s["scenario"]].append(s)
@@ -44,11 +53,11 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
             x=at,
             y=means,
             width=0.25,
-            name=name,
+            name=(called := last if name == "last trial" else name),
             marker_color=colour,
             opacity=0.75,
             error_y={"array": spread, "width": 3, "color": "#7d8b9a"},
-            hovertemplate=f"{name}: %{{y:.2f}} m<extra></extra>",
+            hovertemplate=f"{called}: %{{y:.2f}} m<extra></extra>",
         )
         figure.add_scatter(
             x=[a for a, v in zip(at, values, strict=True) for _ in v],
@@ -56,16 +65,20 @@ def distances(summaries: Sequence[dict[str, Any]], metric: str, tests: Tests) ->
             mode="markers",
             marker={"color": colour, "size": 5, "line": {"color": "#ffffff", "width": 0.5}},
             showlegend=False,
-            hovertemplate=f"{name}: %{{y:.2f}} m<extra></extra>",
+            hovertemplate=f"{called}: %{{y:.2f}} m<extra></extra>",
         )
         for v, mean, wide in zip(values, means, spread, strict=True):
             low, high = min(low, mean - wide, float(v.min())), max(high, mean + wide, float(v.max()))
+    for s in also:
+        values_m = [_distance(s["distance_m"], name) for name in STAGES]
+        low, high = min(low, *values_m), max(high, *values_m)
     room = ROOM * ((high - low) or 1.0)
     said = [(i, tests[metric, c]) for i, c in enumerate(cases) if tests.get((metric, c))]
     for i, told in said:
         figure.add_annotation(x=i, y=high + room / 5, yanchor="bottom", text=told, showarrow=False)
     styled(figure, 430)
-    full = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}") for c in cases]
+    width = LABEL if len(cases) <= MANY else SHORT_LABEL
+    full = [_wrapped(f"{c}. {groups[c][0].get('title') or 'scenario'}", width) for c in cases]
     # On a narrow page a case has room for its number alone, and what the test says stands upright.
     short = [str(c) for c in cases] if len(cases) > 3 else full
     upright = -90 if len(cases) > 3 else 0
@@ -92,21 +105,35 @@ def _turned(count: int, angle: int) -> dict[str, object]:
 
 
 def dominants(summaries: Sequence[dict[str, Any]]) -> go.Figure:
-    """New bests found so far in the diagnosis passes, mean over passes and runs, for each metric."""
-    figure, longest = go.Figure(), 0
+    """New bests found so far in the diagnosis passes for each metric: the mean of all runs, and in the band the middle half of
+    the runs (each the mean of its passes)."""
+    figure, longest, most = go.Figure(), 0, 0.0
     for k, metric in enumerate(sorted({s["metric"] for s in summaries})):
-        curves = [c for s in summaries if s["metric"] == metric for c in s["dominants"]["diagnosis"]]
-        shortest = min(map(len, curves))
-        mean = np.mean([c[:shortest] for c in curves], axis=0)
-        longest = max(longest, shortest)
-        name = METRICS.get(metric, metric)
-        line = {"color": LINES[k % len(LINES)], "width": 2}
-        figure.add_scatter(x=list(range(shortest)), y=[float(v) for v in mean], name=name, mode="lines", line=line)
+        runs = [_mean_curve(s["dominants"]["diagnosis"]) for s in summaries if s["metric"] == metric]
+        shortest = min(map(len, runs))
+        curves = np.array([c[:shortest] for c in runs])
+        low, high = np.quantile(curves, [0.25, 0.75], axis=0)
+        longest, most = (
+            max(longest, shortest),
+            max(most, float(high.max(initial=0.0)), float(curves.mean(axis=0).max())),
+        )
+        name, colour, at = METRICS.get(metric, metric), LINES[k % len(LINES)], list(range(shortest))
+        figure.add_scatter(x=[*at, *reversed(at)], y=[*map(float, high), *map(float, low[::-1])], fill="toself", mode="none",
+                           fillcolor=colour, opacity=0.18, showlegend=False, hoverinfo="skip", name=name)  # fmt: skip
+        line = {"color": colour, "width": 2.5}
+        mean = [float(v) for v in curves.mean(axis=0)]
+        figure.add_scatter(x=at, y=mean, name=name, mode="lines", line=line, hovertemplate="%{y:.1f}")
     styled(figure, 330)
     figure.update_layout(showlegend=True)
     figure.update_xaxes(title_text="generation", rangemode="tozero", dtick=1 if longest < 10 else None)
-    figure.update_yaxes(title_text="new bests so far", rangemode="tozero")
+    figure.update_yaxes(title_text="new bests so far", range=[0, (1 + ROOM) * (most or 1.0)])
     return figure
+
+
+def _mean_curve(passes: Sequence[Sequence[int]]) -> list[float]:
+    """Mean over the passes of a run, as long as the shortest."""
+    shortest = min(map(len, passes))
+    return [float(v) for v in np.mean([p[:shortest] for p in passes], axis=0)]
 
 
 def on_the_body(before: Curve, after: Curve) -> go.Figure:
@@ -122,8 +149,9 @@ def on_the_body(before: Curve, after: Curve) -> go.Figure:
     return figure
 
 
-def _wrapped(text: str) -> str:
-    return "<br>".join(textwrap.wrap(text, LABEL))
+def _wrapped(text: str, width: int) -> str:
+    # A per cent sign stays with its number.
+    return "<br>".join(textwrap.wrap(text.replace(" %", "\u00a0%"), width))
 
 
 def _distance(distances_m: dict[str, Any], name: str) -> float:

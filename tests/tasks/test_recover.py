@@ -19,6 +19,7 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
+from ee_dist.recovery.doubt import doubt_from
 from ee_dist.viewing.story import told
 
 KEYS = {
@@ -58,6 +59,8 @@ def test_terminal_tells_the_result_and_where_the_files_are(finished):
     assert "after the change" in out
     assert "shares of intact, and so this verdict, say little" in " ".join(out.split()), "of a quick budget"
     assert "truth" in out
+    last_lines = " ".join(out.split())
+    assert ("Something is wrong that it does not say" in last_lines) == summary["doubt"]["said"]
     assert summary["result_digest"][:16] in out
 
 
@@ -109,6 +112,7 @@ def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
     assert [float(error) for error, _ in rows] == pytest.approx(summary["diagnosis_error"], rel=1e-2)
 
     assert f"**Believed in the end: {told(believed[-1])}.**" in scene
+    assert doubt_from(summary["doubt"]).words in scene, "and what it does not say"
 
     progress = [line.split("believes: ")[1] for line in out.splitlines() if "believes: " in line]
     assert progress == [told(h) for h in believed]

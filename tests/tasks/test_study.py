@@ -6,14 +6,18 @@ import csv
 import io
 import json
 import math
+import re
+import shlex
 
 import numpy as np
 import pytest
 from rich.console import Console
 
 from ee_dist.tasks import study
-from ee_dist.tasks.results.study_page import p_text, study_page
-from ee_dist.tasks.study import by_case, row, total
+from ee_dist.tasks.results.study_logs import pair_to_show
+from ee_dist.tasks.results.study_page import seeds_for, study_page
+from ee_dist.tasks.results.study_sections import last_name, p_text
+from ee_dist.tasks.results.study_table import by_case, once, row, total
 from ee_dist.viewing.report import write_page
 from ee_dist.viewing.study_figures import distances
 
@@ -31,8 +35,21 @@ def test_a_sweep_becomes_a_table_and_figures(cli, tiny):
     summary = json.loads((run / "summary.json").read_text())
     assert summary["runs"] == 4
     page = (run / "report.html").read_text().split("<body>")[1]
-    assert "How far the robot went forward, diagnosed by rolling means" in page
-    assert "Mann-Whitney U test, two-sided, corrected for the number of cases by Benjamini and Hochberg" in page
+    assert re.search(
+        r"<h2>The first trial goes [\d.]+ m (farther|less far) than the one after the change, diagnosed by", page
+    )
+    assert "Wilcoxon signed rank test, exact, two-sided, corrected for the number of cases by Holm" in page
+    for heading in ("What the paper found", "New best hypotheses in a diagnosis pass", "One run, case 3, seed 0",
+                    "Path of the body from above", "Logs of nearly equal damages part after", "The doubt caught"):  # fmt: skip
+        assert heading in page, heading
+    assert all(f["verdict"] == "cannot be told" for f in summary["findings"]), "of one seed"
+    assert all(f" +scenario={r['scenario']} " in r["command"] + " " and len(r["digest"]) == 64 for r in rows)
+    assert {r["digest"] for r in rows} == {
+        json.loads((f / "summary.json").read_text())["result_digest"] for f in sweep.runs()
+    }
+    (again,) = {r["command"] for r in rows if (r["scenario"], r["metric"]) == ("9", "distance")}
+    once_more = cli(*shlex.split(again)[3:])
+    assert once_more.summary()["result_digest"] in {r["digest"] for r in rows}, "the command repeats the run"
     restored, right = (sum(t[k] for t in summary["totals"].values()) for k in ("restored", "right"))
     head = f"Function restored in {restored} of 4 runs; the diagnosis right in {right} of 4."
     assert f"<h1>{head}</h1>" in page
@@ -54,6 +71,39 @@ def test_table_counts_what_the_summaries_say():
     (line,) = by_case([row(summary(0, [1.0, 1.9], True)), row(summary(1, [1.5, 0.5], False))])
     assert (line["restored"], line["right"], line["named"], line["runs"]) == (1, 1, 1, 2)
     assert (line["best_m"], line["last_m"]) == (1.7, 1.2)
+
+
+def test_a_run_that_is_there_twice_counts_once():
+    runs = study_of([1], range(3))
+    assert once([*runs, runs[1]]) == runs
+
+
+def test_doubts_are_counted_against_the_truth():
+    """Said of a right diagnosis: false. Not said of a wrong one, or of a truth that no genome can say: missed."""
+    leg = {"effect": "part_lost", "target": "upper_rear_left", "values": {}}
+    lighter = {"effect": "part_mass", "target": "body", "values": {"change": -0.5}}
+    cases = [(True, leg, False), (True, leg, True), (False, leg, True), (False, leg, False), (True, lighter, False)]
+    rows = []
+    for k, (right, truth, said) in enumerate(cases):
+        (summary,) = study_of([1], [k])
+        diagnosis = {"found": int(right), "true": 1, "invented": 0, "right": right}
+        rows.append(row(summary | {"diagnosis": diagnosis, "truth": [truth], "doubt": {"said": said}}))
+    assert total(rows)["rolling_mean"]["doubt"] == {
+        "right": 2, "false": 1, "wrong": 3, "missed": 2, "unsayable": 1, "missed_unsayable": 1,
+    }  # fmt: skip
+    (line,) = by_case(rows)
+    assert (line["doubts"], line["doubts_told"]) == (2, 5)
+
+
+def test_the_run_to_show_is_of_situation_five_and_of_both_metrics():
+    runs = study_of([3, 5], [0, 1]) + study_of([3], [0, 1], "distance") + study_of([5], [1], "distance")
+    assert [(s["metric"], s["scenario"], s["seed"]) for s in pair_to_show(runs)] == [
+        ("rolling_mean", 5, 1),
+        ("distance", 5, 1),
+    ]
+    runs = study_of([3, 5], [0]) + study_of([3], [0], "distance")
+    assert [s["scenario"] for s in pair_to_show(runs)] == [3, 3], "the first that both have"
+    assert [s["scenario"] for s in pair_to_show(study_of([3, 5], [0]))] == [5], "of one metric alone"
 
 
 def study_of(scenarios, seeds, metric="rolling_mean"):
@@ -96,25 +146,33 @@ def page_of(summaries):
 
 
 def test_the_first_lines_of_a_study_tell_what_how_sure_and_what_next():
-    summaries = study_of([1, 2], range(4))
+    summaries = study_of([1, 2], range(8))
     page = page_of(summaries)
     assert page.tone == "good" and page.first[-1] == "Next: nothing has to be done."
     assert "2 of 2 cases" in page.first[1]
-    summaries[5] |= {"restored": False, "recovered_fraction": 0.42, "folder": "logs/a sweep/5"}
+    summaries[9] |= {"restored": False, "recovered_fraction": 0.42, "folder": "logs/a sweep/5"}
     page = page_of(summaries)
-    assert page.headline == "Function restored in 7 of 8 runs; the diagnosis right in 8 of 8." and page.tone == "open"
+    assert (
+        page.headline == "Function restored in 15 of 16 runs; the diagnosis right in 16 of 16." and page.tone == "open"
+    )
     assert page.first[-1] == "Not restored: 1; the worst is case 2, seed 1 at 42% of intact."
     assert "task=view" in page.following and "logs/a sweep/5" in page.following
     assert "no test" in page_of(study_of([1, 2], [0])).first[1]
     assert page_of(study_of([1, 2], [0])).first[-1].startswith("Next: more seeds")
+    assert page_of(study_of([1, 2], [0])).first[-1].endswith("of 2 cases it takes 7.")
+    assert (seeds_for(1), seeds_for(13)) == (6, 10)
     quick = page_of([{**s, "budget": "quick"} for s in study_of([1], range(4))])
     assert quick.tone == "open" and "without budget=quick" in quick.first[-1]
-    assert "cannot be below 0.1" in page_of(study_of([1, 2], range(3))).first[1]
+    assert "cannot be below 0.5" in page_of(study_of([1, 2], range(3))).first[1], "0.25, of two cases"
+    assert (
+        last_name([{"trials": 4}] * 2) == "fourth trial" and last_name([{"trials": 4}, {"trials": 2}]) == "last trial"
+    )
 
 
 @pytest.mark.parametrize(("width", "dark"), [(1280, True), (400, False)], ids=["wide-dark", "narrow-light"])
-def test_the_page_of_a_study_is_quiet_and_fits(window, tmp_path, width, dark):
-    page = write_page(page_of(study_of(range(1, 11), range(3))), tmp_path / "report.html")
+@pytest.mark.parametrize("runs", [1, 3])
+def test_the_page_of_a_study_is_quiet_and_fits(window, tmp_path, width, dark, runs):
+    page = write_page(page_of(study_of(range(1, 14), range(runs))), tmp_path / "report.html")
     seen = window.look(page, width, dark=dark)
     assert seen.complaints == () and seen.asked == () and seen.overflow == 0
     overlapping = (

@@ -1,68 +1,63 @@
-"""The page of study: what became of the runs, the picture that proves it, and the tables."""
+"""The page of study: what became of the runs, the picture that proves it, and how sure that is. Its parts: study_sections.py."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from ee_dist.tasks.outcome import RESTORED
+from ee_dist.tasks.results import study_sections as parts
 from ee_dist.tasks.results.commands import command, setting
-from ee_dist.viewing.report import Page, Section, Table
-from ee_dist.viewing.study_figures import METRICS, distances, dominants
+from ee_dist.tasks.results.findings import HOLDS, OPEN, Finding
+from ee_dist.tasks.results.paired import SURE, Paired, least_p
+from ee_dist.tasks.results.study_table import ROLLING, Rows
+from ee_dist.viewing.parting_figures import Parting
+from ee_dist.viewing.report import Page
+from ee_dist.viewing.run_figures import Told
 
-Rows = Sequence[dict[str, Any]]
-CAPTION = (
-    "Bars are means over runs, whiskers standard deviations, dots the runs. p: last trial against the trial after the change, "
-    "Mann-Whitney U test, two-sided, corrected for the number of cases by Benjamini and Hochberg."
-)
-HEAD = (
-    "case", "runs", "intact (m)", "after (m)", "best trial (m)", "last trial (m)", "restored", "diagnosis right",
-    "truth named", "p (corrected)",
-)  # fmt: skip
-EACH = ("case", "metric", "seed", "engine", "budget", "intact (m)", "after (m)", "best trial (m)", "last trial (m)",
-        "restored", "diagnosis right", "digest")  # fmt: skip
 QUICK = "quick"
 """The budget that only shows that every part works."""
-SURE = 0.05
-"""Of a test, corrected: what counts as more than luck."""
 TERMS = (
     ("Case", "What happens to the robot: one of the situations of the paper, by its number (+scenario=NUMBER)."),
     ("Intact", "How far the robot goes forward before anything happens to it, with a controller evolved for it."),
     ("After the change", "The same controller on the changed robot: how much of its function is lost."),
     ("Compensating trial", "A trial with a controller that was evolved on what the robot believes of itself by then."),
     ("Restored", f"One of the compensating trials goes {RESTORED:.0%} of the intact distance or farther, walking."),
-    ("Diagnosis right", "The last diagnosis names every true effect at its place, and no other."),
-    ("Truth named", "It names every true effect at its place, whatever else it names."),
-    ("p", "How often luck alone would part the last trials from those right after the change as far as this."),
+    ("Right", "The last diagnosis names every true effect at its place, and no other."),
+    ("Named", "It names every true effect at its place, whatever else it names."),
+    ("Doubt", "The last diagnosis leaves more of the sensors' courses unexplained than noise and the rounding of magnitudes "
+        "would: something is wrong that it does not say. Found without knowing the truth."),
+    ("p", "How often luck alone would part the last trials from those right after the change of the same runs as far as this."),
+    ("Gain", "By how much the last trial goes farther than the one after the change of the same run: the median of the means of "
+        "all pairs of runs (Hodges and Lehmann), with its interval."),
+    ("Rank corr.", "Whether pairs go one way: 1 if every run gains, -1 if every run loses (rank biserial, matched pairs)."),
     ("Rolling mean, distance", "How the logs of model and robot are compared in a diagnosis: by the means of short stretches "
         "of the sensors' courses, or by how far the robot went."),
     ("Dominant", "A hypothesis that is better than all before it in its diagnosis pass."),
 )  # fmt: skip
 
 
-def p_text(line: dict[str, Any]) -> str:
-    """What the test says of a case, for a figure."""
-    if not math.isfinite(line["p_corrected"]):
-        return "one run: no test"
-    return "p < 0.001" if line["p_corrected"] < 0.001 else f"p = {line['p_corrected']:.2g}"
+@dataclass
+class Extra:
+    """What only recordings tell, or several metrics together: ``shown`` runs (summary, story), ``partings`` of logs, tests
+    ``between`` metrics by scenario, ``findings`` of the paper, ``links`` (name, path)."""
+
+    shown: Sequence[tuple[Mapping[str, Any], Told]] = ()
+    partings: Sequence[Parting] = ()
+    between: Mapping[Any, Paired] = field(default_factory=dict)
+    findings: Sequence[Finding] = ()
+    links: Sequence[tuple[str, str]] = ()
 
 
-def cells(line: dict[str, Any]) -> list[str]:
-    """A case as a row of the table."""
-    n, p = line["runs"], "-" if math.isnan(line["p_corrected"]) else f"{line['p_corrected']:.2g}"
-    return [
-        str(line["scenario"]), str(n), *(f"{line[k]:.2f}" for k in ("intact_m", "after_m", "best_m", "last_m")),
-        f"{line['restored']}/{n}",
-        *(f"{line[k]}/{line['scored']}" if line["scored"] else "-" for k in ("right", "named")), p,
-    ]  # fmt: skip
-
-
-def study_page(summaries: Rows, rows: Rows, lines: Rows, totals: dict[str, Any], where: str) -> Page:
+def study_page(
+    summaries: Rows, rows: Rows, lines: Rows, totals: dict[str, Any], where: str, extra: Extra | None = None
+) -> Page:
     """``summaries`` of recover runs below the folder ``where`` (each with its ``folder``), the ``rows`` made of them in the
     same order, the ``lines`` of their cases, and the ``totals`` by metric."""
-    metrics = sorted(totals)
-    tests = {(x["metric"], x["scenario"]): p_text(x) for x in lines}
+    extra = extra or Extra()
+    metrics = sorted(totals, key=lambda m: m != ROLLING)
     restored, runs = sum(t["restored"] for t in totals.values()), len(rows)
     right, scored = sum(t["right"] for t in totals.values()), sum(t["scored"] for t in totals.values())
     named = sum(t["true_among_believed"] for t in totals.values())
@@ -77,50 +72,38 @@ def study_page(summaries: Rows, rows: Rows, lines: Rows, totals: dict[str, Any],
         f"budget {', '.join(budgets)}; {', '.join(engines)}; {where}",
         head,
         tone="good" if restored == runs and right == scored and QUICK not in budgets else "open",
-        first=[_distances(rows), _sure(lines), *_open(rows, named, scored), *_advice(rows, lines, budgets)],
+        first=[
+            _distances(rows),
+            _sure(lines),
+            *_held(extra.findings),
+            *_doubts(totals),
+            *_open(rows, named, scored),
+            *_advice(rows, lines, budgets),
+        ],
         terms=TERMS,
-        foot=f"ee_dist. {CAPTION}",
+        links=extra.links,
+        foot=f"ee_dist. {parts.CAPTION}",
     )
-    figures = [
-        Section(_heading(m), CAPTION, distances([s for s in summaries if s["metric"] == m], m, tests)) for m in metrics
-    ]
-    page.proof = figures[0]
+    page.proof, *figures = (parts.distance_section(m, summaries, rows, lines) for m in metrics)
     worst = _worst(rows)
     if worst is not None and summaries[worst].get("folder"):
         page.following = command(["task=view", setting("log", summaries[worst]["folder"])])
-    titles = {s["scenario"]: s.get("title") or "" for s in summaries}
-    for k, metric in enumerate(metrics):
-        mine = [x for x in lines if x["metric"] == metric]
-        told = [[f"{c[0]}. {titles[x['scenario']]}".strip(), *c[1:]] for x, c in ((x, cells(x)) for x in mine)]
-        table = Table(HEAD, told, tuple(range(1, len(HEAD))))
-        if k:
-            page.sections.append(figures[k])
-        page.sections.append(Section(f"By case, {METRICS.get(metric, metric)}", "", None, table))
-    caption = "New best hypotheses found so far in a diagnosis pass, mean over passes and runs."
-    page.sections.append(
-        Section("Dominants: how evolution goes on finding better hypotheses", caption, dominants(summaries))
-    )
-    each = [_run(r) for r in rows]
-    page.sections.append(Section("All runs", "", None, Table(EACH, each, (0, 2, 5, 6, 7, 8)), folded=True))
+    page.sections = [
+        *figures,
+        *parts.finding_sections(extra.findings),
+        *parts.case_sections(metrics, summaries, lines),
+        *parts.between_sections(extra.between),
+        *parts.doubt_sections(totals),
+        parts.dominant_section(summaries),
+        *parts.shown_sections(extra.shown),
+        *parts.parting_sections(extra.partings),
+        parts.run_section(rows),
+    ]
     return page
-
-
-def _run(row: dict[str, Any]) -> list[str]:
-    metres = [f"{row[k]:.3f}" for k in ("intact_m", "after_m", "best_m", "last_m")]
-    about = [str(row["scenario"]), row["metric"].replace("_", " "), str(row["seed"]), row["engine"], row["budget"]]
-    return [*about, *metres, _yes(row["restored"]), _yes(row["right"]), row["digest"]]
-
-
-def _heading(metric: str) -> str:
-    return f"How far the robot went forward, {METRICS.get(metric, metric)}"
 
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
-
-
-def _yes(value: bool | None) -> str:
-    return "not known" if value is None else "yes" if value else "no"
 
 
 def _mean(rows: Rows, key: str) -> float:
@@ -141,15 +124,32 @@ def _sure(lines: Rows) -> str:
         return "How sure: one run for each case, which is no test; more seeds are (seed=0,1,2,...)."
     what = "case" if len({x["metric"] for x in tested}) == 1 else "pair"
     of = "" if what == "case" else " of case and metric"
-    clear = sum(x["p_corrected"] < SURE and x["last_m"] > x["after_m"] for x in tested)
+    clear = sum(x["test"].sure and x["test"].shift > 0 for x in tested)
     told = (
         f"How sure: in {clear} of {_count(len(tested), what)}{of} the last trial goes farther than the one after the change by "
-        f"more than luck (p < {SURE:g}, Mann-Whitney U test, corrected)"
+        f"more than luck (p < {SURE:g}, Wilcoxon signed rank test, corrected)"
     )
     fewest = min(x["runs"] for x in tested)
-    # With n runs a side the two-sided test cannot say less than 2 in all orders of them.
-    least = 2 / math.comb(2 * fewest, fewest)
+    least = max(x["test"].least_corrected for x in tested)
     return told + (f"; with {fewest} runs a case p cannot be below {least:.2g}." if least >= SURE else ".")
+
+
+def _held(findings: Sequence[Finding]) -> list[str]:
+    if not findings:
+        return []
+    held, unclear = (sum(f.verdict == v for f in findings) for v in (HOLDS, OPEN))
+    rest = f"; {unclear} cannot be told with so few runs" if unclear else ""
+    return [f"Of {len(findings)} findings of the paper {held} hold in these runs{rest}."]
+
+
+def _doubts(totals: Mapping[str, Any]) -> list[str]:
+    """How well the doubt tells wrong diagnoses from right ones, all metrics together."""
+    counts = [t["doubt"] for t in totals.values() if "doubt" in t]
+    right, false, wrong, missed = (sum(c[k] for c in counts) for k in ("right", "false", "wrong", "missed"))
+    if not right + wrong:
+        return []
+    were = "1 diagnosis that was" if wrong == 1 else f"{wrong} diagnoses that were"
+    return [f"Doubt was said of {wrong - missed} of {were} wrong, and of {false} of {right} right."]
 
 
 def _share(row: dict[str, Any]) -> float:
@@ -184,5 +184,13 @@ def _advice(rows: Rows, lines: Rows, budgets: Sequence[str]) -> list[str]:
     if _worst(rows) is not None:
         return []
     if any(not x["p_corrected"] < SURE for x in lines):
-        return ["Next: more seeds (seed=0,1,2,...), where p is to tell more."]
+        cases = max(sum(x["metric"] == m for x in lines) for m in {x["metric"] for x in lines})
+        return [
+            f"Next: more seeds (seed=0,1,2,...), where p is to tell more: of {_count(cases, 'case')} it takes {seeds_for(cases)}."
+        ]
     return ["Next: nothing has to be done."]
+
+
+def seeds_for(cases: int) -> int:
+    """Runs of each case with which the test can tell anything at all, corrected for the number of cases."""
+    return next(n for n in range(2, 60) if cases * least_p(n) < SURE)
