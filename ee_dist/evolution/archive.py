@@ -66,13 +66,6 @@ class Archive:
                 kept[k] = True
         return kept
 
-    def merge(self, other: Archive) -> None:
-        """Take over what is better in its cell."""
-        for cell, elite in other._cells.items():
-            there = self._cells.get(cell)
-            if there is None or elite.score > there.score:
-                self._cells[cell] = elite
-
     @property
     def elites(self) -> list[Elite]:
         """The allowed ones first, of these the best first."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,16 +27,13 @@ class Mapping:
     """How a map is searched. A generation simulates as many steps as the paper's asks for (half a population, whole), whatever is
     set here: shorter first trials make more offspring."""
 
-    bins: int = 3
-    """Into how many parts each axis of the map is cut."""
+    bins: int = 8
+    """Into how many parts each axis of the map is cut: with few, a robot on three legs has a handful of kinds, and a search
+    with as many parents comes to a stop."""
     first: float = 0.3
     """Share of a trial for which all offspring are tried first; with 1 all are tried whole."""
     kept: float = 0.2
     """Share of the offspring, the best of those first parts, that are then tried whole."""
-    starts: int = 3
-    """From how many places a repair pass starts: one is what is known, the others are new."""
-    apart: float = 0.75
-    """Share of a pass's generations in which they are kept apart, one after the other."""
     narrow: float = 0.9
     """Share of the map, its worse end, that has no more offspring at the end of a repair pass."""
     steps: Steps = field(default_factory=Steps)
@@ -48,11 +44,8 @@ class Mapping:
         for name in ("first", "kept"):
             if not 0.01 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"repair: {name} must be from 0.01 to 1, not {getattr(self, name)}")
-        if self.starts < 1:
-            raise ValueError(f"repair: starts must be 1 or more, not {self.starts}")
-        for name in ("apart", "narrow"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"repair: {name} must be from 0 to 1, not {getattr(self, name)}")
+        if not 0.0 <= self.narrow <= 1.0:
+            raise ValueError(f"repair: narrow must be from 0 to 1, not {self.narrow}")
 
     def tried(self, whole: int) -> tuple[int, int]:
         """(offspring, those of them tried whole) of a generation that may simulate as much as ``whole`` whole trials."""
@@ -82,33 +75,16 @@ class MapSearch:
         self.behaviour = self.subject.behaviour(model)
         self.archive = Archive(mapping.bins)
 
-    def run(self, starts: Sequence[Genomes], generations: int, narrow: float, rng: np.random.Generator) -> Archive:
-        """Fill a map from each of ``starts`` (n, length), go on with one after the other, then with all of them together.
-
-        What begins together ends as one kind, the first that was good; apart, others get to where they can be compared.
-        ``narrow``: the share of a map, its worse end, that has no more offspring in the end; it grows from 0.
-        """
+    def run(self, first: Genomes, generations: int, narrow: float, rng: np.random.Generator) -> Archive:
+        """Fill the map from ``first`` (n, length) and go on. ``narrow``: the share of the map, its worse end, that has no more
+        offspring in the last generation; it grows from 0."""
         self.observer.pass_started(self.phase, self.pass_index, generations)
-        apart = int(generations * self.mapping.apart) // len(starts) if len(starts) > 1 else 0
-        maps, dominants = [Archive(self.mapping.bins) for _ in starts], 0
+        dominants = 0
         for generation in range(generations + 1):
             before, best = self.evaluator.counts.copy(), self._best
-            turn, place = divmod(generation - 1, apart) if apart else (len(starts), 0)
-            if generation == 0:
-                born = np.concatenate(starts)
-                judged = self._judged(born)
-                ends = np.cumsum([len(s) for s in starts])
-                for own, some, end in zip(maps, starts, ends, strict=True):
-                    own.add(some, judged[end - len(some) : end])
-                    self.archive.merge(own)
-            else:
-                together = turn >= len(starts)
-                done = (generation - 1 - apart * len(starts)) if together else place
-                length = generations - apart * len(starts) if together else apart
-                own = self.archive if together else maps[turn]
-                born = self._promising(own, narrow * done / max(1, length - 1), rng)
-                own.add(born, self._judged(born))
-                self.archive.merge(own)
+            if generation:
+                first = self._promising(narrow * (generation - 1) / max(1, generations - 1), rng)
+            self.archive.add(first, self._judged(first))
             dominants += self._best > best
             self._tell(generation, dominants, before)
         return self.archive
@@ -145,9 +121,9 @@ class MapSearch:
         elites = self.archive.elites
         return elites[0].score if elites else -math.inf
 
-    def _promising(self, archive: Archive, narrow: float, rng: np.random.Generator) -> Genomes:
+    def _promising(self, narrow: float, rng: np.random.Generator) -> Genomes:
         """Offspring that are worth a whole trial."""
-        elites = [e.genome for e in archive.elites]
+        elites = [e.genome for e in self.archive.elites]
         parents = max(1, round(len(elites) * (1.0 - narrow)))
         count, kept = self.mapping.tried(self.budget.population // 2)
         born = offspring(elites, parents, count, self.budget.tournament, self.mapping.steps, rng)

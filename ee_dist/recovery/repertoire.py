@@ -1,9 +1,9 @@
-"""The better repair: a map of gaits made before anything breaks, of which each pass goes on with those that still walk.
+"""The repair with a map of gaits: the best gait of each kind is kept, within a pass and from one pass to the next.
 
-The paper's pass starts around one gait and keeps its kind, good or bad on the changed body. Here the best gait of each kind is
-kept (a map, as in Cully, Clune, Tarapore and Mouret 2015, Robots that can adapt like animals), all of them are judged on the
-diagnosed model, and evolution goes on from those that do well there; kinds that do badly fall behind while the pass goes on.
-What a pass found, the next begins with.
+The paper's evolution ends with one kind of gait, and a pass around one controller keeps its kind, good or bad on the changed
+body. Here a pass keeps the best of each kind (MAP-Elites) and has offspring of all of them; those that do badly fall
+behind while it goes on. What a pass found, the next begins with. On demand gaits of the intact system are mapped before anything
+breaks, as in Cully, Clune, Tarapore and Mouret (2015, Robots that can adapt like animals).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Repertoire:
     passes; 0 leaves it out."""
 
     mapping: Mapping = field(default_factory=Mapping)
-    map_passes: int = 2
+    map_passes: int = 0
     intact: list[Elite] = field(default_factory=list)
     """The map of the intact system, the best first."""
     found: list[Elite] = field(default_factory=list)
@@ -58,7 +58,7 @@ class Repertoire:
         fresh = start.integers(-SCALE, SCALE, size=shape, endpoint=True).astype(np.int16)
         search = MapSearch(robot, evaluator, budget, steps, self.mapping, observer, MAP, 0)
         self.intact = search.run(
-            [np.concatenate([near, fresh])], self.map_passes * budget.generations, 0.0, stream
+            np.concatenate([near, fresh]), self.map_passes * budget.generations, 0.0, stream
         ).elites
         self.cost = evaluator.counts.since(before)
 
@@ -75,24 +75,19 @@ class Repertoire:
     ) -> tuple[Network, float]:
         """Best controller found on ``model`` and how well it does there.
 
-        One start is what is known: the ``database``, what the last pass ended with, and relatives of the database. The others
-        are gaits of the map, dealt out among them, and random controllers. Together they are a population.
+        The pass begins with what is known: the ``database``, what the last pass ended with (half of a population at most: another
+        diagnosis may ask for another gait), the map (up to three quarters), and relatives of the database.
         """
         start, stream = (np.random.default_rng(s) for s in seed.spawn(2))
-        length, starts = weight_count(len(model.sensors), len(model.drives)), self.mapping.starts
-        room = [budget.population // starts + (k < budget.population % starts) for k in range(starts)]
+        length, room = weight_count(len(model.sensors), len(model.drives)), budget.population
         controllers = np.array([genome_of(c) for c in database], dtype=np.int16).reshape(-1, length)
-        # Half of the room at most for the last pass: another diagnosis may ask for another gait.
-        last = [e.genome for e in self.found[: room[0] // 2]]
-        known = _different([*controllers[::-1], *last])[: room[0]]
-        begun = [np.concatenate([known, relatives(controllers, room[0] - len(known), start)])]
-        mapped = [e.genome for e in self.intact if e.allowed]
-        for k in range(1, starts):
-            dealt = mapped[k - 1 :: starts - 1][: room[k]]
-            fresh = start.integers(-SCALE, SCALE, size=(room[k] - len(dealt), length), endpoint=True).astype(np.int16)
-            begun.append(np.concatenate([*(g[None] for g in dealt), fresh]))
+        last = [e.genome for e in self.found[: room // 2]]
+        known = _different([*controllers[::-1], *last])[:room]
+        mapped = [e.genome for e in self.intact if e.allowed][: max(0, 3 * room // 4 - len(known))]
+        known = _different([*known, *mapped])
+        first = np.concatenate([known, relatives(controllers, room - len(known), start)])
         search = MapSearch(model, evaluator, budget, steps, self.mapping, observer, REPAIR, pass_index)
-        self.found = search.run(begun, budget.generations, self.mapping.narrow, stream).elites
+        self.found = search.run(first, budget.generations, self.mapping.narrow, stream).elites
         chosen = search.choose()
         return network(chosen.genome), chosen.score
 

@@ -180,19 +180,16 @@ class RepairConfig:
     """How a repair pass searches."""
 
     name: str = "paper"
-    map_passes: int = 2
-    bins: int = 3
+    map_passes: int = 0
+    bins: int = 8
     first: float = 0.3
     kept: float = 0.2
-    starts: int = 3
-    apart: float = 0.75
     narrow: float = 0.9
 
     def __post_init__(self) -> None:
         one_of("repair", self.name, ("paper", "gaits"))
         within("repair.map_passes", self.map_passes, 0, 1000)
         within("repair.bins", self.bins, 1, 100)
-        within("repair.starts", self.starts, 1, 100)
         for f in fields(self)[1:]:
             if self.name == "paper" and getattr(self, f.name) != f.default:
                 raise ConfigError(f"repair.{f.name}={getattr(self, f.name)}: is of repair=gaits, not of repair=paper")
@@ -201,7 +198,7 @@ class RepairConfig:
     def build(self) -> Repertoire | None:
         """None for the paper's own."""
         try:
-            mapping = Mapping(self.bins, self.first, self.kept, self.starts, self.apart, self.narrow)
+            mapping = Mapping(self.bins, self.first, self.kept, self.narrow)
         except ValueError as error:
             raise ConfigError(str(error)) from None
         return None if self.name == "paper" else Repertoire(mapping, self.map_passes)
