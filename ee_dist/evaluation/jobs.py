@@ -71,6 +71,15 @@ class Counts:
     def copy(self) -> Counts:
         return Counts(self.asked, self.simulated, self.steps, self.asked_steps)
 
+    def since(self, before: Counts) -> Counts:
+        """What was added to an earlier copy."""
+        return Counts(
+            self.asked - before.asked,
+            self.simulated - before.simulated,
+            self.steps - before.steps,
+            self.asked_steps - before.asked_steps,
+        )
+
 
 class Evaluator(Protocol):
     """Where rollouts run. Results come in the order of the jobs and do not depend on where or with what they ran."""

@@ -12,7 +12,8 @@ from ee_dist.trials.log import SensorLog
 HARDWARE, PREDICTION, HINDSIGHT = "hardware", "prediction", "hindsight"
 """Where a trial was: on hardware; on the model that its controller was chosen on, before it; on the model that was found
 from it, afterwards."""
-REPAIR, DIAGNOSIS = "repair", "diagnosis"
+REPAIR, DIAGNOSIS, MAP = "repair", "diagnosis", "map"
+"""Passes: repair, diagnosis, and, where a map of the intact system is made, that."""
 EVOLVING, EVOLVED, POLISHED, PRUNED = "evolving", "evolved", "polished", "pruned"
 """How far a hypothesis has come: best of a generation, one of the last population, after its last step to a better
 neighbour, after terms that explain nothing were dropped."""
@@ -55,7 +56,7 @@ class HypothesisRecord:
 
 @dataclass(frozen=True)
 class GenerationRecord:
-    """One generation of a repair pass (best: fitness, m, higher is better) or a diagnosis pass (error, lower)."""
+    """One generation of a repair pass or of the map (best: fitness, m, higher is better) or a diagnosis pass (error, lower)."""
 
     phase: str
     pass_index: int

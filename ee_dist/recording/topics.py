@@ -11,6 +11,7 @@ topic                          message                   one per
 ``/hindsight/...``             the same                  the trial on the model of the diagnosis that followed it
 ``/repair/generation``         ee_dist.Generation        generation of a repair pass
 ``/diagnosis/generation``      ee_dist.Generation        generation of a diagnosis pass
+``/map/generation``         ee_dist.Generation        generation of the map of the intact system, where one is made
 ``/diagnosis/hypothesis``      ee_dist.Hypothesis        hypothesis, with its error
 =============================  ========================  =============================================================
 
@@ -25,7 +26,7 @@ reached its end) and attachments (``robot.json``, the robot; those of the run).
 
 from __future__ import annotations
 
-from ee_dist.recording.records import DIAGNOSIS, HARDWARE, HINDSIGHT, PREDICTION, REPAIR
+from ee_dist.recording.records import DIAGNOSIS, HARDWARE, HINDSIGHT, MAP, PREDICTION, REPAIR
 
 PROFILE = "ee_dist"
 LIBRARY = "ee_dist recording 1"
@@ -35,7 +36,7 @@ FIRST_FORMAT = "1"
 """Of before: its final hypotheses were a last population, and most of its predictions were made after their trial."""
 
 SOURCES = (HARDWARE, PREDICTION, HINDSIGHT)
-PHASES = (REPAIR, DIAGNOSIS)
+PHASES = (REPAIR, DIAGNOSIS, MAP)
 
 FORMAT_RECORD, RUN_RECORD, STATUS_RECORD = "ee_dist", "run", "status"
 CHECKSUM = "crc32"

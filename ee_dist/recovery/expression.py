@@ -12,6 +12,7 @@ from ee_dist.effects.catalogue import Hypothesis, Term
 from ee_dist.effects.genes import genes, links
 from ee_dist.evolution.ga import SCALE
 from ee_dist.networks.model import GeneNetwork, Wanted
+from ee_dist.recovery.behaviour import levels_of
 from ee_dist.recovery.subject import Situation, Subject
 from ee_dist.trials.log import Array, SensorLog
 
@@ -82,4 +83,5 @@ def expressing(network: GeneNetwork) -> Subject:
         situations=SITUATIONS,
         normal=normal,
         tried_places=lambda n: len(n.link_names),
+        behaviour=lambda n: levels_of(n, Agreement(network.wanted)),
     )

@@ -74,7 +74,7 @@ def gait(robot: Robot, log: SensorLog) -> Gait | None:
     excess, put_in = _energy(robot, log, poses, centres, gravity)
     floored = robot.world.has_floor
     return Gait(
-        back_share=_back_share(log.base_pose),
+        back_share=back_share(log.base_pose),
         flight_s=_longest(_lowest(robot, poses) > CLEAR_M) * robot.time_step_s if floored else 0.0,
         flight_limit_s=float(2 * np.sqrt(2 * JUMP * reach / max(-gravity[2], 1e-3))),
         deep_m=max(0.0, -min(float(c[:, 2].min()) for c in centres.values())) if floored else 0.0,
@@ -83,7 +83,7 @@ def gait(robot: Robot, log: SensorLog) -> Gait | None:
     )
 
 
-def _back_share(base_pose: Array) -> float:
+def back_share(base_pose: Array) -> float:
     """Of the way forward, the part made while what was up at the start points down."""
     up = np.array([0.0, 0.0, 1.0])
     there = quat_rotate(base_pose[0, 3:] * [-1, -1, -1, 1], up)

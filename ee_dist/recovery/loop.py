@@ -12,7 +12,7 @@ import numpy as np
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Network
-from ee_dist.evaluation.jobs import Evaluator, Job, Whole
+from ee_dist.evaluation.jobs import Counts, Evaluator, Job, Whole
 from ee_dist.evolution.ga import Budget, Genomes
 from ee_dist.recording.records import HARDWARE, HINDSIGHT, PREDICTION, TrialRecord
 from ee_dist.recovery.diagnosis import Judge, believe
@@ -20,6 +20,7 @@ from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.recovery.repair import repair
+from ee_dist.recovery.repertoire import Repertoire
 from ee_dist.robots.system import System
 from ee_dist.trials.hardware import Hardware
 from ee_dist.trials.log import SensorLog
@@ -70,6 +71,8 @@ class Recovery:
     hypotheses: list[Hypothesis] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
     controllers: list[Network] = field(default_factory=list)
+    before_change: Counts = field(default_factory=Counts)
+    """What was simulated before the change."""
 
 
 def recover(
@@ -81,8 +84,11 @@ def recover(
     evaluator: Evaluator,
     seed: np.random.SeedSequence,
     observer: Observer,
+    repertoire: Repertoire | None = None,
 ) -> Recovery:
-    """Run the loop. ``intact`` is the hardware before the change, ``changed`` the same robot after it.
+    """Run the loop. ``repertoire`` takes the place of the paper's repair passes after the change.
+
+    ``intact`` is the hardware before the change, ``changed`` the same robot after it.
 
     Seeds: one for each repair pass, then one for each diagnosis pass, spawned from ``seed``.
     """
@@ -94,6 +100,8 @@ def recover(
     best, expected = repair(robot, [], evaluator, plan.repair, plan.steps, repair_seeds[0], observer, 0)
     controllers: list[Network] = [best]
     result.expected.append(expected)
+    if repertoire is not None:
+        repertoire.prepare(robot, best, evaluator, plan.repair, plan.steps, repair_seeds[0], observer)
 
     def say(index: int, name: str, source: str, driver: Network, hypothesis: Hypothesis) -> None:
         """Record what the model under this hypothesis does in the trial of that index."""
@@ -106,6 +114,7 @@ def recover(
     result.intact = subject.value(log)
     observer.trial(TrialRecord(0, "intact", HARDWARE, best, log))
 
+    result.before_change = evaluator.counts.copy()
     say(1, "after the change", PREDICTION, best, ())
     log = changed.trial(best, plan.steps)
     result.after = subject.value(log)
@@ -124,9 +133,11 @@ def recover(
 
         model = apply(robot, hypothesis)
         known = controllers if k >= min(plan.restarts, passes - 1) else controllers[:1]
-        best, expected = repair(
-            model, known, evaluator, plan.repair, plan.steps, repair_seeds[k + 1], observer, k + 1, plan.related
-        )
+        way = (evaluator, plan.repair, plan.steps, repair_seeds[k + 1], observer, k + 1)
+        if repertoire is None:
+            best, expected = repair(model, known, *way, plan.related)
+        else:
+            best, expected = repertoire.repair(model, controllers, *way)
         controllers.append(best)
         result.expected.append(expected)
         say(k + 2, f"trial {k + 1}", PREDICTION, best, hypothesis)

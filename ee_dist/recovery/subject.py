@@ -10,6 +10,7 @@ from typing import Any
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.evaluation.jobs import Reduction
 from ee_dist.evolution.ga import SCALE
+from ee_dist.recovery.behaviour import Behaviour
 from ee_dist.trials.log import SensorLog
 
 
@@ -20,6 +21,10 @@ def share(value: int) -> float:
 
 def _nothing(value: int) -> Mapping[str, float]:
     return {}
+
+
+def _none(system: Any, log: SensorLog) -> tuple[str, ...]:
+    return ()
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,8 @@ class Subject:
     """``noun`` is what people call such a system. ``function`` is what a controller is chosen by (higher is better); its value of
     a trial is called ``quantity``, in ``unit``, and means what ``meaning`` says. ``situations`` are all that a hypothesis
     can say, ``normal`` leaves out of one what its other terms make meaningless, ``tried_places`` is how many places a
-    neighbour of a hypothesis is tried at."""
+    neighbour of a hypothesis is tried at. ``behaviour`` tells one kind of doing it from another, and ``cheats`` names what of a
+    trial (with the body's pose) is no honest way of doing it."""
 
     noun: str
     function: Reduction
@@ -49,6 +55,8 @@ class Subject:
     situations: tuple[Situation, ...]
     normal: Callable[[list[Term], Any], Hypothesis]
     tried_places: Callable[[Any], int]
+    behaviour: Callable[[Any], Behaviour]
+    cheats: Callable[[Any, SensorLog], tuple[str, ...]] = _none
 
     def value(self, log: SensorLog) -> float:
         """How well a trial went; not a number where the log does not tell."""

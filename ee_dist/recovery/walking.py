@@ -8,8 +8,11 @@ from ee_dist.effects.catalogue import Hypothesis, Term
 from ee_dist.effects.targets import carried_parts, motors, parts, sensors
 from ee_dist.evaluation.jobs import Travel
 from ee_dist.evolution.ga import SCALE
+from ee_dist.recovery.behaviour import gait_of
+from ee_dist.recovery.gait import gait
 from ee_dist.recovery.subject import Situation, Subject, share
 from ee_dist.robots.model import Robot
+from ee_dist.trials.log import SensorLog
 
 HEAVIER = (1.0, 2.0)
 """A part grows heavier by 100 to 200 %."""
@@ -50,6 +53,11 @@ def normal(terms: list[Term], robot: Robot) -> Hypothesis:
     return tuple(kept[key] for key in sorted(kept))
 
 
+def _cheats(robot: Robot, log: SensorLog) -> tuple[str, ...]:
+    found = gait(robot, log)
+    return () if found is None else found.cheats
+
+
 WALKING = Subject(
     noun="robot",
     function=Travel(),
@@ -66,4 +74,6 @@ WALKING = Subject(
     ),
     normal=normal,
     tried_places=lambda robot: len(parts(robot)),
+    behaviour=lambda robot: gait_of(robot, Travel()),
+    cheats=_cheats,
 )

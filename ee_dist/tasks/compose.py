@@ -53,6 +53,7 @@ USED_BY = {
     "to": (("export",), ""),
     "hardware": (("recover", "trial"), ""),
     "metric": (("recover",), ""),
+    "repair": (("recover",), ""),
 }
 """Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
 _OPENS = re.compile(r"^\+{0,2}(measured|log)=(?!null$)")

@@ -11,7 +11,9 @@ from ee_dist.effects.catalogue import Hypothesis, from_dict
 from ee_dist.evaluation.jobs import Reduction, Travel
 from ee_dist.evolution.ga import Budget
 from ee_dist.recovery.loop import Plan
+from ee_dist.recovery.map_search import Mapping
 from ee_dist.recovery.metrics import Distance, Metric, RollingMean
+from ee_dist.recovery.repertoire import Repertoire
 from ee_dist.trials.hardware import Limits
 
 ENGINES = ("pybullet", "mujoco", "kinetics")
@@ -174,6 +176,35 @@ class BudgetConfig:
 
 
 @dataclass
+class RepairConfig:
+    """How a repair pass searches."""
+
+    name: str = "paper"
+    map_passes: int = 0
+    bins: int = 8
+    first: float = 0.3
+    kept: float = 0.2
+    narrow: float = 0.9
+
+    def __post_init__(self) -> None:
+        one_of("repair", self.name, ("paper", "gaits"))
+        within("repair.map_passes", self.map_passes, 0, 1000)
+        within("repair.bins", self.bins, 1, 100)
+        for f in fields(self)[1:]:
+            if self.name == "paper" and getattr(self, f.name) != f.default:
+                raise ConfigError(f"repair.{f.name}={getattr(self, f.name)}: is of repair=gaits, not of repair=paper")
+        self.build()
+
+    def build(self) -> Repertoire | None:
+        """None for the paper's own."""
+        try:
+            mapping = Mapping(self.bins, self.first, self.kept, self.narrow)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+        return None if self.name == "paper" else Repertoire(mapping, self.map_passes)
+
+
+@dataclass
 class ScenarioConfig:
     """``number``: of the paper's situations. Others have a ``name``."""
 
@@ -242,6 +273,7 @@ class Config:
     hardware: HardwareConfig = field(default_factory=HardwareConfig)
     metric: MetricConfig = field(default_factory=MetricConfig)
     budget: BudgetConfig = field(default_factory=BudgetConfig)
+    repair: RepairConfig = field(default_factory=RepairConfig)
     scenario: ScenarioConfig | None = None
     system: SystemConfig | None = None
 

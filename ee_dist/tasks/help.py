@@ -43,7 +43,7 @@ VERBS = {
     "recover": Verb(
         "the loop: break, diagnose, repair",
         "+scenario=8",
-        ("scenario", "budget", "metric", "robot", "system", *_RUN),
+        ("scenario", "budget", "metric", "repair", "robot", "system", *_RUN),
         ("seed", "noise", "plugins", "ray.address", *_HARDWARE),
     ),
     "online": Verb(

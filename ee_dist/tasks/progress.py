@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from ee_dist.recording.records import (
     DIAGNOSIS,
     HARDWARE,
+    MAP,
     POLISHED,
     REPAIR,
     GenerationRecord,
@@ -82,7 +83,7 @@ class PassProgress(Observer):
 
     def pass_started(self, phase: str, pass_index: int, generations: int) -> None:
         self.phase, self.index, self.generations = phase, pass_index, generations + 1
-        name = f"{phase} {pass_index + 1} of {self.passes[phase]}"
+        name = f"{phase} {pass_index + 1} of {self.passes[phase]}" if phase != MAP else "map of the intact"
         self.bars.reset(self.pass_bar, total=self.generations, description=name, best="")
         if not self.live and not self.done:
             seconds = time.monotonic() - self.started
@@ -90,13 +91,16 @@ class PassProgress(Observer):
 
     def generation(self, record: GenerationRecord) -> None:
         self.done += self.weights[self.phase] / self.generations
-        good = f"best {self.subject.measure(record.best)}" if record.phase == REPAIR else f"error {record.best:.4f}"
+        measured = record.phase in (REPAIR, MAP)
+        good = f"best {self.subject.measure(record.best)}" if measured else f"error {record.best:.4f}"
         self.bars.update(self.pass_bar, advance=1, best=good)
         self.bars.update(self.run_bar, completed=round(100 * self.done / self.total))
         if record.generation < self.generations - 1:
             return
         if record.phase == REPAIR:
             self._say(f"{record.phase} pass {record.pass_index + 1}: {good}")
+        elif record.phase == MAP:
+            self._say(f"map of the intact {self.subject.noun}: {good}")
         else:
             # Not yet what the loop will believe: that is told when it is final.
             self.evolved = record.best

@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
@@ -18,14 +18,16 @@ from rich.console import Console
 from rich.table import Table
 
 from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.evaluation.jobs import Counts
 from ee_dist.evaluation.physical import PhysicalRobot
-from ee_dist.recording.records import DIAGNOSIS, POLISHED, REPAIR
+from ee_dist.recording.records import DIAGNOSIS, MAP, POLISHED, REPAIR
 from ee_dist.recording.writer import RunWriter
 from ee_dist.recovery.doubt import Doubt, doubt
 from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.loop import Recovery, recover
 from ee_dist.recovery.metrics import RollingMean
 from ee_dist.recovery.observer import Observers
+from ee_dist.recovery.repertoire import Repertoire
 from ee_dist.recovery.subject import Subject
 from ee_dist.tasks.compose import config_folder
 from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig, one_of
@@ -103,12 +105,19 @@ def run(config: Config, options: Options, out: Path) -> None:
     path = out / "recovery.mcap"
     digest = ResultDigest()
     beliefs, gaits, measured = Beliefs(), Gaits(robot, hidden), Measured()
-    passes = {REPAIR: plan.compensating_trials + 1, DIAGNOSIS: plan.compensating_trials}
+    repertoire = config.repair.build()
+    passes = {
+        REPAIR: plan.compensating_trials + 1,
+        DIAGNOSIS: plan.compensating_trials,
+        MAP: int(repertoire is not None),
+    }
     share = metric.steps(plan.steps) * plan.compensating_trials / 2
     weights = {
         REPAIR: plan.repair.population * plan.repair.generations * float(plan.steps) / 2,
         DIAGNOSIS: plan.diagnosis.population * plan.diagnosis.generations * share / 4,
         POLISHED: plan.polish * NEIGHBOURS * share / 2,
+        # Nothing in a map's pass is a copy of what was simulated before.
+        MAP: config.repair.map_passes * plan.repair.population * plan.repair.generations * float(plan.steps) / 2,
     }
     with starting(console, WORKERS[evaluator_name(config)]):
         evaluator = evaluator_of(config)
@@ -119,7 +128,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         # Slow to load, and needed only later: done while the first controllers run.
         Thread(target=_load, args=("scipy.stats", "ee_dist.viewing.scenes"), daemon=True).start()
         observer = Observers(Recorder(writer), digest, beliefs, gaits, measured, progress)
-        result = recover(robot, first, later, metric, plan, evaluator, search_seed, observer)
+        result = recover(robot, first, later, metric, plan, evaluator, search_seed, observer, repertoire)
         # After the search: nothing of it, nor of what it is said to have cost, depends on the doubt.
         counts = evaluator.counts.copy()
         yardstick = metric if isinstance(metric, RollingMean) else RollingMean()
@@ -160,6 +169,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "doubt": last.as_dict(),
         "evaluations": {"asked": counts.asked, "simulated": counts.simulated, "steps": counts.steps,
                         "asked_steps": counts.asked_steps},
+        "repair": _repair(config.repair.name, result.before_change, counts, repertoire),
     })  # fmt: skip
     recording = drawn(path)
     wall, _ = watch.read()
@@ -177,6 +187,16 @@ def run(config: Config, options: Options, out: Path) -> None:
     console.print(
         f"Look at it: python -m ee_dist task=view log={os.path.relpath(path)}", highlight=False, soft_wrap=True
     )
+
+
+def _repair(name: str, before: Counts, whole: Counts, repertoire: Repertoire | None) -> dict[str, Any]:
+    """Which repair, and what was simulated before the change (of that: for a map) and after it."""
+    found = {"name": name, "before": asdict(before), "after": asdict(whole.since(before)), "map": None}
+    if repertoire is not None and repertoire.intact:
+        kinds = [e for e in repertoire.intact if e.allowed]
+        best = kinds[0].score if kinds else None
+        found["map"] = {**asdict(repertoire.cost), "kinds": len(kinds), "best": best}
+    return found
 
 
 def _diagnosis(final: Score) -> dict[str, Any]:

@@ -29,7 +29,7 @@ class ResultDigest(Observer):
     after it, else the prediction. Beliefs are in it as the models behind these. Later beliefs, polished or pruned, are
     thus told only once, and a digest does not change with the number of stages that are recorded.
 
-    Keeps the best of each generation on the way: ``fitness`` and ``dominants`` of the passes, repair and diagnosis.
+    Keeps the best of each generation on the way: ``fitness`` of the repair passes, and ``dominants`` of the passes of each phase.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class ResultDigest(Observer):
         self.dominants: dict[str, list[list[int]]] = {REPAIR: [], DIAGNOSIS: []}
 
     def pass_started(self, phase: str, pass_index: int, generations: int) -> None:
-        self.dominants[phase].append([])
+        self.dominants.setdefault(phase, []).append([])
         if phase == REPAIR:
             self.fitness.append([])
 

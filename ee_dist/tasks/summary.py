@@ -45,6 +45,8 @@ def config_digest(config: Config, options: Any) -> str:
     for key in ("address", "timeout_s", "begin_s", "torque"):  # these end a trial or not, and alter none
         tree.get("hardware", {}).pop(key, None)
     tree.engine.pop("threads", None)
+    if tree.repair.name == "paper":  # which has no settings of its own
+        tree.pop("repair")
     if tree.system is None:
         tree.pop("system")
     if tree.scenario is not None and not tree.scenario.name:

@@ -163,7 +163,7 @@ def test_records_that_have_no_place_are_refused_and_the_rest_is_kept(tmp_path: P
             writer.trial(replace(run.trials[0], source="dream"))
         with pytest.raises(RecordingError, match="ClosedLoop cannot be recorded"):
             writer.trial(replace(run.trials[0], driver=ClosedLoop("mine", zero)))  # type: ignore[arg-type]
-        with pytest.raises(RecordingError, match="no phase 'dream'; there are: repair, diagnosis"):
+        with pytest.raises(RecordingError, match="no phase 'dream'; there are: repair, diagnosis, map"):
             writer.generation(replace(run.generations[0], phase="dream"))
         with pytest.raises(RecordingError, match="metadata: 'seed' is 0; expected text"):
             writer.finish({"seed": 0})  # type: ignore[dict-item]
