@@ -27,7 +27,7 @@ from ee_dist.tasks.results.findings import findings
 from ee_dist.tasks.results.study_logs import controllers, doubted, parting, shown
 from ee_dist.tasks.results.study_page import Extra, study_page
 from ee_dist.tasks.results.study_sections import TEST, brief, cells, head
-from ee_dist.tasks.results.study_table import COLUMNS, against, by_case, once, plain, row, total
+from ee_dist.tasks.results.study_table import COLUMNS, against, by_case, method, once, plain, row, total
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.wiring import evaluator_of, for_few
 from ee_dist.viewing.parting_figures import Parting
@@ -105,7 +105,9 @@ def load(folder: Path) -> list[dict[str, Any]]:
             row(content)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise ConfigError(f"{path}: a summary without {error}; take it out of the folder") from None
-        found.append({**content, "folder": str(path.parent), "command": _command(path.parent)})
+        # Before their way of repair counts as one: the command is of what the run was told.
+        again = _command(path.parent)
+        found.append({**content, "metric": method(content), "folder": str(path.parent), "command": again})
     if not found:
         raise ConfigError(f"log={folder}: no finished run below it; a run is finished when it has a summary.json")
     return sorted(found, key=lambda s: (s["metric"], s["engine"], str(s["scenario"]).zfill(9), s["seed"]))

@@ -17,7 +17,7 @@ from ee_dist.tasks import study
 from ee_dist.tasks.results.study_logs import pair_to_show
 from ee_dist.tasks.results.study_page import seeds_for, study_page
 from ee_dist.tasks.results.study_sections import last_name, p_text
-from ee_dist.tasks.results.study_table import by_case, once, row, total
+from ee_dist.tasks.results.study_table import by_case, method, once, repeated, row, total
 from ee_dist.viewing.report import write_page
 from ee_dist.viewing.study_figures import distances
 
@@ -56,6 +56,15 @@ def test_a_sweep_becomes_a_table_and_figures(cli, tiny):
     assert outcome.out.splitlines()[-1].startswith("Next: ") and head in outcome.out, (
         "the finding last, and what to do next"
     )
+
+
+def test_runs_that_repair_in_another_way_are_counted_apart():
+    told = {"scenario": 8, "metric": "rolling_mean", "seed": 2, "engine": "mujoco", "budget": "paper"}
+    assert method(told) == method({**told, "repair": {"name": "paper"}}) == "rolling_mean"
+    other = method({**told, "repair": {"name": "gaits"}})
+    assert other == "rolling_mean, repair=gaits"
+    words = shlex.split(repeated({**told, "metric": other}))
+    assert {"metric=rolling_mean", "repair=gaits", "+scenario=8"} <= set(words)
 
 
 def test_table_counts_what_the_summaries_say():

@@ -24,6 +24,8 @@ COLUMNS = (
 )  # fmt: skip
 MEANS = ("intact_m", "after_m", "best_m", "last_m", "recovered")
 ROLLING, DISTANCE = "rolling_mean", "distance"
+PAPER = "paper"
+"""The repair that needs no mention."""
 
 
 def row(summary: Mapping[str, Any]) -> Row:
@@ -65,8 +67,15 @@ def _term(entry: Mapping[str, Any]) -> Term:
 
 def repeated(summary: Mapping[str, Any]) -> str:
     """The command of a run whose settings are not beside it: what its summary tells of them."""
-    words = [f"+scenario={summary['scenario']}", f"metric={summary['metric']}", f"seed={summary['seed']}"]
+    metric, *repair = str(summary["metric"]).split(", ")
+    words = [f"+scenario={summary['scenario']}", f"metric={metric}", f"seed={summary['seed']}", *repair]
     return command([*words, f"engine={summary['engine']}", f"budget={summary['budget']}"])
+
+
+def method(summary: Mapping[str, Any]) -> str:
+    """What runs are counted together by: the metric, and the repair where it is not the paper's."""
+    how = summary.get("repair", {}).get("name", PAPER)
+    return summary["metric"] if how == PAPER else f"{summary['metric']}, repair={how}"
 
 
 def total(rows: Rows) -> dict[str, Any]:
