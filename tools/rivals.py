@@ -4,7 +4,8 @@
 
 Each run (a rival, a scenario, a seed) is one JSON file in OUT, and a run that is there is not made again: a study that was
 stopped goes on with the same command. What was simulated is in OUT too, and shared. Ends with table.md, table.csv, runs.csv,
-rivals.json and rivals.png (a page where there is no browser) of all runs in OUT with these settings.
+rivals.json and rivals.png (a page where there is no browser) of all runs in OUT with these settings; table and figure are of the
+cases (scenario and seed) on which every rival ran that ran at all.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.rivals.attempt import Attempt, attempt_of
 from ee_dist.rivals.roster import ROSTER
 from ee_dist.rivals.setting import Allowance, RivalError
-from ee_dist.rivals.tally import markdown, rows_of, table_of, write_csv
+from ee_dist.rivals.tally import by_run, common, markdown, rows_of, table_of, write_csv
 from ee_dist.tasks.compose import config_folder
 from ee_dist.tasks.config import BudgetConfig, Config, ConfigError, EngineConfig, MetricConfig, ScenarioConfig
 from ee_dist.tasks.wiring import build_robot, engine_maker
@@ -77,7 +78,8 @@ class Study:
         versions = {n: installed().get(n) for n in PACKAGES[args.engine]}
         kept = hashlib.sha256(repr((args.engine, versions)).encode()).hexdigest()[:8]
         self.engine = engine_maker(first, alone=True)()
-        self.journal = Journal(self.out / f"simulated_{kept}.bin")
+        # To open it beside a study that runs would cut off what that is just writing.
+        self.journal = None if args.only_write else Journal(self.out / f"simulated_{kept}.bin")
         self.evaluator = CachedEvaluator(JournaledEvaluator(SerialEvaluator(self.engine), self.journal))
         self.robot = build_robot(first)
         self.digest = hashlib.sha256(
@@ -111,7 +113,8 @@ class Study:
 
     def close(self) -> None:
         self.evaluator.close()
-        self.journal.close()
+        if self.journal is not None:
+            self.journal.close()
 
 
 def told(found: Attempt) -> str:
@@ -125,15 +128,18 @@ def told(found: Attempt) -> str:
 
 
 def write(found: Sequence[Attempt], trials: int, out: Path) -> list[Path]:
-    """Table, runs and figure of these attempts."""
+    """Table and figure of the cases on which all of these rivals ran, and every run."""
     titles = {name: entry.title for name, entry in ROSTER.items()}
-    table = table_of(found, titles, trials)
+    shared = common(found)
+    cases = sorted({(a.scenario, a.seed) for a in shared})
+    head = f"Cases that every rival has ({len(cases)}): {', '.join(f'scenario {n} seed {s}' for n, s in cases)}\n\n"
+    table = table_of(shared, titles, trials)
     written = [out / name for name in ("table.md", "table.csv", "runs.csv", "rivals.json")]
-    write_whole(written[0], markdown(table))
+    write_whole(written[0], head + markdown(table) + "\n" + by_run(found, titles))
     write_csv(written[1], table)
     write_csv(written[2], rows_of(found, trials))
     write_whole(written[3], json.dumps({"table": table, "runs": [a.as_dict() for a in found]}) + "\n")
-    curves = {titles[name]: [a.curve() for a in found if a.rival == name] for name in titles}
+    curves = {titles[name]: [a.curve() for a in shared if a.rival == name] for name in titles}
     return [*written, save(by_trials({t: c for t, c in curves.items() if c}), out / "rivals.png")]
 
 

@@ -53,6 +53,15 @@ def means(drawn: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(drawn.mean(axis=1), dtype=np.float64)
 
 
+def common(attempts: Sequence[Attempt]) -> list[Attempt]:
+    """Those of the cases (scenario and seed) on which every rival ran that ran at all: others cannot be set side by side."""
+    cases = {a.rival: set[tuple[int, int]]() for a in attempts}
+    for a in attempts:
+        cases[a.rival].add((a.scenario, a.seed))
+    shared = set.intersection(*cases.values()) if cases else set()
+    return [a for a in attempts if (a.scenario, a.seed) in shared]
+
+
 def table_of(attempts: Sequence[Attempt], titles: Mapping[str, str], trials: int) -> list[dict[str, Any]]:
     """A row for each rival and number of trials allowed: ``trials`` beside the first, and all that a rival made.
 
@@ -150,6 +159,27 @@ def markdown(table: Sequence[Mapping[str, Any]]) -> str:
             rollouts, steps = row[f"simulated_{when}"], row[f"steps_{when}"]
             cells.append(f"{rollouts:,.0f} ({steps / 1e6:.1f} M steps)")
         lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def by_run(attempts: Sequence[Attempt], titles: Mapping[str, str]) -> str:
+    """Markdown: a line for each scenario and seed, a column for each rival: its best share, and the trials until each of
+    ``SHARES``."""
+    names = [n for n in titles if any(a.rival == n for a in attempts)]
+    lines = ["| scenario | seed | intact (m) | " + " | ".join(titles[n] for n in names) + " |"]
+    lines.append("|" + "---|" * (3 + len(names)))
+    made = {(a.scenario, a.seed, a.rival): a for a in attempts}
+    for scenario, seed in sorted({key[:2] for key in made}):
+        cells, intact = [], math.nan
+        for name in names:
+            a = made.get((scenario, seed, name))
+            if a is None:
+                cells.append("")
+                continue
+            best, intact = a.share(len(a.trials_m)), a.intact_m
+            until = ", ".join("-" if (r := a.reached(s)) is None else str(r) for s in SHARES)
+            cells.append(f"{best:.2f} ({until})" if math.isfinite(best) else "none walks")
+        lines.append(f"| {scenario} | {seed} | {intact:.2f} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 

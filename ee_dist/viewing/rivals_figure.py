@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -48,8 +49,11 @@ def by_trials(curves: Mapping[str, Sequence[Sequence[float]]]) -> go.Figure:
         )
     for share in (0.9, 1.0):
         figure.add_hline(y=share, line={"color": "#8899aa", "dash": "dot", "width": 1})
+    widest = math.log10(max((len(run) for runs in curves.values() for run in runs), default=10)) + 0.05
     styled(figure, 520)
     figure.update_layout(hovermode="closest")
-    figure.update_xaxes(type="log", title_text="hardware trials after the change", tickvals=TICKS)
+    figure.update_xaxes(
+        type="log", title_text="hardware trials after the change", tickvals=TICKS, range=(-0.05, widest)
+    )
     figure.update_yaxes(title_text="best distance walked, share of intact", tickformat=".0%")
     return figure

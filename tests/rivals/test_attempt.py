@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ee_dist.rivals.attempt import Attempt, Cost, attempt_of
-from ee_dist.rivals.tally import bootstrap, markdown, means, medians, rows_of, table_of, wilson
+from ee_dist.rivals.tally import bootstrap, by_run, common, markdown, means, medians, rows_of, table_of, wilson
 from ee_dist.viewing.rivals_figure import by_trials
 
 
@@ -51,6 +51,20 @@ def test_the_table_has_a_row_for_few_trials_and_one_for_all():
     assert few["trials_70"] == 5 and few["trials_100"] == math.inf
     assert "never" in markdown([few, many])
     assert [r["trials_to_100"] for r in rows_of(made, 4)] == [6, None]
+
+
+def test_each_run_has_its_line_with_a_hole_where_a_rival_did_not_run():
+    text = by_run(
+        [attempt([0.2, 1.5, 2.0]), attempt([0.2], rival="bayes", no_gait=[0])], {"loop": "L", "bayes": "B", "x": "X"}
+    )
+    assert text.splitlines()[0] == "| scenario | seed | intact (m) | L | B |"
+    assert text.splitlines()[2] == "| 3 | 0 | 2.00 | 1.00 (2, 3, 3) | none walks |"
+
+
+def test_only_cases_that_all_have_are_set_side_by_side():
+    a, b, c = attempt([1.0]), attempt([1.0], rival="bayes"), attempt([1.0])
+    c.seed = 1
+    assert common([a, b, c]) == [a, b] and common([b, c]) == [] and common([]) == []
 
 
 def test_the_picture_has_a_line_for_each_and_a_band_where_runs_differ():

@@ -87,8 +87,19 @@ def test_a_study_goes_on_where_it_was_stopped(done, capsys):
     assert told.count("(was there)") == len(ROSTER) - 1
 
 
+def test_a_table_can_be_written_beside_a_study_that_runs(done, capsys):
+    found, out = done
+    (journal,) = out.glob("simulated_*.bin")
+    with journal.open("ab") as other:
+        other.write(b"half an entry")
+    before = journal.read_bytes()
+    assert study(out, "--only-write") == found
+    assert journal.read_bytes() == before
+    assert ROSTER["loop"].title in capsys.readouterr().out
+
+
 def test_the_loop_is_the_loop(done):
-    from rivals import main, settings_of  # noqa: F401
+    from rivals import settings_of
 
     class Args:
         budget, change, engine = "quick", TINY, "mujoco"
