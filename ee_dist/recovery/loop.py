@@ -5,6 +5,7 @@ It sees hardware through ``trial`` alone. What is wrong with the hardware it mus
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -59,6 +60,10 @@ class Plan:
             raise ValueError(f"plan: related must be from 0 to 1, not {self.related}")
 
 
+Diagnosis = Callable[[Sequence[tuple[Network, SensorLog]], int, np.random.SeedSequence], tuple[Hypothesis, float]]
+"""From all trials since the change, the number of the pass and its seed: the hypothesis to act on, and its error."""
+
+
 @dataclass
 class Recovery:
     """What a run found. ``intact``, ``after`` and each of ``trials`` (the compensating ones) say how well the hardware did, as
@@ -85,12 +90,12 @@ def recover(
     seed: np.random.SeedSequence,
     observer: Observer,
     repertoire: Repertoire | None = None,
+    diagnosis: Diagnosis | None = None,
 ) -> Recovery:
-    """Run the loop. ``repertoire`` takes the place of the paper's repair passes after the change.
+    """Run the loop. ``intact`` is the hardware before the change, ``changed`` the same robot after it.
 
-    ``intact`` is the hardware before the change, ``changed`` the same robot after it.
-
-    Seeds: one for each repair pass, then one for each diagnosis pass, spawned from ``seed``.
+    ``repertoire`` takes the place of the paper's repair passes after the change, ``diagnosis`` that of the evolution of
+    hypotheses. Seeds: one for each repair pass, then one for each diagnosis pass, spawned from ``seed``.
     """
     passes = plan.compensating_trials
     streams = seed.spawn(2 * passes + 1)
@@ -121,13 +126,19 @@ def recover(
     observer.trial(TrialRecord(1, "after the change", HARDWARE, best, log))
     trials: list[tuple[Network, SensorLog]] = [(best, log)]
     believed: list[Genomes] = []
-    for k in range(passes):
+
+    def evolved(
+        trials: Sequence[tuple[Network, SensorLog]], k: int, stream: np.random.SeedSequence
+    ) -> tuple[Hypothesis, float]:
         judge = Judge(robot, trials, metric, evaluator)
-        belief = believe(judge, believed, plan.diagnosis, plan.polish, plan.parsimony, diagnosis_seeds[k], observer, k)
-        hypothesis = belief.hypothesis
+        belief = believe(judge, believed, plan.diagnosis, plan.polish, plan.parsimony, stream, observer, k)
         believed.append(belief.genome)
+        return belief.hypothesis, belief.error
+
+    for k in range(passes):
+        hypothesis, error = (diagnosis or evolved)(trials, k, diagnosis_seeds[k])
         result.hypotheses.append(hypothesis)
-        result.errors.append(belief.error)
+        result.errors.append(error)
         name = "after the change" if k == 0 else f"trial {k}"
         say(k + 1, name, HINDSIGHT, trials[-1][0], hypothesis)
 
