@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Iterator
 
 import pytest
@@ -9,6 +11,10 @@ from hypothesis import settings
 
 from ee_dist.effects import catalogue, laws
 from ee_dist.viewing.browser import BrowserError, HeadlessBrowser, chromium
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN and threading.current_thread() is threading.main_thread():
+    # In the background of a shell Ctrl-C is ignored, also by what tests start to see what it does with one.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # How long an example takes says what else the machine does.
 settings.register_profile("without a clock", deadline=None)
