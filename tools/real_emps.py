@@ -22,7 +22,7 @@ from ee_dist.effects.catalogue import apply
 from ee_dist.effects.model_file import ModelFile, read_model, write_model
 from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.report import describe as report
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "examples"

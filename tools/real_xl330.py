@@ -26,7 +26,7 @@ from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.report import describe
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "examples"

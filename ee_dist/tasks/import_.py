@@ -21,7 +21,8 @@ from ee_dist.basics.files import write_whole
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
-from ee_dist.measurements.mapping import Mapping, read_mapping
+from ee_dist.measurements.mapping import Mapping
+from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import FIT, UNITS_TO_ASK, Hints, Proposal
 from ee_dist.measurements.proposal.write import as_yaml, rows

@@ -14,7 +14,7 @@ from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.effects.catalogue import term
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import FIT, Hints
 from ee_dist.measurements.proposal.write import as_yaml

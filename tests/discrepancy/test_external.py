@@ -16,7 +16,7 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import mapping_of
+from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.writer import RunWriter
 

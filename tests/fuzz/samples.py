@@ -32,7 +32,7 @@ from ee_dist.engines.drivers import Commands, DriverError
 from ee_dist.evaluation.journal import Journal
 from ee_dist.evaluation.socket_body import SocketBody
 from ee_dist.evaluation.stepped import SteppedRobot
-from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.readers import read as read_table
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.reader import read_logs, read_run

@@ -12,7 +12,7 @@ import pytest
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import mapping_of, read_mapping
+from ee_dist.measurements.mapping_file import mapping_of, read_mapping
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.servo_pendulum import servo_pendulum
 

@@ -12,7 +12,8 @@ import pytest
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import Mapping, mapping_of
+from ee_dist.measurements.mapping import Mapping
+from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints
 from ee_dist.robots.model import Drive, Robot

@@ -11,7 +11,8 @@ import pytest
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file, import_files
-from ee_dist.measurements.mapping import Mapping, mapping_of
+from ee_dist.measurements.mapping import Mapping
+from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.measurements.report import describe
 from ee_dist.measurements.sampling import LowPass, decimated, held, linear, smoothed
 from ee_dist.robots.linear_stage import linear_stage

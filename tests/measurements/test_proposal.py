@@ -14,7 +14,7 @@ import pytest
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
-from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints
 from ee_dist.measurements.proposal.write import as_yaml, rows

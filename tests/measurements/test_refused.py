@@ -13,7 +13,7 @@ import pytest
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import mapping_of, read_mapping
+from ee_dist.measurements.mapping_file import mapping_of, read_mapping
 from ee_dist.measurements.readers import Options, read
 from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.model import Robot

@@ -9,7 +9,7 @@ import pytest
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import mapping_of
+from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.readers.options import Options
 from ee_dist.measurements.table import Table

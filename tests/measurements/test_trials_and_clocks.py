@@ -12,7 +12,8 @@ import pytest
 from ee_dist.measurements.alignment import match
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
-from ee_dist.measurements.mapping import Mapping, mapping_of
+from ee_dist.measurements.mapping import Mapping
+from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
 ROBOT = servo_pendulum(time_step_s=0.005)

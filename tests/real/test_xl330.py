@@ -18,7 +18,7 @@ from ee_dist.effects.model_file import read_model
 from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.measurements.importer import import_file
-from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.mapping_file import read_mapping
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "xl330"

@@ -10,7 +10,7 @@ import pytest
 
 from ee_dist.effects.model_file import read_model
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.mapping import read_mapping
+from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.sampling import grid
 from ee_dist.robots.describe import load_robot
