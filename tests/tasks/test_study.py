@@ -168,7 +168,7 @@ def test_the_first_lines_of_a_study_tell_what_how_sure_and_what_next():
     assert "task=view" in page.following and "logs/a sweep/5" in page.following
     assert "no test" in page_of(study_of([1, 2], [0])).first[1]
     assert page_of(study_of([1, 2], [0])).first[-1].startswith("Next: more seeds")
-    assert page_of(study_of([1, 2], [0])).first[-1].endswith("of 2 cases it takes 7.")
+    assert page_of(study_of([1, 2], [0])).first[-1].endswith("with 2 cases p can fall below 0.05 from 7 seeds on.")
     assert (seeds_for(1), seeds_for(13)) == (6, 10)
     quick = page_of([{**s, "budget": "quick"} for s in study_of([1], range(4))])
     assert quick.tone == "open" and "without budget=quick" in quick.first[-1]

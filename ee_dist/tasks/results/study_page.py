@@ -186,7 +186,8 @@ def _advice(rows: Rows, lines: Rows, budgets: Sequence[str]) -> list[str]:
     if any(not x["p_corrected"] < SURE for x in lines):
         cases = max(sum(x["metric"] == m for x in lines) for m in {x["metric"] for x in lines})
         return [
-            f"Next: more seeds (seed=0,1,2,...), where p is to tell more: of {_count(cases, 'case')} it takes {seeds_for(cases)}."
+            f"Next: more seeds (seed=0,1,2,...): with {_count(cases, 'case')} p can fall below {SURE:g} from "
+            f"{seeds_for(cases)} seeds on."
         ]
     return ["Next: nothing has to be done."]
 
