@@ -29,9 +29,10 @@ def check_written(robot: System, terms: Hypothesis) -> None:
     what no robot can be."""
     if not isinstance(robot, Robot):
         return
+    changed = apply(robot, terms)
     _not_too_much(robot, terms)
     try:
-        checked(apply(robot, terms), "with these effects")
+        checked(changed, "with these effects")
     except RobotError as error:
         raise EffectError(str(error)) from None
 

@@ -54,7 +54,6 @@ def read_model(path: str | Path) -> ModelFile:
         raise EffectError(f"{file}: effects: expected a list, not {quoted(entries)}")
     try:
         terms = tuple(from_dict(e) for e in entries)
-        apply(robot, terms)
         check_written(robot, terms)
     except EffectError as error:
         raise EffectError(f"{file}: {error}") from None

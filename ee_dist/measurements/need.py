@@ -21,7 +21,10 @@ def torques_needed(robot: Robot, position: Array, step_s: float) -> tuple[Array,
     q = signals.smooth(position, max(3, round(WINDOW_S / step_s)))
     speed = signals.change(q, step_s, WINDOW_S)
     try:
-        found = joint_torques(robot, q, speed, signals.change(speed, step_s, WINDOW_S))
+        acceleration = signals.change(speed, step_s, WINDOW_S)
+        # Row by row, but with hundreds of numbers for each on the way: a long log would fill the memory.
+        stretches = (slice(k, k + signals.MOST_ROWS) for k in range(0, len(q), signals.MOST_ROWS))
+        found = np.concatenate([joint_torques(robot, q[s], speed[s], acceleration[s]) for s in stretches])
     except (RobotError, np.linalg.LinAlgError):
         return None
     return (found, speed) if np.isfinite(found).all() else None

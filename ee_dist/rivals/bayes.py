@@ -22,8 +22,7 @@ from ee_dist.effects.targets import carried_parts, floor, motors, parts, sensors
 from ee_dist.engines.drivers import Network
 from ee_dist.recovery.diagnosis import Judge
 from ee_dist.recovery.kinds import subject_of
-from ee_dist.recovery.loop import recover
-from ee_dist.recovery.observer import Observer
+from ee_dist.rivals.loop import loop
 from ee_dist.rivals.setting import Setting
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import SensorLog
@@ -92,19 +91,8 @@ class Inference:
 
 
 def bayes(setting: Setting, beside: bool = False) -> Sequence[Hypothesis]:
-    s, listed = setting, faults(setting.robot, beside, setting.allowance.pairs)
-    found = recover(
-        s.robot,
-        s.intact,
-        s.changed,
-        s.metric,
-        s.plan,
-        s.evaluator,
-        s.fresh_seed(),
-        Observer(),
-        diagnosis=Inference(s, listed),
-    )
-    return found.hypotheses
+    listed = faults(setting.robot, beside, setting.allowance.pairs)
+    return loop(setting, Inference(setting, listed))
 
 
 def bayes_beside(setting: Setting) -> Sequence[Hypothesis]:

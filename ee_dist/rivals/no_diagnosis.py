@@ -9,8 +9,7 @@ import numpy as np
 
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.drivers import Network
-from ee_dist.recovery.loop import recover
-from ee_dist.recovery.observer import Observer
+from ee_dist.rivals.loop import loop
 from ee_dist.rivals.setting import Setting
 from ee_dist.trials.log import SensorLog
 
@@ -22,7 +21,4 @@ def _nothing(
 
 
 def no_diagnosis(setting: Setting) -> Sequence[Hypothesis]:
-    s = setting
-    return recover(
-        s.robot, s.intact, s.changed, s.metric, s.plan, s.evaluator, s.fresh_seed(), Observer(), diagnosis=_nothing
-    ).hypotheses
+    return loop(setting, _nothing)

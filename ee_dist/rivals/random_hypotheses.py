@@ -13,8 +13,7 @@ from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.drivers import Network
 from ee_dist.recovery.diagnosis import Judge
 from ee_dist.recovery.genome import first_hypotheses
-from ee_dist.recovery.loop import recover
-from ee_dist.recovery.observer import Observer
+from ee_dist.rivals.loop import loop
 from ee_dist.rivals.setting import Setting
 from ee_dist.trials.log import SensorLog
 
@@ -34,6 +33,4 @@ def random_hypotheses(setting: Setting, drawn: int = DRAWN) -> Sequence[Hypothes
         best = int(np.argmin(errors))
         return said[best], float(errors[best])
 
-    return recover(
-        s.robot, s.intact, s.changed, s.metric, s.plan, s.evaluator, s.fresh_seed(), Observer(), diagnosis=guess
-    ).hypotheses
+    return loop(s, guess)

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binomtest
 
 from ee_dist.basics.files import write_whole
 from ee_dist.rivals.attempt import SHARES, Attempt
 
-Z = 1.959963984540054
 RESAMPLES = 10_000
 Interval = tuple[float, float]
 
@@ -29,9 +29,8 @@ def wilson(hits: int, runs: int) -> Interval:
     """95 % interval of a share of runs."""
     if not runs:
         return 0.0, 1.0
-    p, z2 = hits / runs, Z**2 / runs
-    middle, half = p + z2 / 2, Z * math.sqrt(p * (1 - p) / runs + z2 / (4 * runs))
-    return max(0.0, (middle - half) / (1 + z2)), min(1.0, (middle + half) / (1 + z2))
+    found = binomtest(hits, runs).proportion_ci(0.95, method="wilson")
+    return float(found.low), float(found.high)
 
 
 def bootstrap(values: Sequence[float], of: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Interval:

@@ -27,7 +27,7 @@ from ee_dist.tasks.results.findings import findings
 from ee_dist.tasks.results.study_logs import controllers, doubted, parting, shown
 from ee_dist.tasks.results.study_page import Extra, study_page
 from ee_dist.tasks.results.study_sections import TEST, brief, cells, head
-from ee_dist.tasks.results.study_table import COLUMNS, against, by_case, method, once, plain, row, total
+from ee_dist.tasks.results.study_table import COLUMNS, Rows, against, by_case, method, once, plain, row, total
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.wiring import evaluator_of, for_few
 from ee_dist.viewing.parting_figures import Parting
@@ -50,7 +50,9 @@ def run(config: Config, options: Options, out: Path) -> None:
     console, watch = Console(), Stopwatch()
     if not config.log:
         raise ConfigError("log=: which runs? name the folder of a sweep, such as log=logs/recover/..._sweep")
-    every = load(Path(config.log))
+    folder = Path(config.log)
+    told_by = summaries(folder)
+    every = load(folder, told_by)
     runs = once(every)
     if len(runs) < len(every):
         console.print(f"{len(every) - len(runs)} of {len(every)} runs are there twice and count once.", highlight=False)
@@ -64,10 +66,10 @@ def run(config: Config, options: Options, out: Path) -> None:
     writer.writeheader()
     writer.writerows(rows)
     write_whole(out / "study.csv", table.getvalue())
-    write_whole(out / "study.md", markdown(rows))
     lines, between, totals = by_case(rows), against(rows), total(rows)
-    _print(console, rows)
-    parted = _partings(config, runs)
+    write_whole(out / "study.md", markdown(rows, lines, totals))
+    _print(console, lines, totals)
+    parted = _partings(few, runs)
     found = findings(rows, lines, between, runs, [(p.near, p.far) for p in parted])
     write_summary(out, "study", config, options, watch, digest_of(_decisive(rows)), {
         "runs": len(rows),
@@ -77,7 +79,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "logs_part_after_steps": [{"nearly_equal": p.near, "different": p.far} for p in parted],
         "findings": [f.as_dict() for f in found],
     })  # fmt: skip
-    extra = Extra(shown(runs), parted, between, found, _links(Path(config.log), out))
+    extra = Extra(shown(runs), parted, between, found, _links(told_by, out))
     page = study_page(runs, rows, lines, totals, str(config.log), extra)
     write_page(page, out / "report.html")
     for name in ("study.csv", "study.md", "report.html"):
@@ -93,12 +95,16 @@ def _decisive(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [{k: v for k, v in r.items() if k not in ("wall_s", "folder", "command")} for r in rows]
 
 
-def load(folder: Path) -> list[dict[str, Any]]:
-    """Summaries of all finished recover runs below a folder, in order, each with its own ``folder`` and the ``command`` that
-    repeats it. Raises ConfigError where there is none."""
+def summaries(folder: Path) -> dict[Path, dict[str, Any]]:
+    """All below a folder, by path in order. Raises ConfigError for a file that is none."""
+    return {path: _summary(path) for path in sorted(folder.rglob("summary.json"))}
+
+
+def load(folder: Path, told_by: Mapping[Path, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Of the summaries below a folder those of finished recover runs, in order, each with its own ``folder`` and the
+    ``command`` that repeats it. Raises ConfigError where there is none."""
     found = []
-    for path in sorted(folder.rglob("summary.json")):
-        content = _summary(path)
+    for path, content in told_by.items():
         if content.get("task") != "recover":
             continue
         try:
@@ -136,35 +142,34 @@ def _command(folder: Path) -> str:
     return command([w.replace("'", "") if w.startswith("+scenario=") else w for w in asked])
 
 
-def _partings(config: Config, runs: Sequence[Mapping[str, Any]]) -> list[Parting]:
+def _partings(few: Config, runs: Sequence[Mapping[str, Any]]) -> list[Parting]:
     """When logs of damages part under the intact controllers: the only rollouts of a study, three for each."""
     found = []
     for engine, robot, controller, steps in controllers(runs):
-        parted = parting(robot, controller, steps, evaluator_of(for_few(config), engine))
+        parted = parting(robot, controller, steps, evaluator_of(few, engine))
         if parted is not None:
             found.append(parted)
     return found
 
 
-def _links(folder: Path, out: Path) -> list[tuple[str, str]]:
+def _links(told_by: Mapping[Path, dict[str, Any]], out: Path) -> list[tuple[str, str]]:
     """Runs of evolution on the body alone (the paper's Fig. 1) that lie below the folder too: each has a page of its own."""
     found = []
-    for path in sorted(folder.rglob("summary.json")):
-        page, told = path.parent / "report.html", _summary(path)
+    for path, told in told_by.items():
+        page = path.parent / "report.html"
         if told.get("task") == "online" and page.is_file():
             name = f"Evolution on the body alone, without a model (the paper's Fig. 1), scenario {told.get('scenario')}"
             found.append((f"{name}, seed {told.get('seed')}", os.path.relpath(page, out)))
     return found
 
 
-def markdown(rows: list[dict[str, Any]]) -> str:
+def markdown(rows: Rows, lines: Rows, totals: Mapping[str, Any]) -> str:
     """The table for a document, each metric and the totals."""
     parts, heads = [], head(rows)
-    for metric, counts in total(rows).items():
-        lines = [x for x in by_case(rows) if x["metric"] == metric]
+    for metric, counts in totals.items():
         parts.append(f"### {metric}\n")
         parts.append("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
-        parts += ["| " + " | ".join(cells(x)) + " |" for x in lines]
+        parts += ["| " + " | ".join(cells(x)) + " |" for x in lines if x["metric"] == metric]
         n, scored = counts["runs"], counts["scored"]
         parts.append(
             f"\nRestored ({RESTORED:.0%} of intact or more in one of the compensating trials): {counts['restored']} of {n}. "
@@ -174,14 +179,14 @@ def markdown(rows: list[dict[str, Any]]) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _print(console: Console, rows: list[dict[str, Any]]) -> None:
-    for metric, counts in total(rows).items():
+def _print(console: Console, lines: Rows, totals: Mapping[str, Any]) -> None:
+    for metric, counts in totals.items():
         table = Table(
             title=f"{metric}, distances in m", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False, title_justify="left"
         )
         for name in SHORT:
             table.add_column(name, justify="right", no_wrap=True)
-        for line in by_case(rows):
+        for line in lines:
             if line["metric"] == metric:
                 table.add_row(*brief(line))
         console.print(table)

@@ -127,7 +127,7 @@ def summary(path: Path) -> None:
 
 
 def studied(path: Path) -> None:
-    study.load(path.parent)
+    study.load(path.parent, study.summaries(path.parent))
 
 
 def repaired(path: Path) -> None:

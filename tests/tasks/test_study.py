@@ -194,7 +194,8 @@ def test_the_page_of_a_study_is_quiet_and_fits(window, tmp_path, width, dark, ru
 
 def test_the_table_of_all_cases_survives_80_columns():
     out = io.StringIO()
-    study._print(Console(file=out, width=80), [row(s) for s in study_of(range(1, 14), range(10))])
+    rows = [row(s) for s in study_of(range(1, 14), range(10))]
+    study._print(Console(file=out, width=80), by_case(rows), total(rows))
     lines = out.getvalue().splitlines()
     assert all(len(line) <= 80 for line in lines)
     assert "…" not in out.getvalue()

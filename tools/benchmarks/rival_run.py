@@ -10,7 +10,7 @@ import numpy as np
 
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Engine, Rollout
-from ee_dist.evaluation.jobs import Evaluator
+from ee_dist.evaluation.jobs import Counts, Evaluator
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recovery.gait import gait
 from ee_dist.recovery.kinds import subject_of
@@ -32,7 +32,7 @@ class Watched:
     def __init__(self, physical: PhysicalRobot, engine: Engine, body: Robot, ledger: Ledger) -> None:
         self.physical, self.engine, self.body, self.ledger = physical, engine, body, ledger
         self.trials_m: list[float] = []
-        self.costs: list[Cost] = []
+        self.costs: list[Counts] = []
         self.no_gait: dict[int, list[str]] = {}
         self._best = -np.inf
         self._coming: list[Any] = []
@@ -56,9 +56,8 @@ class Watched:
                 self.no_gait[len(self.trials_m)] = list(cheats.cheats)
             else:
                 self._best = distance
-        counts = self.ledger.counts
         self.trials_m.append(distance)
-        self.costs.append(Cost(counts.asked, counts.simulated, counts.steps))
+        self.costs.append(self.ledger.counts.copy())
         return log
 
     def _ahead(self, driver: Any, steps: int) -> None:
@@ -67,6 +66,10 @@ class Watched:
         some, self._coming = self._coming[:TOGETHER], self._coming[TOGETHER:]
         logs = self.engine.rollout([Rollout(self.body, d, steps, pose=True) for d in some])
         self._known = {d.key: log for d, log in zip(some, logs, strict=True) if log.finite}
+
+
+def _cost(counts: Counts) -> Cost:
+    return Cost(counts.asked, counts.simulated, counts.steps)
 
 
 def attempt(
@@ -88,21 +91,17 @@ def attempt(
     believed = ROSTER[name].run(setting)
     if intact.physical.trials != 1 or changed.physical.trials != len(changed.trials_m):
         raise AssertionError("the hardware counted other trials than were noted")
-    before, counts = changed.costs[0], ledger.counts
-
-    def since(cost: Cost) -> Cost:
-        return Cost(cost.asked - before.asked, cost.simulated - before.simulated, cost.steps - before.steps)
-
+    before = changed.costs[0]
     assert config.scenario is not None
     return Attempt(
         rival=name,
         scenario=config.scenario.number,
         seed=config.seed,
         intact_m=intact.trials_m[0],
-        before=before,
-        after=since(Cost(counts.asked, counts.simulated, counts.steps)),
+        before=_cost(before),
+        after=_cost(ledger.counts.since(before)),
         trials_m=changed.trials_m,
-        spent=[since(c) for c in changed.costs],
+        spent=[_cost(c.since(before)) for c in changed.costs],
         no_gait=changed.no_gait,
         believed=[[t.as_dict() for t in h] for h in believed],
         truth=[t.as_dict() for t in hidden],

@@ -94,6 +94,13 @@ def _control(tests: Mapping[tuple[str, Any], Paired]) -> Finding | None:
     )
 
 
+def _positive(test: Paired) -> str:
+    """Of a finding that says that a difference is more than none."""
+    if test.sure:
+        return HOLDS if test.shift > 0 else NOT
+    return NOT if test.could_tell else OPEN
+
+
 def _nothing(rows: Rows, metric: str) -> Finding | None:
     mine = [r for r in rows if r["metric"] == metric and r["scenario"] == UNCHANGED and r["true"] is not None]
     if not mine:
@@ -108,7 +115,7 @@ def _improves(tests: Mapping[tuple[str, Any], Paired], metric: str) -> Finding |
     if not mine:
         return None
     (test,) = corrected(list(mine.values()))  # one situation by itself
-    verdict = (HOLDS if test.shift > 0 else NOT) if test.sure else NOT if test.could_tell else OPEN
+    verdict = _positive(test)
     said = f"Where nothing breaks (9) the controller goes on improving, {NAMES[metric]}."
     return Finding(said, verdict, f"{_told(test)}; {_enough({UNCHANGED: test})}.")
 
@@ -154,7 +161,7 @@ def _dominants(summaries: Sequence[Mapping[str, Any]]) -> Finding | None:
     if not both:
         return None
     (test,) = corrected([paired([c[ROLLING] - c[DISTANCE] for c in both])])
-    verdict = (HOLDS if test.shift > 0 else NOT) if test.sure else NOT if test.could_tell else OPEN
+    verdict = _positive(test)
     means = [float(np.mean([c[m] for c in both])) for m in (ROLLING, DISTANCE)]
     return Finding(
         "A diagnosis by rolling means finds many new best hypotheses, one by distances few.",
@@ -186,7 +193,7 @@ def _part(partings: Sequence[tuple[int, int]]) -> Finding | None:
     if not partings:
         return None
     (test,) = corrected([paired([float(near - far) for near, far in partings])])
-    verdict = (HOLDS if test.shift > 0 else NOT) if test.sure else NOT if test.could_tell else OPEN
+    verdict = _positive(test)
     near, far = (float(np.median([p[k] for p in partings])) for k in (0, 1))
     return Finding(
         "Logs of nearly equal damages part late (after about 150 steps), of different damages early (about 50).",
