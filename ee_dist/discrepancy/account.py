@@ -46,7 +46,8 @@ NOTHING_ELSE = "Nothing else is left above the noise."
 CONTENT = (
     "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
 )
-PLANNED = "task=plan finds the trial that tells them apart within limits of yours, and writes its commands."
+PLAN = "What to record to tell them apart, within limits of yours:"
+"""Before the command that finds it."""
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
 
@@ -54,7 +55,8 @@ STUCK = "Next: try other motions, or write the effect that is missing (docs/own_
 class Account:
     """``headline``: what was found, where, how much of it, and whether more is left. ``error``: of the models, beside the
     noise floor. ``sure``: how sure it is. ``advice``: what to do next, where a command does not say it. ``lines``: what speaks
-    for it and what stays open. ``good``: whether the question is settled."""
+    for it and what stays open. ``good``: whether the question is settled. ``planner``: the command that finds the trial which
+    tells apart what is tied, where something is."""
 
     headline: str
     error: str
@@ -62,11 +64,13 @@ class Account:
     lines: tuple[str, ...]
     good: bool
     advice: str = ""
+    planner: str = ""
 
     @property
     def first(self) -> list[str]:
         """What comes below the headline before anything else."""
-        return [line for line in (self.error, self.sure, self.advice) if line]
+        planned = f"{PLAN} {self.planner}" if self.planner else ""
+        return [line for line in (self.error, self.sure, self.advice, planned) if line]
 
     @property
     def words(self) -> list[str]:
@@ -125,8 +129,9 @@ def _beside(error: float, floor: float, left: bool) -> list[str]:
     return [GRANTED] if error > 1.03 * floor and not left else []
 
 
-def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None) -> Account:
-    """The verdict, what it is, what speaks for it, what stays open, what to do next."""
+def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None, planner: str = "") -> Account:
+    """The verdict, what it is, what speaks for it, what stays open, what to do next; ``planner`` is said where something is tied
+    that another trial might tell apart."""
     robot, best = problem.robot, found.best
     lines = [f"Noise floor: {found.floor_source}. {_count(found.tried, 'explanation')} {_were(found.tried)} tried."]
     error = f"{_error(problem)}: model {problem.told(found.baseline_error)}"
@@ -179,12 +184,12 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         where = f", on the {e.fixture}" if robot.free_base else ""
         advice = (
             f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
-            f"(predicted distance {ahead.separation:.0f} standard deviations). {PLANNED}"
+            f"(predicted distance {ahead.separation:.0f} standard deviations)."
         )
-    elif best is not None and best.tied_with:
-        advice = PLANNED
     good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
-    return Account(head, error, sure, (*lines, *problem.notes), good, advice)
+    tied = found.verdict == EFFECT and best is not None and best.tied_with
+    alike = ahead is not None and ahead.separation < ENOUGH
+    return Account(head, error, sure, (*lines, *problem.notes), good, advice, planner if tied and not alike else "")
 
 
 def _error(problem: Problem) -> str:
@@ -252,8 +257,8 @@ def confidence(best: Judged) -> str:
     )
 
 
-def improve_account(problem: Problem, found: Improvement) -> Account:
-    """What was done, how good it is, and what is left."""
+def improve_account(problem: Problem, found: Improvement, planner: str = "") -> Account:
+    """What was done, how good it is, and what is left; ``planner`` is said where what was added is tied."""
     robot, first, last = problem.robot, found.ladder[0], found.ladder[-1]
     steps = [r for r in found.ladder if r.added]
     lines = []
@@ -289,7 +294,9 @@ def improve_account(problem: Problem, found: Improvement) -> Account:
         sure = f"How sure: {share}, judged on {last.held_out}{_rest(found.explained, settled)}"
         sure += f"{_ranges(found, [t for _, mine in phrases[:NAMED] if len(mine) == 1 for t in mine], robot)}{_told_from(steps)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
-    return Account(head, error, sure, (*lines, *problem.notes), settled, advice)
+    there = {t.name for t in found.terms}
+    tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in there for r in steps)
+    return Account(head, error, sure, (*lines, *problem.notes), settled, advice, planner if tied else "")
 
 
 def added(found: Improvement) -> list[Term]:

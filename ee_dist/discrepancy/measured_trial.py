@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -61,6 +61,37 @@ def start_of(log: SensorLog, robot: Robot) -> State | None:
     if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
         return None
     return State(log.joints[0].copy(), speeds_of(log, robot)[0])
+
+
+def evenly_read(log: SensorLog) -> SensorLog:
+    """The log at the rate of its readings, where rows between them were filled in; straight lines between uneven ones."""
+    if log.filled is None:
+        return log
+    read = log.readings
+    known_s, before = log.times_s[read], log.times_s - 1e-9
+    at_s = np.arange(known_s[0], known_s[-1], float(np.median(np.diff(known_s))))
+    rows = np.searchsorted(before, at_s, side="right") - 1
+
+    def lines(values: Array | None) -> Array | None:
+        if values is None:
+            return None
+        columns = values[read].reshape(len(read), -1).T
+        return np.stack([np.interp(at_s, known_s, c) for c in columns], axis=1).reshape(len(at_s), *values.shape[1:])
+
+    sensors = lines(log.sensors)
+    assert sensors is not None
+    return replace(
+        log,
+        times_s=at_s,
+        sensors=sensors,
+        commands=log.commands[rows],
+        base_pose=lines(log.base_pose),
+        joints=lines(log.joints),
+        torques=lines(log.torques),
+        supply_v=lines(log.supply_v),
+        external=lines(log.external),
+        filled=None,
+    )
 
 
 def speeds_of(log: SensorLog, robot: Robot) -> Array:

@@ -20,7 +20,7 @@ from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.need import beside_need, torques_needed
 from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_units, torque_units
-from ee_dist.measurements.sampling import LowPass, grid, held, linear, smoothed
+from ee_dist.measurements.sampling import LowPass, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
     command_suspicion,
     speed_suspicion,
@@ -99,6 +99,7 @@ class _Import:
             torques=torques,
             supply_v=supply,
             external=external,
+            filled=self._filled(),
         )
         record = TrialRecord(self.index, self.report.trial, HARDWARE, Commands(commands.copy()), log, self._settings())
         return record, self.report
@@ -147,6 +148,18 @@ class _Import:
             report.suspicious.append(note)
         for row, seconds in timing.gaps[:5]:
             report.suspicious.append(f"time: a gap of {seconds:.4g} s before row {row}")
+
+    def _filled(self) -> Array | None:
+        """Rows between the readings of the slowest table that sensors are read from."""
+        tables = {c.table for c in self.mapping.sensors.values() if isinstance(c, Column)}
+        slowest = max((self.clocks[t] for t in sorted(tables)), key=lambda c: c.timing.median_s, default=self.main)
+        # The grid begins where the main table does.
+        found = filled(self.at_s, slowest.times_s - self.main.times_s[0])
+        if found is not None:
+            self.report.done.append(
+                f"{int((~found).sum())} of {len(found)} rows are readings of the sensors: only these are compared"
+            )
+        return found
 
     # -- columns -----------------------------------------------------------------------------------------------------
 

@@ -19,6 +19,10 @@ LONGEST = 1e7
 """Rows of one trial: a thousand a second for nearly three hours."""
 MOST_AT_ONCE = 13
 """Samples of which one is kept in a single step."""
+SLACK = 1e-3
+"""Share of a step by which a time stamp may be late and still be the row's own."""
+FILLED = 1.5
+"""Rows for each reading from which most rows are no readings, and only those that are count."""
 GAP = 5.0
 """Steps longer than this many medians are gaps."""
 
@@ -72,6 +76,21 @@ def grid(times_s: Array, step_s: float) -> Array:
 def linear(at_s: Array, times_s: Array, values: Array) -> Array:
     """Straight lines between samples: for states, which cannot jump."""
     return np.interp(at_s, times_s - times_s[0], values)
+
+
+def filled(at_s: Array, read_s: Array) -> Array | None:
+    """(T,) bool: times of an even grid, from 0 on, at which nothing was read, so that only straight lines between the readings
+    of ``read_s`` (K,) are there; None where there are about as many readings as rows."""
+    if len(at_s) < 2 or len(read_s) < 2:
+        return None
+    step = float(at_s[1] - at_s[0])
+    if float(np.median(np.diff(read_s))) < FILLED * step:
+        return None
+    # The first row that may know of a reading: what is held (commands, torques) is there from then on.
+    rows = np.ceil(read_s / step - SLACK).astype(int)
+    out = np.ones(len(at_s), dtype=bool)
+    out[rows[(rows >= 0) & (rows < len(at_s))]] = False
+    return out
 
 
 def held(at_s: Array, times_s: Array, values: Array, lead_s: float = 0.0) -> Array:

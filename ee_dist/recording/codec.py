@@ -20,6 +20,7 @@ from ee_dist.trials.log import Array, SensorLog
 _ALWAYS = ("sensors", "commands")
 _TABLES = ("base_pose", "joints", "torques", "external")
 _SERIES = "supply_v"
+_FILLED = "filled"
 
 
 # -- to messages -----------------------------------------------------------------------------------------------------
@@ -51,6 +52,8 @@ def row_messages(number: int, log: SensorLog) -> Iterator[bytes]:
     columns: dict[str, list[Any]] = {"time_s": _rows(log.times_s), **tables}
     if log.supply_v is not None:
         columns[_SERIES] = _rows(log.supply_v)
+    if log.filled is not None:
+        columns[_FILLED] = log.filled.tolist()
     names = tuple(columns)
     for values in zip(*columns.values(), strict=True):
         yield schemas.Row(trial_id=number, **dict(zip(names, values, strict=True))).SerializeToString(
@@ -130,11 +133,13 @@ class TrialBuilder:
         self._names = (*_ALWAYS, *(n for n in _TABLES if n in message.recorded))
         self._times: list[float] = []
         self._supply: list[float] = []
+        self._filled: list[bool] = []
         self._flat: dict[str, list[float]] = {n: [] for n in self._names}
 
     def add(self, row: Any) -> None:
         self._times.append(row.time_s)
         self._supply.append(row.supply_v)
+        self._filled.append(row.filled)
         for name in self._names:
             self._flat[name].extend(getattr(row, name))
 
@@ -154,6 +159,7 @@ class TrialBuilder:
             sensor_units=tuple(m.sensor_units),
             motor_names=tuple(m.motor_names),
             supply_v=np.array(self._supply, dtype=np.float64) if _SERIES in m.recorded else None,
+            filled=np.array(self._filled, dtype=bool) if any(self._filled) else None,
             travel_m=m.travel_m,
             **tables,
         )

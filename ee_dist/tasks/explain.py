@@ -18,7 +18,7 @@ from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
-from ee_dist.tasks.results.commands import asked, setting
+from ee_dist.tasks.results.commands import asked, planning, setting
 from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
 from ee_dist.tasks.results.story import links
@@ -69,7 +69,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         if len(found.tied) > 1 and measured.robot.name in BUILT_IN:
             tied = [(*found.fixed, *c.hypothesis) for c in found.tied[:MOST_TIED]]
             ahead = next(iter(next_trials(measured.robot, tied, evaluator_of(config))), None)
-    account = explain_account(problem, found, ahead)
+    account = explain_account(problem, found, ahead, planning(out, problem.robot))
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead))

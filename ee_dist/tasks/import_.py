@@ -214,7 +214,9 @@ def digest_of(records: list[TrialRecord]) -> str:
     for r in records:
         total.update(repr((r.index, r.name, r.believed, r.log.sensor_names, r.log.motor_names)).encode())
         log = r.log
-        for values in (log.times_s, log.sensors, log.commands, log.joints, log.torques, log.supply_v, log.external):
+        for values in (
+            log.times_s, log.sensors, log.commands, log.joints, log.torques, log.supply_v, log.external, log.filled,
+        ):  # fmt: skip
             if values is not None:
                 total.update(np.ascontiguousarray(values).tobytes())
     return total.hexdigest()

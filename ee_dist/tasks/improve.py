@@ -28,7 +28,7 @@ from ee_dist.tasks.config import AUTO, Config, ConfigError
 from ee_dist.tasks.measurements import Measurements, load
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
-from ee_dist.tasks.results.commands import asked
+from ee_dist.tasks.results.commands import asked, planning
 from ee_dist.tasks.results.labels import step_phrase
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
@@ -85,7 +85,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             found = improve(
                 problem, pool, measured.model, wanted, most=options.most, progress=progress, climbed=climbed
             )
-    account = improve_account(problem, found)
+    account = improve_account(problem, found, planning(out, problem.robot))
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
     write_model(path, measured.source, measured.folder, found.terms, account.words)

@@ -141,8 +141,9 @@ def _of_others(path: Path) -> bool:
 
 def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
     """The log with its channels in the robot's order. Raises LogError in one line for what cannot be compared."""
-    if len(log) < FEWEST_ROWS:
-        raise LogError(f"{where}: {len(log)} rows; at least {FEWEST_ROWS} are needed")
+    if len(log.readings) < FEWEST_ROWS:
+        what = "rows" if log.filled is None else "readings"
+        raise LogError(f"{where}: {len(log.readings)} {what}; at least {FEWEST_ROWS} are needed")
     _names(where, "joint", log.motor_names, robot.motor_names)
     _names(where, "channel", log.sensor_names, robot.sensor_names)
     order = [log.sensor_names.index(n) for n in robot.sensor_names]

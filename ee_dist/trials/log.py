@@ -24,7 +24,8 @@ class SensorLog:
 
     Shapes: times_s (T,), sensors (T, S), commands (T, M) in radians (metres for a slide). Where known: base_pose (T, 7)
     as x, y, z, qx, qy, qz, qw in the frame of the floor; joints (T, M) joint positions; torques (T, M) of the drives;
-    supply_v (T,); external (T, M) torques on the joints that are known and not the drives'. Arrays are read-only.
+    supply_v (T,); external (T, M) torques on the joints that are known and not the drives'; filled (T,) whether the sensors
+    were not read in a row, so that what it holds of them lies between two readings. Arrays are read-only.
     """
 
     times_s: Array
@@ -38,6 +39,7 @@ class SensorLog:
     torques: Array | None = None
     supply_v: Array | None = None
     external: Array | None = None
+    filled: Array | None = None
     travel_m: float = float("nan")
     """How far the body went along +x of the floor, from the start to the last row."""
 
@@ -51,6 +53,7 @@ class SensorLog:
             "torques": (steps, len(self.motor_names)),
             "supply_v": (steps,),
             "external": (steps, len(self.motor_names)),
+            "filled": (steps,),
         }
         for name, shape in expected.items():
             value = getattr(self, name)
@@ -69,6 +72,11 @@ class SensorLog:
     def channel(self, name: str) -> Array:
         """The (T,) series of one sensor."""
         return self.sensors[:, self.sensor_names.index(name)]
+
+    @property
+    def readings(self) -> Array:
+        """(K,) the rows in which the sensors were read: all of them, or what an import did not fill in."""
+        return np.arange(len(self)) if self.filled is None else np.flatnonzero(~self.filled)
 
     @property
     def finite(self) -> bool:
@@ -97,6 +105,7 @@ class SensorLog:
             torques=cut(self.torques),
             supply_v=cut(self.supply_v),
             external=cut(self.external),
+            filled=cut(self.filled),
             travel_m=float("nan")
             if self.base_pose is None
             else float(self.base_pose[last - 1, 0] - self.base_pose[first, 0]),

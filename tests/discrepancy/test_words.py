@@ -142,7 +142,7 @@ def test_units_are_told_once_and_as_they_are_on_a_slide() -> None:
 def test_a_headline_says_no_more_than_the_verdict() -> None:
     rung = SimpleNamespace(
         added=(term("coulomb_friction", "servo", torque_nm=0.3),), dropped=(), tied_with=[], name="x@y", error_heldout=1.5,
-        held_out="motions that were not fitted",
+        held_out="motions that were not fitted", alternatives=[],
     )  # fmt: skip
     start = SimpleNamespace(added=(), dropped=(), tied_with=[], error_heldout=5.0, held_out="", name="")
     problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[])
@@ -156,7 +156,11 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         )  # fmt: skip
         account = improve_account(problem, found)  # type: ignore[arg-type]
         assert account.headline.endswith(said) or said in account.headline
+        assert not account.planner, "nothing is tied"
         assert account.good is (verdict == EXPLAINED) and ("Nothing" in account.headline) is account.good
+    rung.alternatives = [("a proposal", ())]
+    found.ladder = [start, rung]
+    assert improve_account(problem, found, "plan it").first[-1].endswith(" plan it")  # type: ignore[arg-type]
     rung.dropped = ("offset_torque@servo",)
     end = SimpleNamespace(**{**vars(start), "dropped": ("rotor_inertia@servo",)})
     found.ladder = [start, rung, end]

@@ -39,8 +39,13 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     """At small angles a heavier pendulum and a drive that turns too little are one law. The whole chain, each by its own line."""
     first, _ = run("task=trial", "robot=servo_pendulum", "task.excitations=['sway:seconds=2,amplitude=0.03,seed=1']",
                    "task.noise=0.001", HIDDEN, "engine=mujoco")  # fmt: skip
-    before, _ = run("task=explain", f"measured={first}", SUSPECTS, "task.rerun=false", *QUICK)
+    before, outcome = run("task=explain", f"measured={first}", SUSPECTS, "task.rerun=false", *QUICK)
     assert set(tied(before)) == {"part_mass@arm", "command_gain@servo"}
+    told = next(line for line in outcome.out.splitlines() if "task=plan" in line)
+    line = shlex.split(told.split(": ", 1)[1])
+    assert line[:3] == ["python", "-m", "ee_dist"] and told in (before / "report.html").read_text()
+
+    assert line[3] == "task=plan" and (outcome.folder / line[4].removeprefix("task.explained=")).samefile(before)
 
     plan, outcome = run("task=plan", f"task.explained={before}", "task.seconds=2", "task.draws=1", "evaluator=serial")
     found = json.loads((plan / "summary.json").read_text())
@@ -64,6 +69,7 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     both = f"measured=[{first / 'trial.mcap'},{second / 'trial.mcap'}]"
     after, _ = run("task=explain", both, SUSPECTS, "task.rerun=false", *QUICK)
     assert tied(after) == ["part_mass@arm"]
+    assert "task=plan" not in (after / "report.html").read_text(), "nothing is left to plan for"
 
     # A run that tells it needs no plan, unless a suspicion is named.
     outcome = cli("task=plan", f"task.explained={after}")

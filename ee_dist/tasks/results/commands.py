@@ -6,7 +6,9 @@ import os
 import shlex
 from collections.abc import Sequence
 
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config
+from ee_dist.trials.family import driven
 
 
 def command(words: Sequence[str]) -> str:
@@ -36,6 +38,12 @@ def asked(task: str, config: Config, by: str = AUTO, *more: str) -> list[str]:
     if by != AUTO:
         words.append(f"task.by={by}")
     return [*words, *simulated(config)]
+
+
+def planning(out: str | os.PathLike[str], robot: Robot) -> str:
+    """The command that finds what to record next, for the explain or improve that lies in ``out``; empty for a robot that obeys
+    no commands."""
+    return command(["task=plan", setting("task.explained", out)]) if driven(robot) else ""
 
 
 def simulated(config: Config) -> list[str]:

@@ -92,7 +92,8 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
         console.print(f"  {os.path.relpath(out / file)}", highlight=False, markup=False, soft_wrap=True)
     console.print(account.headline, highlight=False, markup=False, style="bold")
     for line in account.first:
-        console.print(line, highlight=False, markup=False)
+        whole = bool(account.planner) and line.endswith(account.planner)  # a command is for copying
+        console.print(line, highlight=False, markup=False, soft_wrap=whole)
     if following:
         console.print(f"Next: {command(following)}", highlight=False, markup=False, soft_wrap=True)
 

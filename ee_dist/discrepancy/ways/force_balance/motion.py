@@ -21,6 +21,8 @@ ROOM = 150_000_000
 """Bytes of regressors that are kept for a motion, if there are more than two geometries."""
 PASSED = 1 / 20
 """Cut-off of the positions' low-pass as a share of their rate: above it, differences twice over are mostly noise."""
+SLOWEST_HZ, STEEPEST = 5.0, 1 / 5
+"""Cut-off below which the motion of an arm would go too, and its largest share of the rate."""
 REST_NOISE = 3.0
 """Standard deviations of the readings' slope below which a joint rests."""
 REST_WINDOWS = 1
@@ -31,16 +33,26 @@ FINEST = 1e-5
 
 @dataclass(frozen=True)
 class Processing:
-    """What is done to the measurements: low-pass of the positions (None: at a twentieth of the rate, 50 Hz at 1 kHz), rows
-    dropped at the start (where the filter settles), one row kept of ``keep_every``, blocks of time judged apart."""
+    """What is done to the measurements: low-pass of the positions (None: at a share ``passed`` of the rate, 50 Hz at 1 kHz),
+    rows dropped at the start (where the filter settles), one row kept of ``keep_every``, blocks of time judged apart."""
 
     low_pass: LowPass | None = None
     drop_rows: int = 49
     keep_every: int = 10
     blocks: int = 12
+    passed: float = PASSED
+
+    @classmethod
+    def for_rate(cls, step_s: float) -> Processing:
+        """The usual one; below 100 Hz a larger share passes, the filter settles in fewer rows, and more of them are kept."""
+        wider = max(1.0, min(SLOWEST_HZ * step_s, STEEPEST) / PASSED)
+        usual = cls()
+        return cls(
+            drop_rows=round(usual.drop_rows / wider), keep_every=round(usual.keep_every / wider), passed=PASSED * wider
+        )
 
     def filter_for(self, step_s: float) -> LowPass:
-        return self.low_pass or LowPass(cutoff_hz=PASSED / step_s)
+        return self.low_pass or LowPass(cutoff_hz=self.passed / step_s)
 
     def differentiated(self, joints: Array, step_s: float) -> tuple[Array, Array, Array]:
         """Positions, speeds and accelerations, (T, M) each, of readings (T, M), without the rows dropped."""

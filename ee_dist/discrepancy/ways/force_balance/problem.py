@@ -12,10 +12,11 @@ Gautier, Brunot 2019; Gautier, Janot, Vandanjon 2013): regressor and force both 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read
 from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.discrepancy.ways.force_balance.balance import Balance
 from ee_dist.discrepancy.ways.force_balance.motion import Processing
@@ -45,9 +46,11 @@ class ForceBalance(Problem):
     natural_unit = "1"
 
     def __init__(self, trials: Sequence[MeasuredTrial], robot: Robot, processing: Processing | None = None) -> None:
+        # Nothing is simulated, so that no time step but that of the readings is wanted.
+        trials = [replace(t, log=evenly_read(t.log)) for t in trials]
         self.robot, self.measured = robot, tuple(trials)
         self.models = [apply(robot, t.setup) for t in trials]
-        self.asked = processing or Processing()
+        self.asked = processing or Processing.for_rate(float(np.median(np.diff(trials[0].log.times_s))))
         ready = prepared(trials, self.models, self.asked)
         self.processing, self.motions, self.size, self.motion_noise = (
             ready.processing,

@@ -10,6 +10,7 @@ position error. A stick that lasts too long moves a joint far away for a while; 
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,6 +20,7 @@ import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released, speeds_of
 from ee_dist.discrepancy.problem import Layout, Problem, Series, error, joints_of
+from ee_dist.discrepancy.slow_noise import slow_noise
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -30,18 +32,17 @@ from ee_dist.trials.log import Array, SensorLog, State
 
 @dataclass(frozen=True)
 class ToPositions:
-    """The reduction that keeps every n-th of the first ``rows`` of some channels, (rows // n, C)."""
+    """The reduction that keeps some rows of some channels, (rows, C)."""
 
     columns: tuple[int, ...]
-    every: int
-    rows: int
+    rows: range | tuple[int, ...]
 
     @property
     def key(self) -> str:
-        return f"positions:{self.columns}:{self.every}:{self.rows}"
+        return f"positions:{self.columns}:{hashlib.sha256(repr(self.rows).encode()).hexdigest()}"
 
     def __call__(self, log: SensorLog) -> Array:
-        return log.sensors[: self.rows : self.every, list(self.columns)].copy()
+        return log.sensors[np.ix_(self.rows, self.columns)]
 
 
 RESTART_S = 0.5
@@ -55,7 +56,8 @@ BLOCKS = 6
 class FreeRun(Problem):
     """Free runs: whole records simulated from their measured first state. Channels are the joint positions.
 
-    ``every``: rows of a log from one residual value to the next. ``windows_s`` starts the model anew from the measured
+    ``every``: rows of a log from one residual value to the next; where sensors were read more seldom than rows are simulated,
+    their readings are taken instead. ``windows_s`` starts the model anew from the measured
     state so often, and makes segments of the windows; None runs each trial through, in BLOCKS segments. ``effort``
     scales the length of a search.
     """
@@ -83,8 +85,8 @@ class FreeRun(Problem):
             raise MeasurementError(f"{robot.name}: no sensor of kind 'position', which a free run is compared by")
         self.columns = tuple(columns)
         self.setups = [apply(robot, t.setup) for t in trials]
-        self.pieces = [p for k, t in enumerate(trials) for p in _pieces(k, t, robot, windows_s)]
-        self.noise = max(float(np.mean([_noise(p.log.sensors[::every, columns]) for p in self.pieces])), 1e-9)
+        self.pieces = [p for k, t in enumerate(trials) for p in _pieces(k, t, robot, windows_s, every)]
+        self.noise = max(float(np.mean([_noise(p, columns) for p in self.pieces])), 1e-9)
         self._lay_out(BLOCKS if windows_s is None else 1)
         self.unit = robot.sensors[columns[0]].unit
         self.natural_unit = self.unit
@@ -97,7 +99,7 @@ class FreeRun(Problem):
     def _lay_out(self, blocks: int) -> None:
         """Segments and places of all residual values. A trial's values carry equal weight in sum, whatever its length."""
         width = len(self.columns)
-        rows = [len(p.log.sensors[:: self.every]) for p in self.pieces]
+        rows = [len(p.rows) for p in self.pieces]
         starts = np.concatenate([[0], np.cumsum(rows)]) * width
         self.slices = [slice(int(a), int(b)) for a, b in pairwise(starts)]
         names: list[str] = []
@@ -107,7 +109,7 @@ class FreeRun(Problem):
         for p, count in zip(self.pieces, rows, strict=True):
             cut = min(blocks, max(1, count // 10))
             block = np.arange(count) * cut // count
-            at = p.start_s + (p.log.times_s[:: self.every] - p.log.times_s[0])
+            at = p.start_s + p.times_s
             seg.append(np.repeat(len(names) + block, width))
             time.append(np.repeat(at, width))
             names += [f"{self.measured[p.trial].name}@{at[np.argmax(block == b)]:.1f}s" for b in range(cut)]
@@ -138,14 +140,14 @@ class FreeRun(Problem):
         # Rollouts of one length with the same inputs share a batch, so all run as long as the longest.
         steps, switched = max(len(p.log) for p in self.pieces), any(p.enabled is not None for p in self.pieces)
         jobs = [
-            Job(p.rollout(m, steps, switched), ToPositions(self.columns, self.every, len(p.log)))
+            Job(p.rollout(m, steps, switched), ToPositions(self.columns, p.rows))
             for p in (self.pieces[i] for i in chosen)
             for m in models[p.trial]
         ]
         found = self.evaluator.evaluate(jobs)
         out = np.zeros((len(hypotheses), len(self.segment_of)))
         for place, i in enumerate(chosen):
-            measured = self.pieces[i].log.sensors[:: self.every, list(self.columns)]
+            measured = self.pieces[i].measured(self.columns)
             gap = measured[None] - np.stack(found[place * len(hypotheses) : (place + 1) * len(hypotheses)])
             with np.errstate(invalid="ignore"):
                 value = np.sign(gap) * np.sqrt(np.abs(gap) * (self.weight[self.slices[i].start] / self.noise))
@@ -176,8 +178,7 @@ class FreeRun(Problem):
         out = []
         for i, p in enumerate(self.pieces):
             off = gap[self.slices[i]].reshape(-1, len(self.columns))
-            measured = p.log.sensors[:: self.every, list(self.columns)]
-            times = p.start_s + p.log.times_s[:: self.every] - p.log.times_s[0]
+            measured, times = p.measured(self.columns), p.start_s + p.times_s
             for c in range(len(self.columns)):
                 out.append(Series(p.trial, c, self.layout.units[c], times, measured[:, c], measured[:, c] - off[:, c]))
         return out
@@ -206,14 +207,25 @@ class FreeRun(Problem):
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A stretch of a trial that is simulated in one go. ``log`` is what was measured of it."""
+    """A stretch of a trial that is simulated in one go. ``log`` is what was measured of it, ``rows`` those of its rows that are
+    compared."""
 
     trial: int
     start_s: float
     log: SensorLog
+    rows: range | tuple[int, ...]
     commands: Array
     enabled: Array | None
     start: State
+
+    @property
+    def times_s(self) -> Array:
+        """(R,) of the rows that are compared, since its start."""
+        return np.asarray(self.log.times_s[list(self.rows)] - self.log.times_s[0])
+
+    def measured(self, columns: Sequence[int]) -> Array:
+        """(R, C) of some channels."""
+        return np.asarray(self.log.sensors[np.ix_(self.rows, columns)])
 
     def rollout(self, model: Robot, steps: int, switched: bool) -> Rollout:
         """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
@@ -229,7 +241,7 @@ class Piece:
         )
 
 
-def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None) -> list[Piece]:
+def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None, every: int) -> list[Piece]:
     log = trial.log
     if log.joints is None:
         raise MeasurementError(
@@ -254,11 +266,16 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
         last = min(first + length, len(log))
         if last - first < min(length, len(log)) // 2:
             break
+        part = log.part(first, last)
+        rows = range(0, len(part), every) if log.filled is None else tuple(part.readings.tolist())
+        if not rows:
+            continue  # a gap in the log
         found.append(
             Piece(
                 index,
                 first * dt,
-                log.part(first, last),
+                part,
+                rows,
                 commands[first:last],
                 None if enabled is None else enabled[first:last],
                 State(log.joints[first].copy(), speeds[first].copy()),
@@ -267,9 +284,12 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
     return found
 
 
-def _noise(positions: Array) -> float:
-    """Mean absolute error that the noise of the readings (T, C) alone would leave, from second differences of rows ``every``
-    apart. A little of the motion is in them, as what the noise of the first state does later is in the error."""
+def _noise(piece: Piece, columns: Sequence[int]) -> float:
+    """Mean absolute error that the noise of the readings alone would leave, from second differences of the rows that are
+    compared. A little of the motion is in them, as what the noise of the first state does later is in the error."""
+    positions = piece.measured(columns)
+    if piece.log.filled is not None:
+        return float(np.mean(slow_noise(piece.times_s, positions))) * MEAN_ABSOLUTE
     if len(positions) < 3:
         return 0.0
     rough = np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2])

@@ -6,6 +6,7 @@ sensors and what its sensors would report is computed afterwards: hypotheses abo
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
@@ -55,7 +56,8 @@ def block_sums(values: Array, size: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Digest:
-    """What is kept of a predicted log: block means (T // block, S); noise and repeats per window (T // window, S)."""
+    """What is kept of a predicted log of R readings: block means (R // block, S); noise and repeats per window (R // window,
+    S)."""
 
     means: Array
     rough: Array
@@ -65,17 +67,19 @@ class Digest:
 
 @dataclass(frozen=True)
 class ToDigest:
-    """The reduction that makes one."""
+    """The reduction that makes one, of the ``rows`` in which the measured sensors were read; of all where it is None."""
 
     block: int
     window: int
+    rows: tuple[int, ...] | None = None
 
     @property
     def key(self) -> str:
-        return f"digest:{self.block}:{self.window}"
+        read = "" if self.rows is None else f":{hashlib.sha256(repr(self.rows).encode()).hexdigest()}"
+        return f"digest:{self.block}:{self.window}{read}"
 
     def __call__(self, log: SensorLog) -> Digest:
-        return digest(log.sensors, self.block, self.window)
+        return digest(of_rows(log.sensors, self.rows), self.block, self.window)
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,16 @@ class ToSensors:
 
     def __call__(self, log: SensorLog) -> Array:
         return np.array(log.sensors)
+
+
+def rows_read(log: SensorLog) -> tuple[int, ...] | None:
+    """The rows in which the sensors of a measured log were read; None where that is all of them."""
+    return None if log.filled is None else tuple(log.readings.tolist())
+
+
+def of_rows(values: Array, rows: Sequence[int] | None) -> Array:
+    """(T, ...) -> (R, ...)."""
+    return values if rows is None else values[list(rows)]
 
 
 def digest(sensors: Array, block: int, window: int) -> Digest:
@@ -135,13 +149,14 @@ def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) ->
 
 
 class Predictor:
-    """Predictions for many models at once. ``block``, ``window``: rows a mean and a window span."""
+    """Predictions for many models at once. ``block``, ``window``: readings that a mean and a window span."""
 
     def __init__(
         self, trials: Sequence[MeasuredTrial], base: Robot, evaluator: Evaluator, block: int, window: int
     ) -> None:
         self.trials, self.base, self.evaluator = trials, base, evaluator
         self.block, self.window = block, window
+        self.rows = [rows_read(t.log) for t in trials]
         self._only_noisy = [replace(s, noise=0.0) == _faultless(s) for s in base.sensors]
 
     def digests(self, pairs: Sequence[tuple[int, Robot]]) -> list[Digest]:
@@ -152,7 +167,7 @@ class Predictor:
         for k, model in pairs:
             if id(model) not in bare:
                 bare[id(model)] = clean(model)
-            reduction = ToSensors() if changed[id(model)] else ToDigest(self.block, self.window)
+            reduction = ToSensors() if changed[id(model)] else ToDigest(self.block, self.window, self.rows[k])
             jobs.append(Job(rollout_of(self.trials[k], model, bare[id(model)]), reduction))
         found = self.evaluator.evaluate(jobs)
         out: list[Digest] = list(found)
@@ -195,9 +210,10 @@ class Predictor:
         for i, (_, true, channels) in enumerate(members):
             clear = true.copy()
             clear[:, channels] = steady[i]
-            shape = self._with_declared_noise(digest(clear, self.block, self.window))
+            rows = self.rows[trial]
+            shape = self._with_declared_noise(digest(of_rows(clear, rows), self.block, self.window))
             rough, repeated = shape.rough.copy(), shape.repeated.copy()
-            grain = digest(drawn[i].reshape(len(true), -1), self.block, self.window)
+            grain = digest(of_rows(drawn[i].reshape(len(true), -1), rows), self.block, self.window)
             rough[:, channels] = grain.rough.reshape(-1, DRAWS, len(channels)).mean(axis=1)
             repeated[:, channels] = grain.repeated.reshape(-1, DRAWS, len(channels)).mean(axis=1)
             out.append(replace(shape, rough=rough, repeated=repeated))

@@ -20,7 +20,9 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
     Digest,
     Predictor,
     ToSensors,
+    block_sums,
     digest,
+    of_rows,
     predicted_commands,
     report,
     rollout_of,
@@ -35,6 +37,8 @@ from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
+BLOCK_S = 0.04
+"""Time that readings are averaged over, where they are taken more seldom than rows are simulated."""
 SOFT = 6.0
 """Residuals beyond this many standard deviations count by their logarithm."""
 TOGETHER = 4_000_000
@@ -61,8 +65,9 @@ def _held_up(spread: Array) -> Array:
 class OpenLoop(Problem):
     """Open loop: the model gets the recorded commands and nothing else.
 
-    ``block`` rows are averaged into a value, ``window`` rows (a multiple) are a segment. ``unmodelled`` widens the
-    scales by what a calibrated model is known to leave; ``gained``: energy that an effect took off an untouched robot.
+    ``block`` readings are averaged into a value (fewer, of sensors that were read seldom), ``window`` readings (a multiple)
+    are a segment. Rows that an import filled in are simulated and not compared. ``unmodelled`` widens the scales by what a
+    calibrated model is known to leave; ``gained``: energy that an effect took off an untouched robot.
     ``before``: what the model is believed to have; the spread of ``members`` neighbours of that model weighs the
     residuals.
     """
@@ -82,19 +87,24 @@ class OpenLoop(Problem):
         members: int = MEMBERS,
     ) -> None:
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
-        self.block, self.window = block, window
+        spacing = max((_spacing_s(t.log) for t in trials if t.log.filled is not None), default=0.0)
+        self.block = block if not spacing else min(block, max(1, round(BLOCK_S / spacing)))
+        self.window = window // self.block * self.block
+        block, window = self.block, self.window
         self._members = members
         self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}
         self.scale = channel_scale(robot, trials)
         self._unmodelled, self.gained, self.calibrated = unmodelled or {}, gained, unmodelled is not None
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self._looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
-        self._data = [digest(t.log.sensors, block, window) for t in trials]
+        self._rows = [len(t.log.readings) for t in trials]
+        rows = self.predictor.rows
+        self._data = [digest(of_rows(t.log.sensors, r), block, window) for t, r in zip(trials, rows, strict=True)]
         self._weigh(before)
         self._lay_out()
         self.error_definition = (
             "root mean square over channels and time of the residual in standard deviations of its noise "
-            f"and of equally good models (means over {block * robot.time_step_s:g} s, softened beyond {SOFT:g})"
+            f"and of equally good models (means over {block * (spacing or robot.time_step_s):.3g} s, softened beyond {SOFT:g})"
         )
 
     @property
@@ -162,20 +172,20 @@ class OpenLoop(Problem):
         trial_of_segment: list[int] = []
         self.slices: list[slice] = []
         s, per = len(self.robot.sensors), self.window // self.block
-        dt, at = self.robot.time_step_s, 0
+        at = 0
         noisy = (self.scale.noise / self.scale.scale) ** 2
         pure = 2 * 1.95 / self.window + 0.01
         for k, trial in enumerate(self.measured):
-            blocks, windows = len(trial.log) // self.block, len(trial.log) // self.window
+            blocks, windows = self._rows[k] // self.block, self._rows[k] // self.window
             first = len(names)
             count = max(1, windows)
-            names += [f"{trial.name}@{w * self.window * dt:.1f}s" for w in range(count)]
+            names += [f"{trial.name}@{self._begins(k, w):.1f}s" for w in range(count)]
             trial_of_segment += [k] * count
             of_block = first + np.minimum(np.arange(blocks) // per, count - 1)
             seg += [np.repeat(of_block, s), np.repeat(first + np.arange(windows), 2 * s)]
             chan += [np.tile(np.arange(s), blocks), np.tile(np.arange(s), 2 * windows)]
-            middle = (np.arange(blocks) + 0.5) * self.block * dt
-            time += [np.repeat(middle, s), np.repeat((np.arange(windows) + 0.5) * self.window * dt, 2 * s)]
+            middle = self._middles(k, self.block)
+            time += [np.repeat(middle, s), np.repeat(self._middles(k, self.window), 2 * s)]
             reading += [np.ones(blocks * s, dtype=bool), np.zeros(2 * windows * s, dtype=bool)]
             left = self._known(k)[0] / self.deviation[k] ** 2
             share = self.scale.noise**2 / self.block / self.deviation[k] ** 2 + left
@@ -209,6 +219,18 @@ class OpenLoop(Problem):
             units=(*(x.unit for x in robot.sensors), *(joint_unit(robot, m) for m in computed)),
             joint_of_channel=joints_of(robot, [*(x.target for x in robot.sensors), *computed]),
         )
+
+    def _begins(self, trial: int, window: int) -> float:
+        """When a window begins, s."""
+        log, row = self.measured[trial].log, window * self.window
+        return row * self.robot.time_step_s if log.filled is None else float(log.times_s[log.readings[row]])
+
+    def _middles(self, trial: int, size: int) -> Array:
+        """(R // size,) middles of stretches of ``size`` readings, s."""
+        log, count = self.measured[trial].log, self._rows[trial] // size
+        if log.filled is None:
+            return (np.arange(count) + 0.5) * size * self.robot.time_step_s
+        return block_sums(log.times_s[log.readings][:, None], size)[:, 0] / size
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
@@ -277,8 +299,8 @@ class OpenLoop(Problem):
     # -- views of a residual -----------------------------------------------------------------------------------------
 
     def blocks(self, trial: int, residual: Array) -> Array:
-        """(T // block, S): the part of a residual (n,) that compares means, of one trial."""
-        rows, s = len(self.measured[trial].log) // self.block, len(self.robot.sensors)
+        """(R // block, S): the part of a residual (n,) that compares means, of one trial with R readings."""
+        rows, s = self._rows[trial] // self.block, len(self.robot.sensors)
         return residual[self.slices[trial]][: rows * s].reshape(rows, s)
 
     def raw_blocks(self, trial: int, residual: Array) -> Array:
@@ -286,8 +308,8 @@ class OpenLoop(Problem):
         return np.asarray(SOFT * np.sinh(self.blocks(trial, residual) / SOFT) * self.deviation[trial])
 
     def raw_grain(self, trial: int, residual: Array) -> Array:
-        """(T // window, S): differences of the log of roughness, before softening."""
-        rows, s = len(self.measured[trial].log), len(self.robot.sensors)
+        """(R // window, S): differences of the log of roughness, before softening."""
+        rows, s = self._rows[trial], len(self.robot.sensors)
         first, windows = rows // self.block * s, rows // self.window
         texture = residual[self.slices[trial]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
         return np.asarray(SOFT * np.sinh(texture / SOFT) * self.grain_deviation[trial])
@@ -308,9 +330,9 @@ class OpenLoop(Problem):
         """What every channel of every trial reported, and should have reported without noise."""
         out = []
         for k, values in enumerate(self.predicted(hypothesis)):
-            log = self.measured[k].log
+            log, read = self.measured[k].log, self.measured[k].log.readings
             for c, sensor in enumerate(self.robot.sensors):
-                out.append(Series(k, c, sensor.unit, log.times_s, log.sensors[:, c], values[:, c]))
+                out.append(Series(k, c, sensor.unit, log.times_s[read], log.sensors[read, c], values[read, c]))
         return out
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
@@ -325,6 +347,11 @@ class OpenLoop(Problem):
         rollouts = [rollout_of(t, m) for t, m in zip(self.measured, models, strict=True)]
         true = self.evaluator.evaluate([Job(r, ToSensors()) for r in rollouts])
         return [report(m, v) for m, v in zip(models, true, strict=True)]
+
+
+def _spacing_s(log: SensorLog) -> float:
+    """From one reading to the next, s."""
+    return float(np.median(np.diff(log.times_s[log.readings])))
 
 
 def _spans(robot: Robot) -> Array:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.slow_noise import MEDIAN_OF_SQUARES, slow_noise
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, SensorLog
 from ee_dist.trials.noise import channel_range
 
 RESOLUTION = 0.002
@@ -40,11 +41,19 @@ def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
         if between is not None:
             noise, source = between, "measured: differences between repeated trials"
         else:
-            noise = np.sqrt(np.mean([np.median(roughness(t.log.sensors), axis=0) / 0.455 for t in trials], axis=0))
-            source = "estimated: second differences of the logs"
+            noise = np.sqrt(np.mean([_variance(t.log) for t in trials], axis=0))
+            seldom = any(t.log.filled is not None for t in trials)
+            source = f"estimated: {'divided' if seldom else 'second'} differences of the logs"
     scale = np.maximum(noise, RESOLUTION * spans)
     scale = np.where(touch, np.maximum(scale, TOUCH_SCALE), scale)
     return Scale(noise, scale, source)
+
+
+def _variance(log: SensorLog) -> Array:
+    """(S,) of the noise of what was read."""
+    if log.filled is None:
+        return np.asarray(np.median(roughness(log.sensors), axis=0) / MEDIAN_OF_SQUARES)
+    return slow_noise(log.times_s[log.readings], log.sensors[log.readings]) ** 2
 
 
 def _between_repeats(trials: Sequence[MeasuredTrial]) -> Array | None:
