@@ -13,6 +13,7 @@ from ee_dist.robots.body import Body
 from ee_dist.robots.model import COMMANDS, Drive, Joint, Part, Robot, RobotError, Sensor, Wiring, World
 from ee_dist.robots.numbers import checked, number
 from ee_dist.robots.pivots import PIVOT_HINT, about_centre
+from ee_dist.robots.time_step import FINE_S, default_step_s, too_coarse
 
 KEYS = (
     "name",
@@ -54,7 +55,6 @@ UNITS = {
 SCALE, OBEYED = "scale", "obeyed"
 """What ``velocity_limits`` of a file are: a scale for what is measured, or limits that the controllers keep to."""
 OF_JOINT = ("angle", *dict.fromkeys(kind for kind, _ in UNITS))
-TIME_STEP_S = 0.002
 GRAVITY_M_S2 = 9.81
 
 
@@ -78,7 +78,7 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     if not isinstance(start, (list, tuple)) or len(start) != 3:
         raise RobotError(f"{where}: start_position_m: expected three numbers, not {quoted(start)}")
     gravity = GRAVITY_M_S2 if body.gravity_m_s2 is None else body.gravity_m_s2
-    step = TIME_STEP_S if body.time_step_s is None else body.time_step_s
+    step = FINE_S if body.time_step_s is None else body.time_step_s
     # A hint that was taken need not be given again.
     taken = data.get("inertia_about") == "joint"
     notes = [n for n in body.notes if not (taken and n.startswith(PIVOT_HINT))]
@@ -100,7 +100,12 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
         start_rotation=body.start_rotation,
         time_step_s=number(data.get("time_step_s", step), f"{where}: time_step_s"),
     )
-    return checked(robot, where), tuple(notes)
+    robot = checked(robot, where)
+    if body.time_step_s is None and "time_step_s" not in data:
+        robot = replace(robot, time_step_s=default_step_s(robot))
+    elif coarse := too_coarse(robot):
+        notes.append(coarse)
+    return robot, tuple(notes)
 
 
 def _parts(body: Body, about: Any, where: str) -> tuple[Part, ...]:

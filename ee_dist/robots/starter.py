@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from ee_dist.robots.body import Body
-from ee_dist.robots.described import GRAVITY_M_S2, TIME_STEP_S, robot_of_body
+from ee_dist.robots.described import GRAVITY_M_S2, robot_of_body
 from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.model import Joint, Robot
 from ee_dist.robots.ranges import span, travel
@@ -40,6 +40,9 @@ JOINT_COLUMNS = ("joint", "from", "to", "command", "kp", "kd", "limit", "viscous
 """rad, N.m and kg.m^2 for a hinge; m, N and kg for a slide."""
 
 
+STEP = "fine enough for these drives; a log may have any rate"
+
+
 def starter(body: Body, kind: str, source: str, where: str) -> Starter:
     """A description of a body that names its file ``source``. Raises RobotError where no robot can be made of it."""
     assumed = list(body.assumed)
@@ -53,8 +56,8 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
 
     free = bool(body.free_base)
     line(f"free_base: {str(free).lower()}", None if body.free_base is not None else "bolted down")
-    step = TIME_STEP_S if body.time_step_s is None else body.time_step_s
-    line(f"time_step_s: {step:g}", None if body.time_step_s is not None else "2 ms; take that of your log")
+    if body.time_step_s is not None:
+        line(f"time_step_s: {body.time_step_s:g}", None)
     gravity = GRAVITY_M_S2 if body.gravity_m_s2 is None else body.gravity_m_s2
     line(
         f"gravity_m_s2: {gravity:g}",
@@ -71,9 +74,12 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
     else:
         lines.append("# sensors: left out, so position and velocity of every joint; see docs/bring_your_robot.md")
         assumed.append("sensors: position and velocity of every driven joint, without noise")
-    text = "\n".join(lines) + "\n"
-    data = {k: v for k, v in yaml.safe_load(text).items() if k != kind}
+    data = {k: v for k, v in yaml.safe_load("\n".join(lines)).items() if k != kind}
     robot, notes = robot_of_body(body, data, where)
+    if body.time_step_s is None:
+        lines.insert(2, f"time_step_s: {robot.time_step_s:g}  # assumed: {STEP}")
+        assumed.append(f"time_step_s: {robot.time_step_s:g} s, {STEP}")
+    text = "\n".join(lines) + "\n"
     read = (
         f"{len(robot.parts)} parts, {sum(p.mass_kg for p in robot.parts):.4g} kg",
         f"{len(body.moving) + 6 * free} degrees of freedom: {len(body.moving)} joints"

@@ -1,0 +1,52 @@
+"""How finely a robot has to be simulated: what its drives do in a step, and the step that is taken where nobody names one."""
+
+from __future__ import annotations
+
+import math
+
+from ee_dist.robots.inertia import felt_inertia
+from ee_dist.robots.model import Drive, Robot
+
+FINE_S = 0.002
+"""The step of a robot that stands on a floor, or whose joints nothing holds: contacts and free swings are short."""
+STEPS_S = (0.01, 0.005, 0.004)
+"""Coarser ones, for robots that stand fast and whose controllers are slower than they."""
+TURNED, TAKEN = 0.3, 0.5
+"""Of a drive's own oscillation the angle (rad), and of a speed the share that damping takes off it, in a step that is fine."""
+TOO_COARSE = 2.0
+"""Times that step from which on a simulation is another robot's."""
+
+
+def default_step_s(robot: Robot) -> float:
+    """The time step of a robot whose description names none, s."""
+    if robot.free_base or robot.world.has_floor or any(d.command == "torque" for d in robot.drives):
+        return FINE_S
+    coarsest = coarsest_step_s(robot)
+    return next((s for s in STEPS_S if s <= coarsest), FINE_S)
+
+
+def coarsest_step_s(robot: Robot) -> float:
+    """The coarsest time step that resolves what the drives' controllers and motors do, s; infinite without any that hold."""
+    pairs = zip(robot.drives, felt_inertia(robot).tolist(), strict=True) if robot.drives else ()
+    return min((_resolved_s(d, inertia) for d, inertia in pairs), default=math.inf)
+
+
+def _resolved_s(drive: Drive, inertia: float) -> float:
+    motor = drive.torque_limit / drive.speed_limit if math.isfinite(drive.torque_limit) else 0.0
+    damping = motor + {"position": drive.kd, "speed": drive.kp}.get(drive.command, 0.0)
+    found = TAKEN * inertia / damping if damping > 0 else math.inf
+    if drive.command == "position" and drive.kp > 0:
+        found = min(found, TURNED * math.sqrt(inertia / drive.kp))
+    return found
+
+
+def too_coarse(robot: Robot) -> str | None:
+    """A line for people where the robot's time step does not resolve its drives; None where it does."""
+    coarsest = coarsest_step_s(robot)
+    if robot.time_step_s <= TOO_COARSE * coarsest:
+        return None
+    good = next((s for s in (*STEPS_S, FINE_S, FINE_S / 2) if s <= coarsest), FINE_S / 4)
+    return (
+        f"time_step_s {robot.time_step_s:g}: too coarse for its controllers, which need {good:g} s; sensors may be read more "
+        "seldom than that"
+    )

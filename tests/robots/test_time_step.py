@@ -1,0 +1,69 @@
+"""The time step of a robot whose description names none: as coarse as its drives allow, and fine enough for what they do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
+from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.robots.describe import load_robot
+from ee_dist.robots.time_step import FINE_S, STEPS_S, coarsest_step_s
+
+ARM = """<robot name="arm"><link name="base"/>
+  <link name="upper"><inertial><origin xyz="0.1 0 0"/><mass value="0.4"/>
+    <inertia ixx="1e-4" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0.1 0 0"/><mass value="0.3"/>
+    <inertia ixx="1e-4" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="a" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="9" velocity="9"/></joint>
+  <joint name="b" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.2 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="9" velocity="9"/></joint></robot>"""
+
+
+def arm(folder: Path, kp: float = 18.0, kd: float = 0.4, rotor: float = 0.02, **more: object):
+    (folder / "arm.urdf").write_text(ARM)
+    drive = {"kp": kp, "kd": kd, "torque_limit": 9.0, "speed_limit": 30.0, "rotor_inertia": rotor}
+    return load_robot({"urdf": str(folder / "arm.urdf"), "drives": {"a": drive, "b": drive}, **more})
+
+
+@pytest.mark.parametrize(("kp", "rotor", "step"), [(18.0, 0.02, 0.01), (60.0, 0.02, 0.005), (900.0, 0.02, FINE_S)])
+def test_stiffer_drives_are_stepped_more_finely(tmp_path: Path, kp: float, rotor: float, step: float) -> None:
+    robot, notes = arm(tmp_path, kp, rotor=rotor)
+    assert robot.time_step_s == step and not any("coarse" in n for n in notes)
+
+
+def test_contacts_and_free_swings_keep_the_fine_one(tmp_path: Path) -> None:
+    assert arm(tmp_path, has_floor=True)[0].time_step_s == FINE_S
+    drive = {"command": "torque", "torque_limit": 5.0, "speed_limit": 20.0}
+    robot, _ = load_robot({"urdf": str(tmp_path / "arm.urdf"), "drives": {"a": drive, "b": drive}})
+    assert robot.time_step_s == FINE_S
+
+
+def test_a_step_that_is_named_is_taken_and_one_that_is_too_coarse_is_told(tmp_path: Path) -> None:
+    robot, notes = arm(tmp_path, time_step_s=0.004)
+    assert robot.time_step_s == 0.004 and not any("coarse" in n for n in notes)
+    robot, notes = arm(tmp_path, time_step_s=1 / 30)
+    assert robot.time_step_s == pytest.approx(1 / 30)
+    assert any("time_step_s 0.0333333: too coarse for its controllers, which need 0.01 s" in n for n in notes)
+
+
+@pytest.mark.parametrize("kp", [4.0, 18.0, 60.0])
+def test_the_motion_is_that_of_a_step_ten_times_finer(tmp_path: Path, kp: float) -> None:
+    robot, _ = arm(tmp_path, kp, kd=0.02 * kp)
+    assert robot.time_step_s in STEPS_S and robot.time_step_s <= coarsest_step_s(robot)
+    found = []
+    for every in (1, 10):
+        fine = replace(robot, time_step_s=robot.time_step_s / every)
+        t = np.arange(0, 3.0, robot.time_step_s)
+        sent = np.stack([0.6 * np.sin(4 * t), 0.5 * np.sin(7 * t)], axis=1)
+        commands = np.repeat(sent, every, axis=0)
+        (log,) = MuJoCoEngine(1).rollout([Rollout(fine, Commands(commands), len(commands), pose=True)])
+        assert log.joints is not None
+        found.append(log.joints[::every])
+    off = np.sqrt(np.mean((found[0] - found[1]) ** 2)) / np.sqrt(np.mean(found[1] ** 2))
+    assert off < 0.04, "of the motion"
