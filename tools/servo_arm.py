@@ -1,6 +1,7 @@
 """Is improve right about an arm whose equations are not its own? A desk arm of hobby servos, simulated apart from this project.
 
     python tools/servo_arm.py --seed 0 --out logs/servo_arm
+    python tools/servo_arm.py --seed 0 --rate 30
 
 The arm runs in plain MuJoCo at 2 kHz. Its servos have what such servos have: a position controller with a deadband that reads an
 encoder in steps and off its axis, back-EMF, a sagging supply, late commands, friction that grows with the load and falls with
@@ -97,18 +98,20 @@ class Arm:
             xml.append(f'<body pos="{at}"><inertial pos="0.02 0 0" mass="0.12" diaginertia="1e-5 1e-5 1e-5"/></body>')
         return "".join([*xml, "</body>" * N, "</worldbody></mujoco>"])
 
-    def log(self, commands: Array) -> Array:
-        """(T, N) encoder readings at RATE_HZ under (T, N) commands in rad."""
+    def log(self, times_s: Array, commands: Array) -> Array:
+        """(T, N) encoder readings at ``times_s`` (T,), when ``commands`` (T, N) in rad are sent, each held until the next."""
         model, data = self.model, mujoco.MjData(self.model)
-        every, joints, used = round(1 / RATE_HZ / STEP_S), np.arange(N), 0.0
+        rows, joints, used = np.round(times_s / STEP_S).astype(int), np.arange(N), 0.0
+        sent = np.searchsorted(rows, np.arange(rows[-1] + 1), side="right") - 1
+        now = set(rows.tolist())
         read = np.zeros_like(commands)
         data.qpos[:] = commands[0] - self.zero
-        for k in range(len(commands) * every):
-            late = np.clip(((k * STEP_S - self.late) * RATE_HZ).astype(int), 0, len(commands) - 1)
+        for k in range(rows[-1] + 1):
+            late = sent[np.maximum(np.floor(k - self.late / STEP_S).astype(int), 0)]
             seen = data.qpos + self.zero + self.off_axis * np.sin(data.qpos + self.phase)
             seen = np.round(seen / ENCODER) * ENCODER
-            if k % every == 0:
-                read[k // every] = seen
+            if k in now:
+                read[sent[k]] = seen
             gap = commands[late, joints] - seen
             gap = np.sign(gap) * np.maximum(np.abs(gap) - self.deadband, 0.0)
             pushed = np.clip(self.kp * gap, -self.limit, self.limit) * (1 - self.sag * used)
@@ -129,9 +132,16 @@ def _text(values: Sequence[float] | Array) -> str:
     return " ".join(f"{v:.9g}" for v in values)
 
 
-def motion(kind: str, rng: np.random.Generator) -> tuple[Array, Array]:
-    """(T,) times and (T, N) commands in rad."""
-    t = np.arange(0, SECONDS, 1 / RATE_HZ)
+def logged_s(rate_hz: float, rng: np.random.Generator) -> Array:
+    """(T,) times at which a computer reads and sends: to the row at the model's rate, else a tenth of a step early or late."""
+    t = np.arange(0, SECONDS, 1 / rate_hz)
+    if rate_hz != RATE_HZ:
+        t[1:] += np.clip(rng.normal(0, 0.1, len(t) - 1), -0.3, 0.3) / rate_hz
+    return t
+
+
+def motion(kind: str, t: Array, rng: np.random.Generator) -> Array:
+    """(T, N) commands in rad at times (T,)."""
     if kind == "sines":
         q = sum(
             np.sin(2 * np.pi * f * t[:, None] + rng.uniform(0, 2 * np.pi, N)) / (1 + 2 * f)
@@ -149,17 +159,17 @@ def motion(kind: str, rng: np.random.Generator) -> tuple[Array, Array]:
         leg, share = (t / 1.2).astype(int), (t / 1.2 % 1)[:, None]
         q = knots[leg] + (knots[leg + 1] - knots[leg]) * share**3 * (10 - 15 * share + 6 * share**2)
     begin = np.clip(t, 0, 1)[:, None]
-    return t, np.clip(q * begin**2 * (3 - 2 * begin), -1.5, 1.5)
+    return np.clip(q * begin**2 * (3 - 2 * begin), -1.5, 1.5)
 
 
-def write(out: Path, seed: int, described: str) -> dict[str, list[str]]:
+def write(out: Path, seed: int, described: str, rate_hz: float = RATE_HZ) -> dict[str, list[str]]:
     """The user's files: a URDF, what it cannot say, and five logs."""
     out.mkdir(parents=True, exist_ok=True)
     heavier = SOLID if described == "solid" else 1.0
     (out / "arm.urdf").write_text(urdf(heavier), encoding="utf-8")
     joints = [f"joint_{k + 1}" for k in range(N)]
     sensors = [{"name": f"{j}_position", "kind": "position", "target": j} for j in joints]
-    entry = {"urdf": "arm.urdf", "time_step_s": 1 / RATE_HZ, "has_floor": False, "sensors": sensors}
+    entry = {"urdf": "arm.urdf", "has_floor": False, "sensors": sensors}
     more = {"coulomb": 0.4, "viscous": 0.3, "rotor_inertia": 2 * DRIVE["rotor_inertia"]} if described == "rough" else {}
     entry["drives"] = dict.fromkeys(joints, DRIVE | more)
     (out / "arm.yaml").write_text(yaml.safe_dump(entry), encoding="utf-8")
@@ -167,9 +177,10 @@ def write(out: Path, seed: int, described: str) -> dict[str, list[str]]:
     files: dict[str, list[str]] = {"fitted": [], "held": []}
     head = ",".join(["time_s", *(f"{j}_command_rad" for j in joints), *(f"{j}_position_rad" for j in joints)])
     for k, (use, kind) in enumerate([*(("fitted", m) for m in FITTED), *(("held", m) for m in HELD)]):
-        t, commands = motion(kind, np.random.default_rng([5, seed, k]))
+        t = logged_s(rate_hz, np.random.default_rng([6, seed, k]))
+        commands = motion(kind, t, np.random.default_rng([5, seed, k]))
         path = out / f"{use}_{k}_{kind}.csv"
-        table = np.column_stack([t, commands, arm.log(commands)])
+        table = np.column_stack([t, commands, arm.log(t, commands)])
         np.savetxt(path, table, delimiter=",", header=head, comments="", fmt="%.6f")
         files[use].append(str(path))
     return files
@@ -225,10 +236,13 @@ def main() -> int:
         default="nearly",
         help="rough: with much too much friction, and rotors twice as heavy; solid: with parts 2.5 times as heavy",
     )
+    parser.add_argument(
+        "--rate", type=float, default=RATE_HZ, help="Hz of the log; other than 100: uneven, as LeRobot's 30"
+    )
     parser.add_argument("--out", type=Path, default=Path("logs/servo_arm"))
     args = parser.parse_args()
     out = args.out.resolve()
-    files = write(out, args.seed, args.described)
+    files = write(out, args.seed, args.described, args.rate)
     seen, unseen = (problem(out, use, files[use]) for use in ("fitted", "held"))
     three = by_hand(seen)
     began = time.process_time()
