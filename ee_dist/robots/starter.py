@@ -40,7 +40,7 @@ JOINT_COLUMNS = ("joint", "from", "to", "command", "kp", "kd", "limit", "viscous
 """rad, N.m and kg.m^2 for a hinge; m, N and kg for a slide."""
 
 
-STEP = "fine enough for these drives; a log may have any rate"
+STEP = "left out, so as fine as the drives need; a log may have any rate"
 
 
 def starter(body: Body, kind: str, source: str, where: str) -> Starter:
@@ -77,7 +77,8 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
     data = {k: v for k, v in yaml.safe_load("\n".join(lines)).items() if k != kind}
     robot, notes = robot_of_body(body, data, where)
     if body.time_step_s is None:
-        lines.insert(2, f"time_step_s: {robot.time_step_s:g}  # assumed: {STEP}")
+        # No value, so that it follows when the drives are put right.
+        lines.insert(2, f"# time_step_s: {robot.time_step_s:g}  # assumed: {STEP}")
         assumed.append(f"time_step_s: {robot.time_step_s:g} s, {STEP}")
     text = "\n".join(lines) + "\n"
     read = (

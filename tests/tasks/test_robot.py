@@ -24,7 +24,7 @@ def test_a_urdf_becomes_a_description_with_its_assumptions_marked(cli):
     text = (run / "robot.yaml").read_text()
     marked = [line for line in text.splitlines() if "# assumed:" in line]
     assert [line.strip().split(":")[0] for line in marked] == [
-        "free_base", "time_step_s", "gravity_m_s2", "turn", "shoulder", "elbow",
+        "free_base", "# time_step_s", "gravity_m_s2", "turn", "shoulder", "elbow",
     ]  # fmt: skip
     assert "assumed: command, kp, kd" in marked[-1]
     assert yaml.safe_load(text)["drives"]["shoulder"]["torque_limit"] == 6.0
