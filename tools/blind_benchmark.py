@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
-from benchmarks.cases import tried
+from benchmarks.cases import seldom, tried
 
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.explain import EFFECT, UNEXPLAINED, explain
@@ -92,10 +92,14 @@ class Case:
     by: str = ""
 
 
-def measured(engine: Engine, robot: Robot, hidden: Hypothesis, seed: Sequence[int]) -> tuple[MeasuredTrial, ...]:
-    """The standard trials of a robot with a hidden change: what the recording of each would hold."""
-    plan = STANDARD if robot.free_base else FIXED_BASE
-    return tuple(tried(engine, robot, hidden, e, [*seed, k], k) for k, e in enumerate(plan))
+def measured(
+    engine: Engine, robot: Robot, hidden: Hypothesis, seed: Sequence[int], every: int = 1
+) -> tuple[MeasuredTrial, ...]:
+    """The standard trials of a robot with a hidden change: what the recording of each would hold. ``every``: rows from one
+    reading of the sensors to the next, of a robot that is bolted down."""
+    if robot.free_base:
+        return tuple(tried(engine, robot, hidden, e, [*seed, k], k) for k, e in enumerate(STANDARD))
+    return tuple(seldom(tried(engine, robot, hidden, e, [*seed, k], k), every) for k, e in enumerate(FIXED_BASE))
 
 
 class Bench:
@@ -121,7 +125,7 @@ class Bench:
     @cached_property
     def told(self) -> frozenset[str]:
         """Names of the candidates that all ways can tell."""
-        trials = measured(self.engine, self.robot, (), [self.args.seed, 999_998])
+        trials = measured(self.engine, self.robot, (), [self.args.seed, 999_998], self.args.read_every)
         pools = (pool_of(self.problem(trials, by)) for by in self.ways)
         return frozenset.intersection(*(frozenset(c.name for c in pool) for pool in pools))
 
@@ -133,7 +137,7 @@ class Bench:
 
     def calibrate(self) -> None:
         """As ``task=improve task.calibrate=true`` does it, on an untouched robot of the other engine."""
-        trials = measured(self.engine, self.robot, (), [self.args.seed, 999_999])
+        trials = measured(self.engine, self.robot, (), [self.args.seed, 999_999], self.args.read_every)
         plain = replace(self.known, trials=trials)
         found, content = calibrated(plain, self.config, candidates(self.robot))
         self.known = replace(
@@ -158,7 +162,7 @@ class Bench:
                     chosen, hidden_term = draw(self.robot, rng)
                 drawn.append(chosen)
                 hidden = (*hidden, hidden_term)
-        trials = measured(self.engine, self.robot, hidden, [self.args.seed, index])
+        trials = measured(self.engine, self.robot, hidden, [self.args.seed, index], self.args.read_every)
         return [self._case(index, drawn, hidden, trials, by) for by in self.ways]
 
     def _case(
@@ -323,6 +327,9 @@ def main() -> int:
     parser.add_argument("--robot", default="quadruped_lab", help="by name, or a file that describes it (.yaml, .urdf)")
     parser.add_argument("--by", choices=(AUTO, EVERY, *WAYS), default=AUTO, help="the way of comparing")
     parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
+    parser.add_argument(
+        "--read-every", type=int, default=1, metavar="N", help="sensors are read in every N-th row only"
+    )
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--json", type=Path)
     for flag in ("withhold", "two", "cross-engine"):

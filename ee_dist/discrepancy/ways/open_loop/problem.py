@@ -58,6 +58,8 @@ def soften(values: Array) -> Array:
 
 def _held_up(spread: Array) -> Array:
     """(T, C): mean squares that vary from row to row by luck, each at least the mean of its neighbours."""
+    if not len(spread):
+        return spread  # fewer readings than a window
     padded = np.pad(spread, ((1, 1), (0, 0)), mode="edge")
     return np.asarray(np.maximum(spread, (padded[:-2] + spread + padded[2:]) / 3.0))
 
