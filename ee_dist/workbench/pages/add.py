@@ -17,6 +17,8 @@ from ee_dist.workbench.pages.view import Latest, View, heading, of, quiet
 
 STEPS = 400
 """Positions of a slider."""
+SKETCHED = 300
+"""Points of a curve while the hand is on a slider; all of them when it rests."""
 Move = tuple[int, str, float]
 
 
@@ -171,7 +173,7 @@ class AddView(View):
         glance = await of(session.attempt(session.slide, k, {name: value}, place))
         if glance is None:
             return
-        self.curves.draw(glance.series)
+        self.curves.draw(glance.series, points=SKETCHED)
         number = self._sliders.get((k, name), (None, None))[1]
         if number is not None:
             number.set_value(float(f"{value:.5g}"))

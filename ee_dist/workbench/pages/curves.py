@@ -13,7 +13,7 @@ from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
 from ee_dist.workbench import charts
 from ee_dist.workbench.pages.desk import Desk
-from ee_dist.workbench.thin import stretch
+from ee_dist.workbench.thin import POINTS, stretch
 
 HOVERED = "(e) => window.robotAt?.(e.points[0].x)"
 """In the browser alone: a mouse that moves asks nothing of the session."""
@@ -29,8 +29,14 @@ class Curves:
         self.plot.on("plotly_hover", js_handler=HOVERED)
         self.drawn = 0
 
-    def draw(self, series: Series | None, mark: tuple[str, Array] | None = None, better: Array | None = None) -> None:
-        """``mark`` (T,) over the residual, ``better`` (T,) over the prediction."""
+    def draw(
+        self,
+        series: Series | None,
+        mark: tuple[str, Array] | None = None,
+        better: Array | None = None,
+        points: int = POINTS,
+    ) -> None:
+        """``mark`` (T,) over the residual, ``better`` (T,) over the prediction; ``points`` that are drawn at most."""
         sight = self.page.session.sight
         if series is None or sight is None:
             return
@@ -39,12 +45,12 @@ class Curves:
         curve = Overlay(
             name, problem.trials[series.trial], series.unit, series.times_s, series.measured, series.predicted, better
         )
-        span = self.page.span_s
-        part = stretch(curve, *(span or (None, None)))
+        begin_s, end_s = self.page.span_s or (None, None)
+        part = stretch(curve, begin_s, end_s, points)
         shown = None
         if mark is not None:
             shown = (mark[0], np.interp(part.curve.times_s, series.times_s, mark[1]))
-        key = f"{series.trial}:{series.channel}:{span is None}"
+        key = f"{series.trial}:{series.channel}:{begin_s is None}"
         self.plot.update_figure(charts.overlay(part.curve, key, self.page.brushed_s, shown, self.height))
         self.drawn += 1
 
