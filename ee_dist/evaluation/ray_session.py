@@ -5,25 +5,20 @@ Ray itself is loaded by whoever starts it: its errors are known, and its end is 
 
 from __future__ import annotations
 
-import fcntl
 import logging
 import os
-import shutil
 import socket
-import subprocess
 import sys
-import tempfile
 import threading
 import time
-import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import Any
 
 import psutil
 
 from ee_dist.basics.arithmetic import SETTINGS
+from ee_dist.evaluation.ray_folder import Guard
 from ee_dist.evaluation.ray_watch import Watch
 
 
@@ -37,55 +32,14 @@ class RayLostError(EvaluatorError):
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Workers are one process a core: numerical libraries must not start threads of their own in them."""
-MARK = "EE_DIST_RAY"
-"""Variable in the environment of all processes of a Ray that we started, by which its guard knows them."""
 PER_CORE = 8
 """More workers than this on each core only take memory."""
 LOOK_S = 0.5
 """How often to look whether Ray is still there while it starts."""
-_SOCKET_PATH = 40
-"""Longest name of Ray's folder, characters: sockets lie in it, and the system takes 107 for the name of one."""
-_FOLDER, _HELD = "ee_dist_", ".held"
-_LEAVE_S = 10.0
 KNOCK_S = 2.0
 """How often to look whether a cluster of others still answers."""
 _HEADS = ("gcs_server", "raylet")
 """Without these processes of its own nothing of Ray goes on."""
-
-
-class _Guard:
-    """The process that ends what is left of Ray when this one is gone, and the folder that it removes."""
-
-    def __init__(self) -> None:
-        self.mark = f"{MARK}={uuid.uuid4().hex}"
-        place = tempfile.gettempdir()
-        place = place if len(place) < _SOCKET_PATH - 16 else "/tmp"
-        _remove_orphans(Path(place))
-        self.folder = tempfile.mkdtemp(prefix=_FOLDER, dir=place)
-        self.lock = _locked(Path(self.folder))
-        script = str(Path(__file__).with_name("ray_guard.py"))
-        command = [sys.executable, "-I", "-S", script, self.mark, self.folder]
-        self.process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-
-    @property
-    def environment(self) -> dict[str, str]:
-        name, _, value = self.mark.partition("=")
-        return {name: value}
-
-    def release(self) -> None:
-        """Let it do its work, and wait until it has."""
-        with suppress(OSError, subprocess.TimeoutExpired):
-            if self.process.stdin:
-                self.process.stdin.close()
-            self.process.wait(_LEAVE_S)
-        with suppress(OSError):
-            os.close(self.lock)
 
 
 class _Hush:
@@ -108,29 +62,7 @@ class _Hush:
         sys.stderr = self.before
 
 
-def _locked(folder: Path) -> int:
-    """Handle of a lock in the folder that goes with this process, however it ends."""
-    part = folder / f"{_HELD}.part"
-    handle = os.open(part, os.O_RDWR | os.O_CREAT, 0o600)
-    fcntl.flock(handle, fcntl.LOCK_EX)
-    part.rename(folder / _HELD)  # nobody sees it unlocked
-    return handle
-
-
-def _remove_orphans(place: Path) -> None:
-    """Folders of runs that ended together with their guards, as when a machine fails: ours, with a lock that nobody holds."""
-    for lock in place.glob(f"{_FOLDER}*/{_HELD}"):
-        with suppress(OSError):
-            handle = os.open(lock, os.O_RDWR | os.O_NOFOLLOW)
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if lock.parent.stat().st_uid == os.getuid():
-                    shutil.rmtree(lock.parent, ignore_errors=True)
-            finally:
-                os.close(handle)
-
-
-_guard: _Guard | None = None
+_guard: Guard | None = None
 _hush: _Hush | None = None
 _watch: Watch | None = None
 _address: str | None = None
@@ -170,7 +102,7 @@ def start_ray(address: str | None, workers: int) -> None:
                 f"evaluator.workers={workers}: this machine has {cores} cores, and more than {PER_CORE * cores} workers "
                 "only take memory; choose fewer, or evaluator.workers=0 for one a core"
             )
-        _guard = _Guard()
+        _guard = Guard()
         options |= {
             "address": "local",
             "include_dashboard": False,
