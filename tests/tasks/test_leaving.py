@@ -256,3 +256,39 @@ def test_a_ray_lost_while_it_starts_is_one_line_and_the_command_may_be_given_aga
     assert "resume=out" in line or not (tmp_path / "out").exists()
     time.sleep(2.0)
     assert not relatives(tmp_path)
+
+
+HIT = """
+import os, psutil
+import ray._private.worker
+join = ray._private.worker.connect
+def connect(*given, **named):
+    (pid,) = [c.pid for c in psutil.Process().children() if c.name() == "raylet"]
+    os.kill(pid, int(os.environ["HIT"]))
+    return join(*given, **named)
+ray._private.worker.connect = connect
+"""
+JOINING = f"""
+import sys
+from ee_dist.__main__ import main
+from ee_dist.evaluation import ray_apart
+ray_apart.BEGIN = ray_apart.BEGIN.replace("; from", "; exec(" + repr({HIT!r}) + "); from", 1)
+sys.exit(main())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_raylet_lost_while_rays_library_joins_is_one_line(tmp_path, number):
+    """There it ends the process that it is in with status 1, and without a word."""
+    surroundings = {**os.environ, "LEAVING": str(tmp_path), "HIT": str(int(number))}
+    done = subprocess.run(
+        [sys.executable, "-c", JOINING, *LONG, "evaluator=ray"],
+        cwd=tmp_path, capture_output=True, text=True, check=False, env=surroundings, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    assert line.startswith("ee_dist: Ray ") and "nothing was recorded yet" in line
+    assert not (tmp_path / "out").exists()
+    time.sleep(2.0)
+    assert not relatives(tmp_path)
