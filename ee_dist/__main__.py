@@ -118,7 +118,7 @@ def _stopped(stop: KeyboardInterrupt, out: Path) -> NoReturn:
 
 
 def _lost(why: str, out: Path) -> NoReturn:
-    """Without Ray: its libraries in this process are of no use any more, not even to end it."""
+    """Without Ray; from another thread, too, where the main one does not come back to hear of it."""
     abandon_evaluators()
     leaving.leave(f"{why}; {_what_is_kept(out)}", MISTAKE)
 

@@ -60,7 +60,7 @@ def line(text: str) -> str:
 
 
 def leave(text: str, status: int) -> NoReturn:
-    """Say it and end without what libraries do at the end of a process: it takes seconds, and Ray's may crash."""
+    """Say it and end without what libraries do at the end of a process: it takes seconds."""
     global _leaving
     _leaving = True
     try:

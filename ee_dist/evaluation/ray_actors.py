@@ -95,9 +95,17 @@ class RayEvaluator:
     """Implements ``ee_dist.evaluation.jobs.Evaluator`` with ``workers`` actors (0: one a core).
 
     ``chunk`` is how many jobs a call carries (0: by the measured speed of the workers). Results do not depend on either.
+    ``folder``: Ray's, where somebody guards it. A run has it in a process of its own (``ray_apart``).
     """
 
-    def __init__(self, make_engine: EngineMaker, workers: int = 0, chunk: int = 0, address: str | None = None) -> None:
+    def __init__(
+        self,
+        make_engine: EngineMaker,
+        workers: int = 0,
+        chunk: int = 0,
+        address: str | None = None,
+        folder: str | None = None,
+    ) -> None:
         if workers < 0 or chunk < 0:
             raise ValueError("evaluator: workers and chunk must be 0 (automatic) or more")
         self.workers = workers or (os.cpu_count() or 1)
@@ -105,7 +113,7 @@ class RayEvaluator:
         self.counts = Counts()
         self.shares = Shares(self.workers)
         self.patience_s = PATIENCE_S
-        start_ray(address, self.workers)
+        start_ray(address, self.workers, folder)
         # Next to no share of a core: what a lost machine leaves must find a place on one that is full.
         actor = ray.remote(num_cpus=0.01, max_restarts=-1, max_task_retries=-1, scheduling_strategy="SPREAD")(_Worker)
         self.actors = [actor.remote(make_engine) for _ in range(self.workers)]
@@ -185,9 +193,6 @@ class RayEvaluator:
         """What Ray answers. Raises what a job raised, and EvaluatorError for what is Ray's own."""
         try:
             return ask(*arguments, **named)
-        except SystemError as error:
-            # What the watch raised while Ray's compiled part was waiting comes out of it as the cause of another error.
-            raise (error.__cause__ if isinstance(error.__cause__, RayLostError) else error) from None
         except RayTaskError as error:
             cause = getattr(error, "cause", None)
             raise (cause if isinstance(cause, Exception) else EvaluatorError(_last_line(error))) from None

@@ -17,10 +17,13 @@ import time
 
 ROUNDS = 40
 PAUSE_S = 0.05
+TITLE = b"ray::"
+"""How the names begin that Ray gives its processes."""
 
 
 def ours(mark: str, folder: str) -> list[int]:
-    """Ids of the processes that carry the mark, or have a file of the folder open: Ray writes over the environment of some."""
+    """Ids of the processes that carry the mark. Ray writes over the environment of some when it gives them a title: of those, the
+    ones that have a file of the folder open. A run that clears the folder away has that, too, and no such title."""
     if os.path.isdir("/proc/self"):
         return [int(name) for name in os.listdir("/proc") if name.isdigit() and _is_ours(f"/proc/{name}", mark, folder)]
     listed = subprocess.run(["ps", "-axwwE", "-o", "pid=,command="], capture_output=True, text=True, check=False).stdout
@@ -32,6 +35,9 @@ def _is_ours(process: str, mark: str, folder: str) -> bool:
         with open(f"{process}/environ", "rb") as file:
             if mark.encode() in file.read():
                 return True
+        with open(f"{process}/cmdline", "rb") as file:
+            if file.read(len(TITLE)) != TITLE:
+                return False
         for handle in os.listdir(f"{process}/fd"):
             with contextlib.suppress(OSError):
                 if os.readlink(f"{process}/fd/{handle}").startswith(folder + "/"):

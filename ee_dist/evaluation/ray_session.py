@@ -1,30 +1,23 @@
-"""Ray as a run has it: started here with a guard beside it, or a cluster that is there already.
+"""Ray as a process has it: started here, or a cluster that is there already.
 
-Ray itself is loaded by whoever starts it: its errors are known, and its end is asked for, in runs without it too.
+Ray itself is loaded by whoever starts it: its errors are known in runs without it too.
 """
 
 from __future__ import annotations
 
-import fcntl
 import logging
 import os
-import shutil
 import socket
-import subprocess
 import sys
-import tempfile
 import threading
 import time
-import uuid
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
-import psutil
-
 from ee_dist.basics.arithmetic import SETTINGS
-from ee_dist.evaluation.ray_watch import Watch
+from ee_dist.evaluation.ray_folder import Guard
+from ee_dist.evaluation.ray_watch import Heads
 
 
 class EvaluatorError(RuntimeError):
@@ -32,124 +25,29 @@ class EvaluatorError(RuntimeError):
 
 
 class RayLostError(EvaluatorError):
-    """Ray was there and is gone: its libraries in this process are of no use any more, not even to end it."""
+    """Ray was there and is gone, or did not come up."""
 
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Workers are one process a core: numerical libraries must not start threads of their own in them."""
-MARK = "EE_DIST_RAY"
-"""Variable in the environment of all processes of a Ray that we started, by which its guard knows them."""
 PER_CORE = 8
 """More workers than this on each core only take memory."""
 LOOK_S = 0.5
 """How often to look whether Ray is still there while it starts."""
-_SOCKET_PATH = 40
-"""Longest name of Ray's folder, characters: sockets lie in it, and the system takes 107 for the name of one."""
-_FOLDER, _HELD = "ee_dist_", ".held"
-_LEAVE_S = 10.0
-KNOCK_S = 2.0
-"""How often to look whether a cluster of others still answers."""
-_HEADS = ("gcs_server", "raylet")
-"""Without these processes of its own nothing of Ray goes on."""
-
-
-class _Guard:
-    """The process that ends what is left of Ray when this one is gone, and the folder that it removes."""
-
-    def __init__(self) -> None:
-        self.mark = f"{MARK}={uuid.uuid4().hex}"
-        place = tempfile.gettempdir()
-        place = place if len(place) < _SOCKET_PATH - 16 else "/tmp"
-        _remove_orphans(Path(place))
-        self.folder = tempfile.mkdtemp(prefix=_FOLDER, dir=place)
-        self.lock = _locked(Path(self.folder))
-        script = str(Path(__file__).with_name("ray_guard.py"))
-        command = [sys.executable, "-I", "-S", script, self.mark, self.folder]
-        self.process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-
-    @property
-    def environment(self) -> dict[str, str]:
-        name, _, value = self.mark.partition("=")
-        return {name: value}
-
-    def release(self) -> None:
-        """Let it do its work, and wait until it has."""
-        with suppress(OSError, subprocess.TimeoutExpired):
-            if self.process.stdin:
-                self.process.stdin.close()
-            self.process.wait(_LEAVE_S)
-        with suppress(OSError):
-            os.close(self.lock)
-
-
-class _Hush:
-    """What Ray's compiled part says of a Ray that is lost would stand beside our line: it writes to the system's error
-    stream, from which Python's own is taken apart meanwhile."""
-
-    def __init__(self) -> None:
-        sys.stderr.flush()
-        self.before, self.stream = sys.stderr, os.dup(2)
-        with suppress(OSError, ValueError):  # a stream that is not the system's stays as it is
-            if sys.stderr.fileno() == 2:
-                sys.stderr = open(self.stream, "w", 1, sys.stderr.encoding, "backslashreplace", closefd=False)  # noqa: SIM115
-        with open(os.devnull, "wb") as nothing:
-            os.dup2(nothing.fileno(), 2)
-
-    def end(self) -> None:
-        sys.stderr.flush()
-        os.dup2(self.stream, 2)
-        os.close(self.stream)
-        sys.stderr = self.before
-
-
-def _locked(folder: Path) -> int:
-    """Handle of a lock in the folder that goes with this process, however it ends."""
-    part = folder / f"{_HELD}.part"
-    handle = os.open(part, os.O_RDWR | os.O_CREAT, 0o600)
-    fcntl.flock(handle, fcntl.LOCK_EX)
-    part.rename(folder / _HELD)  # nobody sees it unlocked
-    return handle
-
-
-def _remove_orphans(place: Path) -> None:
-    """Folders of runs that ended together with their guards, as when a machine fails: ours, with a lock that nobody holds."""
-    for lock in place.glob(f"{_FOLDER}*/{_HELD}"):
-        with suppress(OSError):
-            handle = os.open(lock, os.O_RDWR | os.O_NOFOLLOW)
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if lock.parent.stat().st_uid == os.getuid():
-                    shutil.rmtree(lock.parent, ignore_errors=True)
-            finally:
-                os.close(handle)
-
-
-_guard: _Guard | None = None
-_hush: _Hush | None = None
-_watch: Watch | None = None
+_guard: Guard | None = None
+_started = False
 _address: str | None = None
-_farewell: list[Callable[[str], None]] = []
-_begun: dict[str, psutil.Process] = {}
-"""Ray's processes by name while it starts: what has it in its own books is not there yet."""
+_heads = Heads()
+"""While Ray starts: what has its processes in its own books is not there yet."""
 
 
-def when_lost(farewell: Callable[[str], None]) -> None:
-    """What to call, from another thread, where Ray is lost and the main thread does not come back to hear of it."""
-    _farewell[:] = [farewell]
-
-
-def start_ray(address: str | None, workers: int) -> None:
-    """Connect to the cluster at ``address``, or start Ray on this machine. Raises EvaluatorError."""
+def start_ray(address: str | None, workers: int, folder: str | None = None) -> None:
+    """Connect to the cluster at ``address``, or start Ray on this machine. ``folder``: Ray's, where somebody guards it already.
+    Raises EvaluatorError."""
     import ray
     from ray._private import auto_init_hook, ray_constants
 
-    global _guard, _address, _hush
+    global _guard, _address, _started, _heads
     if ray.is_initialized():
         return
     # Ray's answer to SIGTERM is a dump of stacks; ours is a line.
@@ -158,7 +56,7 @@ def start_ray(address: str | None, workers: int) -> None:
     auto_init_hook.enable_auto_connect = False
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.CRITICAL}
     if address:
-        _knock(address)
+        knock(address)
         # On machines of a cluster libraries are to compute as they do here.
         alike = {name: os.environ[name] for name in SETTINGS if name in os.environ}
         options |= {"address": address, "runtime_env": {"env_vars": {**alike, **ONE_THREAD}}}
@@ -170,19 +68,18 @@ def start_ray(address: str | None, workers: int) -> None:
                 f"evaluator.workers={workers}: this machine has {cores} cores, and more than {PER_CORE * cores} workers "
                 "only take memory; choose fewer, or evaluator.workers=0 for one a core"
             )
-        _guard = _Guard()
+        _guard = None if folder else Guard()
         options |= {
             "address": "local",
             "include_dashboard": False,
             "num_cpus": max(workers, cores),
-            "_temp_dir": _guard.folder,
+            "_temp_dir": _guard.folder if _guard else folder,
         }
         # Inherited by the workers that Ray has ready: with a runtime_env it would start others, and a second later.
-        environment = {**ONE_THREAD, **_guard.environment}
-    if _hush is None:
-        _hush = _Hush()
+        environment = {**ONE_THREAD, **(_guard.environment if _guard else {})}
+    _started, _address = not address, None
     starter = _Starter(options)
-    _begun.clear()
+    _heads = Heads()
     with _environment(environment):
         starter.start()
         while not starter.over.wait(LOOK_S):
@@ -197,24 +94,6 @@ def start_ray(address: str | None, workers: int) -> None:
             raise _unreachable(address, first)
         raise RayLostError(f"Ray did not start ({first}); evaluator=serial does without it")
     _address = address
-    _look_on(address)
-
-
-def _look_on(address: str | None) -> None:
-    global _watch
-
-    def find() -> str | None:
-        ray = sys.modules.get("ray")
-        return _gone() if ray is not None and ray.is_initialized() else None
-
-    def farewell(why: str) -> None:
-        for say in _farewell:
-            say(f"Ray is lost: {why}")
-
-    if _watch is not None:
-        _watch.stop()
-    _watch = Watch(find, lambda why: RayLostError(f"Ray is lost: {why}"), farewell, KNOCK_S if address else LOOK_S)
-    _watch.start()
 
 
 class _Starter(threading.Thread):
@@ -241,31 +120,21 @@ class _Starter(threading.Thread):
 
 def stop_ray() -> None:
     """Stop what ``start_ray`` started, or leave the cluster. Ray's own way at the end of a process begins with a nap."""
-    global _hush
-    _stop_watch()
+    global _started, _address
+    _started, _address = False, None
     ray = sys.modules.get("ray")
     if ray is not None and ray.is_initialized():
         ray.shutdown()
     abandon_ray()
-    if _hush is not None:
-        _hush.end()
-        _hush = None
 
 
 def abandon_ray() -> None:
-    """End the processes of a Ray that we started, without a word to them. Does nothing for a cluster of others."""
-    global _guard
-    _stop_watch()
+    """End the processes of a Ray that we started and guard, without a word to them."""
+    global _guard, _started
+    _started = False
     if _guard is not None:
         _guard.release()
         _guard = None
-
-
-def _stop_watch() -> None:
-    global _watch
-    if _watch is not None:
-        _watch.stop()
-        _watch = None
 
 
 def lost(within_s: float = 0.0) -> str | None:
@@ -274,41 +143,22 @@ def lost(within_s: float = 0.0) -> str | None:
     end = time.monotonic() + within_s
     while (gone := _gone()) is None and time.monotonic() < end:
         time.sleep(0.1)
-    if gone is not None and _watch is not None:
-        _watch.taken.set()
     return gone
 
 
 def _gone() -> str | None:
-    if _guard is not None:
+    if _started:
         import ray
 
         node = getattr(ray._private.worker, "_global_node", None)
-        dead = [name for name, _ in node.dead_processes()] if node is not None else _ended()
+        dead = [name for name, _ in node.dead_processes()] if node is not None else _heads.ended()
         return f"its process {dead[0]} has ended" if dead else None
     if _address:
         try:
-            _knock(_address)
+            knock(_address)
         except EvaluatorError as error:
             return str(error)
     return None
-
-
-def _ended() -> list[str]:
-    """Names of Ray's processes that were there at an earlier look, while it starts, and have ended."""
-    with suppress(psutil.Error):
-        for child in psutil.Process().children():
-            with suppress(psutil.Error):
-                if child.name() in _HEADS:
-                    _begun.setdefault(child.name(), child)
-    return [name for name, process in _begun.items() if not _runs(process)]
-
-
-def _runs(process: psutil.Process) -> bool:
-    try:
-        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
-    except psutil.Error:
-        return False
 
 
 @contextmanager
@@ -326,8 +176,8 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
                 os.environ[name] = value
 
 
-def _knock(address: str) -> None:
-    """Ray waits for minutes where nobody answers: see first whether somebody does."""
+def knock(address: str) -> None:
+    """Ray waits for minutes where nobody answers: see first whether somebody does. Raises EvaluatorError."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host:
         if address in ("auto", "local"):

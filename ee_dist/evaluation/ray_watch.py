@@ -1,8 +1,8 @@
 """Looks whether all of Ray is still there, and tells the run when it is not.
 
-What Ray has in this process waits a minute for a head that is gone, and then ends the process without a word of ours: in the
-middle of a trial on hardware, say. So a thread looks, interrupts the main thread, which unwinds and keeps what there is, and
-where that is stuck in a call of Ray's says the last words itself.
+Ray's own library waits a minute for a head that is gone, and a run in the middle of a trial on hardware asks it for nothing. So a
+thread looks, interrupts the main thread, which unwinds and keeps what there is, and where that is stuck says the last words
+itself.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType
+
+import psutil
 
 LOOK_S = 0.5
 TAKE_S = 1.5
@@ -19,6 +22,33 @@ TAKE_S = 1.5
 UNWIND_S = 12.0
 """How long it has in all; Ray's own patience is 60 s."""
 NUMBER = signal.SIGUSR1
+HEADS = ("gcs_server", "raylet")
+"""Without these processes of its own nothing of Ray goes on."""
+
+
+class Heads:
+    """These processes below the one that starts Ray (``pid``; none: this one), as soon as they are there."""
+
+    def __init__(self, pid: int | None = None) -> None:
+        self.pid = pid
+        self.seen: dict[str, psutil.Process] = {}
+
+    def ended(self) -> list[str]:
+        """Names of those that were there at this look or an earlier one, and have ended."""
+        if len(self.seen) < len(HEADS):
+            with suppress(psutil.Error):
+                for child in psutil.Process(self.pid).children():
+                    with suppress(psutil.Error):
+                        if child.name() in HEADS:
+                            self.seen.setdefault(child.name(), child)
+        return [name for name, process in self.seen.items() if not _runs(process)]
+
+
+def _runs(process: psutil.Process) -> bool:
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.Error:
+        return False
 
 
 class Watch(threading.Thread):

@@ -14,7 +14,8 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import EffectError, loaded_plugins
 from ee_dist.engines.contract import EngineError
 from ee_dist.engines.drivers import DriverError
-from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, abandon_ray, when_lost
+from ee_dist.evaluation.ray_apart import abandon_ray, when_lost
+from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError, known_settings, unknown_key

@@ -7,13 +7,12 @@ import gc
 import os
 from dataclasses import dataclass, replace
 
-from ee_dist import leaving
 from ee_dist.effects.catalogue import load_plugin
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import JournaledEvaluator
-from ee_dist.evaluation.ray_session import stop_ray
+from ee_dist.evaluation.ray_apart import RayApart, stop_ray
 from ee_dist.evaluation.recent import RecentEvaluator
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.evaluation.socket_body import SocketBody
@@ -130,16 +129,7 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
         if name == "serial":
             inner = SerialEvaluator(engine_maker(config, True, engine)(), settings.chunk or chunk)
         else:
-            # Ray takes a second to load: a run without it does not wait.
-            from ee_dist.evaluation.ray_actors import RayEvaluator
-
-            inner = RayEvaluator(
-                engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address
-            )
-            leaving.arm()  # Ray has put handlers of its own in place
-            # The last to be registered is the first to be called: before Ray's own end, which begins with a nap.
-            atexit.unregister(_leave)
-            atexit.register(_leave)
+            inner = RayApart(engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address)
         inner = JournaledEvaluator(RecentEvaluator(inner) if settings.recent else inner)
         _kept[key] = CachedEvaluator(inner) if settings.cache else inner
     evaluator = _kept[key]

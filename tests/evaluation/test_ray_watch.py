@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from ee_dist import leaving
 from ee_dist.evaluation import ray_watch
 from ee_dist.evaluation.ray_watch import Watch
 
@@ -65,17 +66,8 @@ def test_who_found_out_by_itself_is_not_interrupted(watching):
     assert watch.why == "the raylet" and not said
 
 
-def test_what_interrupts_rays_compiled_part_is_told_as_itself(monkeypatch):
-    """It makes a SystemError of an error that came in from a signal, and a Ctrl-C of whatever leaves a run."""
-    from ee_dist import leaving
-    from ee_dist.evaluation.ray_actors import RayEvaluator
-    from ee_dist.evaluation.ray_session import RayLostError
-
-    def wait() -> None:
-        raise SystemError("returned a result with an exception set") from RayLostError("the raylet is gone")
-
-    with pytest.raises(RayLostError, match="the raylet is gone"):
-        RayEvaluator._said(None, wait)
+def test_what_interrupts_a_compiled_library_is_told_as_itself(monkeypatch):
+    """It may make a Ctrl-C of whatever leaves a run."""
     for name in ("_leaving", "_left"):
         monkeypatch.setattr(leaving, name, getattr(leaving, name))
     with pytest.raises(leaving.Left):

@@ -29,7 +29,7 @@ def test_serial_for_a_small_budget_and_ray_where_it_pays_or_is_asked_for(
             asked.append((workers, address))
             super().__init__(make_engine())
 
-    monkeypatch.setattr("ee_dist.evaluation.ray_actors.RayEvaluator", Ray)
+    monkeypatch.setattr("ee_dist.tasks.wiring.RayApart", Ray)
     wiring.close_evaluators()
     wiring.evaluator_of(
         Config(engine=EngineConfig("mujoco"), budget=budget, evaluator=evaluator, ray=RayConfig(address))

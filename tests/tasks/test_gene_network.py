@@ -12,7 +12,7 @@ from schemas import validated
 from ee_dist.effects.catalogue import apply, from_dict
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.kinetics.engine import KineticsEngine
-from ee_dist.evaluation.ray_session import stop_ray
+from ee_dist.evaluation.ray_apart import stop_ray
 from ee_dist.networks.dream4 import dream4
 from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.reader import ANY, read_run

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,8 +14,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from ee_dist.evaluation import ray_session
-from ee_dist.evaluation.ray_session import MARK
+from ee_dist.evaluation import ray_folder
+from ee_dist.evaluation.ray_folder import MARK, Guard
 from ee_dist.recording.reader import read_run
 
 LONG = (
@@ -74,8 +75,8 @@ def test_while_it_loads_nothing_was_begun(tmp_path):
 
 GUARDED = """
 import subprocess, sys, time
-from ee_dist.evaluation import ray_session
-guard = ray_session._Guard()
+from ee_dist.evaluation.ray_folder import Guard
+guard = Guard()
 subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], env=guard.environment)
 open(guard.folder + "/session.log", "w").close()
 print(guard.mark, guard.folder, flush=True)
@@ -123,24 +124,56 @@ def test_a_killed_run_leaves_no_process_and_no_folder_of_ray(tmp_path):
 
 def test_what_a_failed_machine_left_of_ray_is_removed_by_the_next_run(tmp_path, monkeypatch):
     """There the guard ended with its run."""
-    monkeypatch.setattr(ray_session.tempfile, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(ray_session, "_SOCKET_PATH", 10**6)
+    monkeypatch.setattr(ray_folder.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(ray_folder, "_SOCKET_PATH", 10**6)
     own = tmp_path / "ee_dist_mine"
     own.mkdir()
     (own / "notes.txt").write_text("mine")
-    first = ray_session._Guard()
+    first = Guard()
     (Path(first.folder) / "session").mkdir()
-    second = ray_session._Guard()
+    second = Guard()
     assert Path(first.folder).is_dir(), "its run goes on"
     first.process.kill()
     first.process.wait()
     os.close(first.lock)
-    third = ray_session._Guard()
+    third = Guard()
     assert not Path(first.folder).exists()
     assert Path(second.folder).is_dir() and (own / "notes.txt").exists()
     for guard in (second, third):
         guard.release()
     assert [p.name for p in tmp_path.iterdir()] == ["ee_dist_mine"]
+
+
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
+def test_processes_that_lived_on_without_their_guard_are_ended_by_the_next_run(tmp_path, monkeypatch):
+    """Ray's agents wait for a minute for a Ray that is gone, and have written their title over their environment."""
+    monkeypatch.setattr(ray_folder.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(ray_folder, "_SOCKET_PATH", 10**6)
+    first, second = Guard(), Guard()
+    sleep = shutil.which("sleep")
+    assert sleep
+
+    def one(name: str, folder: str, environment: dict[str, str]) -> subprocess.Popen[bytes]:
+        with (Path(folder) / "some.log").open("w") as log:
+            return subprocess.Popen([name, "600"], executable=sleep, stdout=log, env=environment)
+
+    agent, marked_one = one("ray::Agent", first.folder, {}), one("sleep", str(tmp_path), first.environment)
+    reader, other = one("sleep", first.folder, {}), one("ray::Agent", second.folder, second.environment)
+    try:
+        first.process.kill()
+        first.process.wait()
+        os.close(first.lock)
+        third = Guard()
+        for ended in (agent, marked_one):
+            assert ended.wait(10) == -signal.SIGKILL
+        assert reader.poll() is None and other.poll() is None
+        third.release()
+        second.release()
+        assert other.wait(10) == -signal.SIGKILL
+    finally:
+        for process in (agent, marked_one, reader, other):
+            process.kill()
+            process.wait()
 
 
 def marked(mark: str) -> list[str]:
@@ -221,5 +254,41 @@ def test_a_ray_lost_while_it_starts_is_one_line_and_the_command_may_be_given_aga
     assert line.startswith("ee_dist: Ray ")
     assert "nothing was recorded yet" in line or "resume=out" in line
     assert "resume=out" in line or not (tmp_path / "out").exists()
+    time.sleep(2.0)
+    assert not relatives(tmp_path)
+
+
+HIT = """
+import os, psutil
+import ray._private.worker
+join = ray._private.worker.connect
+def connect(*given, **named):
+    (pid,) = [c.pid for c in psutil.Process().children() if c.name() == "raylet"]
+    os.kill(pid, int(os.environ["HIT"]))
+    return join(*given, **named)
+ray._private.worker.connect = connect
+"""
+JOINING = f"""
+import sys
+from ee_dist.__main__ import main
+from ee_dist.evaluation import ray_apart
+ray_apart.BEGIN = ray_apart.BEGIN.replace("; from", "; exec(" + repr({HIT!r}) + "); from", 1)
+sys.exit(main())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_raylet_lost_while_rays_library_joins_is_one_line(tmp_path, number):
+    """There it ends the process that it is in with status 1, and without a word."""
+    surroundings = {**os.environ, "LEAVING": str(tmp_path), "HIT": str(int(number))}
+    done = subprocess.run(
+        [sys.executable, "-c", JOINING, *LONG, "evaluator=ray"],
+        cwd=tmp_path, capture_output=True, text=True, check=False, env=surroundings, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    assert line.startswith("ee_dist: Ray ") and "nothing was recorded yet" in line
+    assert not (tmp_path / "out").exists()
     time.sleep(2.0)
     assert not relatives(tmp_path)

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from ee_dist.evaluation.ray_session import stop_ray
+from ee_dist.evaluation.ray_apart import stop_ray
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, MAP, REPAIR
