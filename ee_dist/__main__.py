@@ -31,6 +31,7 @@ from ee_dist.tasks.errors import (
     abandon_evaluators,
     defect,
     hydra_message,
+    remove_orphans,
     unasked_end,
     when_lost,
 )
@@ -61,6 +62,7 @@ def run(composed: DictConfig) -> None:
     hydra_settings: Any = HydraConfig.get()
     out = Path(hydra_settings.runtime.output_dir)
     when_lost(lambda why: _lost(why, out))
+    remove_orphans()  # here, since a run that was finished already starts nothing that would
     try:
         out = _folder(hydra_settings)
         config, module, options = settings(composed)

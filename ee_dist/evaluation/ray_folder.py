@@ -28,10 +28,8 @@ class Guard:
 
     def __init__(self) -> None:
         self.mark = f"{MARK}={uuid.uuid4().hex}"
-        place = tempfile.gettempdir()
-        place = place if len(place) < _SOCKET_PATH - 16 else "/tmp"
-        _remove_orphans(Path(place))
-        self.folder = tempfile.mkdtemp(prefix=_FOLDER, dir=place)
+        remove_orphans()
+        self.folder = tempfile.mkdtemp(prefix=_FOLDER, dir=_place())
         self.lock = _locked(Path(self.folder), self.mark)
         script = str(Path(__file__).with_name("ray_guard.py"))
         command = [sys.executable, "-I", "-S", script, self.mark, self.folder]
@@ -69,10 +67,15 @@ def _locked(folder: Path, mark: str) -> int:
     return handle
 
 
-def _remove_orphans(place: Path) -> None:
+def _place() -> Path:
+    place = tempfile.gettempdir()
+    return Path(place if len(place) < _SOCKET_PATH - 16 else "/tmp")
+
+
+def remove_orphans() -> None:
     """What is left of runs that ended together with their guards, as when a machine fails: folders of ours with a lock that
     nobody holds. Some of Ray's processes wait for a minute for a Ray that is gone: they are ended with them."""
-    for lock in place.glob(f"{_FOLDER}*/{_HELD}"):
+    for lock in _place().glob(f"{_FOLDER}*/{_HELD}"):
         with suppress(OSError):
             handle = os.open(lock, os.O_RDWR | os.O_NOFOLLOW)
             try:

@@ -15,6 +15,7 @@ from ee_dist.effects.catalogue import EffectError, loaded_plugins
 from ee_dist.engines.contract import EngineError
 from ee_dist.engines.drivers import DriverError
 from ee_dist.evaluation.ray_apart import abandon_ray, when_lost
+from ee_dist.evaluation.ray_folder import remove_orphans
 from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
@@ -24,7 +25,16 @@ from ee_dist.trials.excitation import ExcitationError
 from ee_dist.trials.hardware import HardwareError
 from ee_dist.trials.log import LogError
 
-__all__ = ("USER_ERRORS", "RayLostError", "abandon_evaluators", "defect", "hydra_message", "unasked_end", "when_lost")
+__all__ = (
+    "USER_ERRORS",
+    "RayLostError",
+    "abandon_evaluators",
+    "defect",
+    "hydra_message",
+    "remove_orphans",
+    "unasked_end",
+    "when_lost",
+)
 
 _LONGEST = 300
 """Characters of an error that nobody foresaw: some libraries put whole arrays into theirs."""

@@ -144,6 +144,16 @@ def test_what_a_failed_machine_left_of_ray_is_removed_by_the_next_run(tmp_path, 
     assert [p.name for p in tmp_path.iterdir()] == ["ee_dist_mine"]
 
 
+def test_any_run_removes_it_and_not_only_one_that_starts_ray(cli, tmp_path, monkeypatch):
+    monkeypatch.setattr(ray_folder, "_place", lambda: tmp_path)
+    left = Guard()
+    left.process.kill()
+    left.process.wait()
+    os.close(left.lock)
+    assert cli("task=compare", "measured=nowhere.mcap").status == 2
+    assert not Path(left.folder).exists()
+
+
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
 def test_processes_that_lived_on_without_their_guard_are_ended_by_the_next_run(tmp_path, monkeypatch):
     """Ray's agents wait for a minute for a Ray that is gone, and have written their title over their environment."""
