@@ -1,7 +1,7 @@
 """Ctrl-C, a request to end and a closed terminal: the run unwinds, says one line and ends with the status of the signal.
 
-A first signal unwinds the run, so that files are closed; a second ends the process at once. What was started beside
-it (Ray) has a guard of its own, and is gone a moment later in either case.
+A first signal unwinds the run, so that files are closed (a trial that was just made is written first); a second ends the
+process at once. What was started beside it (Ray) has a guard of its own, and is gone a moment later in either case.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import sys
 import threading
 from types import FrameType
 from typing import NoReturn
+
+from ee_dist.basics.uncut import keeping
 
 SIGNALS = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "asked to end", signal.SIGHUP: "terminal closed"}
 
@@ -87,7 +89,7 @@ def _unwind(number: int, frame: FrameType | None) -> None:
     if _leaving:
         os._exit(128 + number)
     _leaving, _left = True, Left(number)
-    raise _left
+    keeping.interrupt(_left)
 
 
 def _at_once(number: int, frame: FrameType | None) -> None:

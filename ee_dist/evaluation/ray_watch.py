@@ -2,7 +2,7 @@
 
 Ray's own library waits a minute for a head that is gone, and a run in the middle of a trial on hardware asks it for nothing. So a
 thread looks, interrupts the main thread, which unwinds and keeps what there is, and where that is stuck says the last words
-itself.
+itself. A trial on hardware is made to its end first.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from types import FrameType
 
 import psutil
 
+from ee_dist.basics.uncut import trial_on_hardware
+
 LOOK_S = 0.5
 TAKE_S = 1.5
 """How long the main thread has to find out by itself, as it does where it waits for results."""
 UNWIND_S = 12.0
-"""How long it has in all; Ray's own patience is 60 s."""
+"""How long it has in all, beside a trial on hardware; Ray's own patience is 60 s."""
 NUMBER = signal.SIGUSR1
 HEADS = ("gcs_server", "raylet")
 """Without these processes of its own nothing of Ray goes on."""
@@ -84,13 +86,16 @@ class Watch(threading.Thread):
         end = time.monotonic() + UNWIND_S
         if not self.taken.wait(TAKE_S) and not self.over.is_set() and self._main:
             signal.pthread_kill(threading.main_thread().ident or 0, NUMBER)
+        while trial_on_hardware.under_way and not self.over.wait(self.look_s):
+            end = time.monotonic() + UNWIND_S
         if not self.over.wait(end - time.monotonic()):
             self.farewell(why)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         if self.why is not None and not self.taken.is_set() and not self.over.is_set():
             self.taken.set()
-            raise self.error(self.why)
+            trial_on_hardware.interrupt(self.error(self.why))
+            return
         if callable(self._before):
             self._before(number, frame)
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.uncut import keeping
 from ee_dist.engines.drivers import Controllers, scaling
 from ee_dist.robots.model import Robot
 from ee_dist.trials.hardware import Body, HardwareError, Limiter, Limits, Reading
@@ -17,13 +18,15 @@ _REST = ("base_pose", "joints", "torques", "supply_v")
 class SteppedRobot:
     """Implements ``ee_dist.trials.hardware.Hardware``. ``robot`` names its channels and drives, and bounds its joints.
 
-    ``aborted`` is the log of a trial that did not reach its end, whatever ended it.
+    ``aborted`` is the log of a trial that did not reach its end, whatever ended it; ``made`` that of the last one that did, for
+    whoever was interrupted before it was handed over.
     """
 
     def __init__(self, body: Body, robot: Robot, limits: Limits) -> None:
         self.body, self.robot, self.limits = body, robot, limits
         self.trials = 0
         self.aborted: SensorLog | None = None
+        self.made: SensorLog | None = None
 
     def knock(self) -> None:
         """Raises HardwareError where nobody answers; bodies that cannot be asked are taken to be there."""
@@ -40,27 +43,34 @@ class SteppedRobot:
         controllers = Controllers([robot], [driver], [scaling(robot)], steps)
         sensors: list[Array] = []
         commands: list[Array] = []
-        self.aborted = None
+        self.aborted = self.made = None
+
+        def next_reading(step: int, reading: Reading) -> Reading:
+            sensed = self._sensed(reading, step)
+            sent = limiter(controllers.step(step, step * robot.time_step_s, sensed[None])[0])
+            sensors.append(sensed)
+            commands.append(sent)
+            found = self.body.step(sent)
+            self._check_torques(found, step)
+            return found
+
         try:
             reading = self.body.begin(self.trials, steps, robot.time_step_s)
-            for step in range(steps):
-                sensed = self._sensed(reading, step)
-                sent = limiter(controllers.step(step, step * robot.time_step_s, sensed[None])[0])
-                sensors.append(sensed)
-                commands.append(sent)
-                reading = self.body.step(sent)
-                self._check_torques(reading, step)
-            log = self._log(sensors, commands, self._rest(reading))
+            for step in range(steps - 1):
+                reading = next_reading(step, reading)
+            with keeping:  # a signal between the body's last answer and its log would lose a whole trial
+                self.made = self._log(sensors, commands, self._rest(next_reading(steps - 1, reading)))
+                self.trials += 1
+            return self.made
         except BaseException as error:
             # Whatever it was, Ctrl-C too: the body must not go on moving, and what was measured is kept.
             self.body.abort()
-            self.aborted = self._log(sensors, commands[: len(sensors)], {}) if len(sensors) > 1 else None
+            if self.made is None and len(sensors) > 1:
+                self.aborted = self._log(sensors, commands[: len(sensors)], {})
             if isinstance(error, (HardwareError, LogError)):
                 at = f"trial {self.trials + 1}, step {len(sensors)} of {steps}"
                 raise HardwareError(f"{at}: {error}", self.aborted) from None
             raise
-        self.trials += 1
-        return log
 
     def _sensed(self, reading: Reading, step: int) -> Array:
         found = reading.sensors

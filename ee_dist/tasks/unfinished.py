@@ -15,6 +15,7 @@ from typing import Any
 import yaml
 
 from ee_dist.basics.files import write_whole
+from ee_dist.basics.uncut import keeping, trial_on_hardware
 from ee_dist.evaluation.installed import installed
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import Journal, JournaledEvaluator
@@ -131,15 +132,25 @@ class _Remembered:
             if skip is not None:
                 skip()
             return record.log
-        try:
-            log = self.inner.trial(driver, steps)
-        except BaseException:
-            self._keep_aborted(driver)
-            raise
+        with trial_on_hardware:
+            try:
+                log = self.inner.trial(driver, steps)
+                with keeping:
+                    self._keep(path, driver, log)
+                return log
+            except BaseException:
+                with keeping:
+                    made = getattr(self.inner, "made", None)
+                    if made is None:
+                        self._keep_aborted(driver)
+                    elif not path.exists():  # interrupted between its end and here
+                        self._keep(path, driver, made)
+                raise
+
+    def _keep(self, path: Path, driver: Any, log: SensorLog) -> None:
         self.run.begin()
         with RunWriter(path, self.robot, {"task": "unfinished"}) as writer:
             writer.trial(TrialRecord(self.count - 1, self.name, HARDWARE, driver, log))
-        return log
 
     def _keep_aborted(self, driver: Any) -> None:
         """What was measured in a trial that did not reach its end, beside the recording of the run: no resume removes it."""

@@ -9,6 +9,7 @@ import time
 import pytest
 
 from ee_dist import leaving
+from ee_dist.basics.uncut import trial_on_hardware
 from ee_dist.evaluation import ray_watch
 from ee_dist.evaluation.ray_watch import Watch
 
@@ -55,6 +56,20 @@ def test_who_does_not_listen_hears_the_last_words_said(watching):
         time.sleep(60)
     assert said_at.wait(10), "it was told, and did not end"
     assert said == ["the GCS"]
+
+
+def test_a_trial_on_hardware_is_made_to_its_end_first(watching):
+    watch, said = watching(["the raylet"], takes_s=0.01, unwinds_s=0.05)
+    silent = []
+
+    def trial() -> None:
+        with trial_on_hardware:
+            time.sleep(0.5)
+            silent.append(watch.taken.is_set() and not said)
+
+    with pytest.raises(GoneError):
+        trial()
+    assert silent == [True], "the trial was cut, or the last words were said in the middle of it"
 
 
 def test_who_found_out_by_itself_is_not_interrupted(watching):
