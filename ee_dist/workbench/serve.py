@@ -90,7 +90,13 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     # To squeeze what is sent takes longer than to hand it over, unless a network lies between.
     squeeze = GZipMiddleware if token else None
     ui.run_with(
-        app, title=TITLE, dark=None, show_welcome_message=False, reconnect_timeout=20.0, gzip_middleware_factory=squeeze
+        app,
+        title=TITLE,
+        dark=None,
+        show_welcome_message=False,
+        reconnect_timeout=20.0,
+        gzip_middleware_factory=squeeze,
+        tailwind=False,
     )
     # What is loaded by now stays: neither the collector nor the toolkit, which looks for its server, goes through it again.
     gc.freeze()

@@ -6,13 +6,23 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 from html import escape
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from nicegui import ui
 
 from ee_dist.workbench.pages.desk import Desk
+from ee_dist.workbench.pages.plot import preload
 
 T = TypeVar("T")
+SHEETS = [Path(__file__).with_name(name) for name in ("base.css", "style.css")]
+
+
+def dress() -> None:
+    """The looks of a page, and what its charts need, in its head."""
+    for sheet in SHEETS:
+        ui.add_css(sheet)
+    ui.add_head_html(preload())
 
 
 async def of(future: Future[T]) -> T:
