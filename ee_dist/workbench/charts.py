@@ -13,7 +13,7 @@ import numpy as np
 from ee_dist.discrepancy.words import plain
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
-from ee_dist.viewing.report_figures import wrapped
+from ee_dist.viewing.labels import wrapped
 from ee_dist.workbench.bench import Step
 from ee_dist.workbench.sight import Cloud
 

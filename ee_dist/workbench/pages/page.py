@@ -69,7 +69,9 @@ class Page:
         with ui.element("main").classes("bench"):
             self._head()
             with ui.column().classes("w-full gap-3") as self.started:
-                self.start.build()
+                # What is open stays open: there is nothing to drop a file on then.
+                if self.session.measured is None:
+                    self.start.build()
             with ui.column().classes("w-full gap-2") as self.opened:
                 with (
                     ui.tabs(on_change=lambda: self.changed("tab"))
@@ -81,8 +83,9 @@ class Page:
                     "w-full bg-transparent"
                 ):
                     for view, tab in zip(self.views, tabs, strict=True):
-                        with ui.tab_panel(tab).classes("p-0"), ui.column().classes("w-full gap-3"):
-                            view.build()
+                        with ui.tab_panel(tab).classes("p-0"):
+                            view.panel = ui.column().classes("w-full gap-3")
+                    self.views[0].set_up()
                 ui.label(KEYS).classes("quiet")
         ui.keyboard(on_key=self._key, ignore=["input", "select", "textarea"])
         ui.timer(IDLE_S, self.session.worker.warm, once=True)
@@ -133,7 +136,8 @@ class Page:
                     for view in self.views:
                         view.stale |= topics & view.topics
                     front = self.in_front
-                    if front is not None and front.stale and self.session.seen is not None:
+                    front.set_up()
+                    if front.stale and self.session.seen is not None:
                         stale, front.stale = front.stale, set()
                         await front.draw(stale)
                     if topics & {"opened", "seen", "notice"}:
@@ -142,7 +146,7 @@ class Page:
             self._drawing = False
 
     @property
-    def in_front(self) -> View | None:
+    def in_front(self) -> View:
         return next((v for v in self.views if v.name == self.tabs.value), self.views[0])
 
     def _draw_head(self, topics: set[str]) -> None:

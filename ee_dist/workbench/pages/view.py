@@ -56,7 +56,8 @@ class Latest(Generic[T]):
 
 
 class View:
-    """A tab of the page. ``topics``: what it shows; drawn when one of them changed and the tab is in sight."""
+    """A tab of the page. ``topics``: what it shows; drawn when one of them changed and the tab is in sight. ``panel``: where it
+    goes."""
 
     name = ""
     icon = ""
@@ -65,6 +66,15 @@ class View:
     def __init__(self, page: Desk) -> None:
         self.page, self.session = page, page.session
         self.stale: set[str] = set(self.topics)
+        self.panel: ui.column | None = None
+        self._set_up = False
+
+    def set_up(self) -> None:
+        """Build it in its panel, when it first comes to the front."""
+        if self.panel is not None and not self._set_up:
+            self._set_up = True
+            with self.panel:
+                self.build()
 
     def build(self) -> None:
         """Make the elements."""
