@@ -70,7 +70,8 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     if kept is not None:
         session.reopen(kept)
     elif log is not None:
-        from ee_dist.workbench.pages.recovery import show_recovery  # only here: what tells of a run takes its time to load
+        # Only here: what tells of a run takes its time to load.
+        from ee_dist.workbench.pages.recovery import show_recovery
 
         show_recovery(log, out)
     elif config.measured:

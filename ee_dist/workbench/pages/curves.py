@@ -36,8 +36,8 @@ class Curves:
         better: Array | None = None,
         points: int = POINTS,
     ) -> None:
-        """``mark`` (T,) over the residual, ``better`` (T,) over the prediction; ``points`` that are drawn at most: fewer than all are
-        for a hand that waits for them."""
+        """``mark`` (T,) over the residual, ``better`` (T,) over the prediction; ``points`` that are drawn at most: fewer than
+        all are for a hand that waits for them."""
         sight = self.page.session.sight
         if series is None or sight is None:
             return

@@ -32,8 +32,8 @@ class Plot(Element, component="plot.js", dependencies=["plotly/plotly-cartesian.
         self.update()
 
     def follow(self, figure: Chart) -> None:
-        """Another figure, for a hand that waits for it. Where it differs in the numbers of its lines alone only these are sent, and
-        the toolkit, which goes through the whole page at every message of its own, has nothing to do."""
+        """Another figure, for a hand that waits for it. Where it differs in the numbers of its lines alone only these are sent,
+        and the toolkit, which goes through the whole page at every message of its own, has nothing to do."""
         if self.figure is None or _without_numbers(figure) != _without_numbers(self.figure):
             self.draw(figure)
             return

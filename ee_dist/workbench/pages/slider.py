@@ -9,8 +9,8 @@ from nicegui.element import Element
 
 
 class Slider(Element):
-    """Quasar's own, which follows the hand by itself. The toolkit's is sent every value that it has just sent, and the whole page is
-    gone through for it, before the curves come. ``moved`` and ``released`` are called with the toolkit's events."""
+    """Quasar's own, which follows the hand by itself. The toolkit's is sent every value that it has just sent, and the whole page
+    is gone through for it, before the curves come. ``moved`` is called with the toolkit's event, ``released`` with nothing."""
 
     def __init__(
         self,
