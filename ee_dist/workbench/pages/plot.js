@@ -15,12 +15,14 @@ export default {
   emits: Object.keys(TOLD),
   async mounted() {
     await import("plotly-cartesian");
+    if (this.gone) return;
     this.ready = true;
     this.update();
     this.fits = new ResizeObserver(() => this.fit());
     this.fits.observe(this.$el);
   },
   unmounted() {
+    this.gone = true;
     this.fits?.disconnect();
     if (this.drawn) Plotly.purge(this.$el);
   },
@@ -41,7 +43,7 @@ export default {
     // In a tab that is put away it has no place to fit.
     fit() {
       const { clientWidth: width, _fullLayout: drawn } = this.$el;
-      if (width && drawn && width !== drawn.width) Plotly.Plots.resize(this.$el);
+      if (width && drawn && Math.abs(width - drawn.width) >= 1) Plotly.Plots.resize(this.$el);
     },
   },
 };

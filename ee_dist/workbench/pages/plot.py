@@ -34,7 +34,7 @@ class Plot(Element, component="plot.js", dependencies=["plotly/plotly-cartesian.
     def follow(self, figure: Chart) -> None:
         """Another figure, for a hand that waits for it. Where it differs in the numbers of its lines alone only these are sent,
         and the toolkit, which goes through the whole page at every message of its own, has nothing to do."""
-        if self.figure is None or _without_numbers(figure) != _without_numbers(self.figure):
+        if self.figure is None or not same_but_numbers(self.figure, figure):
             self.draw(figure)
             return
         self.figure = figure
@@ -45,6 +45,11 @@ def preload() -> str:
     """HTML for the head of the page: plotly is loaded while the page is built, not when the first chart asks for it."""
     (library,) = Plot.exposed_libraries
     return f'<link rel="modulepreload" href="/_nicegui/{__version__}/libraries/{library.key}" />'
+
+
+def same_but_numbers(figure: Chart, other: Chart) -> bool:
+    """Whether they differ in the numbers of their lines at most."""
+    return _without_numbers(figure) == _without_numbers(other)
 
 
 def _without_numbers(figure: Chart) -> Any:
