@@ -171,7 +171,7 @@ def disturbed(
         "one line": lines == (0 if silent or not status else 1),
         "left over": ", ".join(bench.left()) or "nothing",
     }
-    if not right(found):
+    if hit and not right(found):
         print(said, errors.read_text(errors="replace"), sep="\n", file=sys.stderr)
     shutil.rmtree(out, ignore_errors=True)
     return found if hit else None

@@ -1,5 +1,5 @@
-// A chart: what is drawn comes from the session as plain data for plotly. The toolkit's own chart loads all of plotly, and hands it
-// data that tell of every number that is looked at.
+// A chart: what is drawn comes from the session as plain data for plotly. The toolkit's own chart hands it data that tell of every
+// number that is looked at.
 const TOLD = {
   plotly_click: (e) => ({ points: places(e) }),
   plotly_hover: (e) => ({ points: places(e) }),
@@ -14,7 +14,7 @@ export default {
   props: { figure: Object },
   emits: Object.keys(TOLD),
   async mounted() {
-    await import("plotly-cartesian");
+    await import("plotly");
     if (this.gone) return;
     this.ready = true;
     this.update();
