@@ -9,6 +9,7 @@ from ee_dist import beginning, leaving
 if __name__ == "__main__":
     leaving.arm(unwinds=False)  # what is imported below takes a second or two, and Ctrl-C may come in it
     beginning.announce(sys.argv[1:], sys.stderr)
+    beginning.load()
 
 import errno
 import multiprocessing
@@ -66,6 +67,7 @@ def run(composed: DictConfig) -> None:
     try:
         out = _folder(hydra_settings)
         config, module, options = settings(composed)
+        beginning.loaded()
         check_used(list(hydra_settings.overrides.task), str(composed.task.name))
         how = handling(composed)
         if how.resume is not None and resumed(out, config, options, how.overwrite):

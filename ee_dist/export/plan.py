@@ -16,7 +16,6 @@ from ee_dist.engines.drive import stiff_joints
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
 from ee_dist.robots.model import DRIVE_NUMBERS, Drive, Robot, Sensor
 
-FORMATS = ("mjcf", "urdf", "yaml", "python")
 NATIVE, SHIM, NOT = "native", "shim", "not expressible"
 ACTUATOR = frozenset({"kp", "kd", "torque_limit", "speed_limit", "strength", "command_gain", "zero_offset", "back_emf"})
 """Of a drive, what an actuator of MuJoCo has: gains, limits, a damping, a bias."""

@@ -12,7 +12,8 @@ from rich.table import Table
 
 from ee_dist.basics.files import write_whole
 from ee_dist.effects.model_file import ModelFile, read_model
-from ee_dist.export.plan import FORMATS, NOT, Fate, fates, native_damping, needs_shim
+from ee_dist.export import FORMATS
+from ee_dist.export.plan import NOT, Fate, fates, native_damping, needs_shim
 from ee_dist.export.python import controller_text
 from ee_dist.export.urdf import urdf_text
 from ee_dist.robots.model import Robot

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from textwrap import wrap
 
 import numpy as np
 import plotly.graph_objects as go
@@ -12,6 +11,7 @@ from plotly.subplots import make_subplots
 
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
+from ee_dist.viewing.labels import wrapped
 
 MEASURED, PREDICTED, IMPROVED = "#4a90d9", "#e08a00", "#2e9e62"
 """What was measured, what the model says, and the improved one: the same in every figure."""
@@ -49,11 +49,6 @@ def styled(figure: go.Figure, height: int) -> go.Figure:
     figure.update_annotations(font_size=12)
     figure.update_xaxes(zeroline=False)
     return figure
-
-
-def wrapped(name: str, width: int = 30) -> str:
-    """A label of an axis in lines of some characters."""
-    return "<br>".join(wrap(name, width))
 
 
 def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> go.Figure:

@@ -13,7 +13,7 @@ import numpy as np
 from ee_dist.discrepancy.words import plain
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
-from ee_dist.viewing.report_figures import wrapped
+from ee_dist.viewing.labels import wrapped
 from ee_dist.workbench.bench import Step
 from ee_dist.workbench.sight import Cloud
 
@@ -27,14 +27,15 @@ DIGITS = 6
 TIME_DIGITS = 6
 """Of a second, so that every row of a fast log has its own place."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
-_CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["toImage", "lasso2d", "autoScale2d"]}
-_STILL = {"displayModeBar": False, "responsive": True}
+_CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["toImage", "lasso2d", "autoScale2d"]}
+_STILL = {"displayModeBar": False}
 """Of charts in which there is nothing to zoom into."""
 
 
 def _chart(data: list[Chart], height: int, **layout: Any) -> Chart:
-    for axis in ("xaxis", "yaxis"):
-        layout[axis] = {"zeroline": False, **layout.get(axis, {})}
+    for axis in ("xaxis", "yaxis", *(["yaxis2"] if "yaxis2" in layout else [])):
+        # To find out whether a number at an axis has room plotly measures the page, and a browser lays all of it out for that.
+        layout[axis] = {"zeroline": axis == "yaxis2", "ticklabeloverflow": "allow", **layout.get(axis, {})}
     return {
         "data": data,
         "layout": {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import logging
 import os
 import secrets
@@ -20,6 +19,7 @@ from nicegui import app as toolkit
 from nicegui import ui
 from rich.console import Console
 
+from ee_dist import beginning
 from ee_dist.effects.model_file import read_model
 from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError
@@ -29,11 +29,13 @@ from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
 from ee_dist.workbench import saved
 from ee_dist.workbench.guard import Guard, is_loopback
 from ee_dist.workbench.pages.page import show_session
-from ee_dist.workbench.pages.recovery import show_recovery
 from ee_dist.workbench.session import Session
 
 TITLE = "ee_dist workbench"
 EVERYWHERE = ("0.0.0.0", "::")
+TURN_S = 0.0005
+"""After which a thread that computes lets the others in. A page and its files are answered in a thousand small steps, and each of
+them would wait ten times as long while the session's thread is at work."""
 
 
 def bound(host: str, port: int) -> socket.socket:
@@ -63,10 +65,14 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     if log is not None and saved.is_session(log):
         kept, log = saved.read(log), None
         config, by = replace(config, engine=replace(config.engine, name=kept.engine)), kept.by
+    sys.setswitchinterval(TURN_S)
     session = Session(config, by, out)
     if kept is not None:
         session.reopen(kept)
     elif log is not None:
+        # Only here: what tells of a run takes its time to load.
+        from ee_dist.workbench.pages.recovery import show_recovery
+
         show_recovery(log, out)
     elif config.measured:
         session.load(config.measured, config.model)
@@ -90,10 +96,16 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     # To squeeze what is sent takes longer than to hand it over, unless a network lies between.
     squeeze = GZipMiddleware if token else None
     ui.run_with(
-        app, title=TITLE, dark=None, show_welcome_message=False, reconnect_timeout=20.0, gzip_middleware_factory=squeeze
+        app,
+        title=TITLE,
+        dark=None,
+        show_welcome_message=False,
+        reconnect_timeout=20.0,
+        gzip_middleware_factory=squeeze,
+        tailwind=False,
     )
-    # What is loaded by now stays: neither the collector nor the toolkit, which looks for its server, goes through it again.
-    gc.freeze()
+    # Neither the collector nor the toolkit, which looks for its server, goes through what is loaded by now.
+    beginning.loaded()
     settings = uvicorn.Config(
         Guard(app, token),
         log_config=None,

@@ -242,6 +242,11 @@ class Session:
         return True
 
     @property
+    def gripped(self) -> bool:
+        """Whether a hand is on a slider: what it sets is not settled yet."""
+        return self._gripped
+
+    @property
     def undoable(self) -> int:
         return len(self._past)
 

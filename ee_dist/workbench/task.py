@@ -6,6 +6,7 @@ import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 
+from ee_dist import beginning
 from ee_dist.tasks.config import AUTO, Config, ConfigError, one_of, within
 from ee_dist.tasks.unfinished import note_nothing
 from ee_dist.tasks.ways import WAYS
@@ -36,6 +37,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         raise ConfigError("log= follows a recovery, measured= compares a model with a log: give one of them")
     note_nothing()
     # The toolkit takes a second to load: not before it is known to be needed.
+    beginning.load()
     from ee_dist.workbench.serve import serve
 
     serve(config, options.by, options.host, options.port, options.show, out)

@@ -18,7 +18,8 @@ from ee_dist.engines.drive import DrivePath
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.mujoco.mjcf_out import mjcf_text
-from ee_dist.export.plan import FORMATS, NATIVE, NOT, SHIM, fates, native_damping, needs_shim, parameters
+from ee_dist.export import FORMATS
+from ee_dist.export.plan import NATIVE, NOT, SHIM, fates, native_damping, needs_shim, parameters
 from ee_dist.export.python import controller_text
 from ee_dist.export.shim import Shim
 from ee_dist.export.urdf import rpy_of, urdf_text

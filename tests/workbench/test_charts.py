@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from ee_dist.viewing.curves import Overlay
 from ee_dist.workbench import charts
@@ -43,3 +44,15 @@ def test_a_refused_step_is_crossed_out_and_no_number_stands_on_the_floor():
     assert lines["held out"]["textposition"] == ["top center", "bottom center"]
     assert "refused" in found["layout"]["xaxis"]["ticktext"][2]
     assert found["layout"]["yaxis"]["title"]["text"] == "error (mrad)"
+
+
+def test_of_a_moved_slider_only_the_numbers_are_other_ones_and_a_mark_is_another_figure():
+    pytest.importorskip("nicegui", reason="needs the extra 'workbench'")
+    from ee_dist.workbench.pages.plot import same_but_numbers
+
+    before, after = overlay(50, 0.1), overlay(50, 0.1)
+    after.predicted[:] += 0.2
+    first, moved = charts.overlay(before, "key"), charts.overlay(after, "key")
+    assert same_but_numbers(first, moved) and first["data"][1]["y"] != moved["data"][1]["y"]
+    assert not same_but_numbers(first, charts.overlay(after, "another key"))
+    assert not same_but_numbers(first, charts.overlay(after, "key", mark=("a mark", np.zeros(50))))

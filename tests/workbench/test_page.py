@@ -33,6 +33,10 @@ UNCOVERED = """(() => {
   const e = [...document.querySelectorAll("input[aria-label^='Add an effect']")].find((e) => e.offsetParent);
   scrollTo(0, 0); const r = e.getBoundingClientRect();
   return e.contains(document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2)); })()"""
+CURVE = (
+    "[...document.querySelectorAll('.js-plotly-plot')].find((p) => p.offsetParent && p.data?.[0]?.name === 'measured')"
+)
+ROWS = 500
 FOUND = "document.body.innerText.includes('Ranked, with 95 % intervals')"
 
 
@@ -96,6 +100,7 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
             for _ in range(6):
                 person.key("PageUp", 33)
             person.wait(f"{NUMBER} > {1.1 * good}")
+            person.wait(f"{CURVE}.data[0].x.length === {ROWS}")  # every row again, once the hand rests
             person.click("Undo", "button")
             person.wait(f"Math.abs({NUMBER} - {good}) < 0.02")
             person.open("Watch")

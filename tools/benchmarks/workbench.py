@@ -36,8 +36,10 @@ FLUID_MS = 300.0
 """What a hand that zooms or asks for another curve may have to wait."""
 COMPLETE = (
     "parseFloat(document.querySelector('.number').innerText) > 0 && "
-    "document.querySelectorAll('.js-plotly-plot .main-svg').length > 4"
+    "[...document.querySelectorAll('.js-plotly-plot')].filter("
+    "(p) => p.calcdata?.length && p.querySelector('.main-svg')).length > 4"
 )
+"""The error is there, and more than four charts are drawn with what there is to see in them."""
 LAUNCH = (
     "import sys, time; from nicegui import ui; print('toolkit', time.time(), time.process_time(), flush=True); "
     "import runpy; sys.argv[0] = 'ee_dist'; runpy.run_module('ee_dist', run_name='__main__', alter_sys=True)"

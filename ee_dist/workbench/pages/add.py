@@ -6,20 +6,25 @@ import asyncio
 from html import escape
 from typing import Any
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 
 from ee_dist.discrepancy.words import placed, plain, quantity
 from ee_dist.effects.catalogue import CATALOGUE
 from ee_dist.workbench import verbs
 from ee_dist.workbench.bench import Entry
 from ee_dist.workbench.pages.curves import Curves
+from ee_dist.workbench.pages.slider import Slider
 from ee_dist.workbench.pages.view import Latest, View, heading, of, quiet
+from ee_dist.workbench.session import Glance
 
 STEPS = 400
 """Positions of a slider."""
 SKETCHED = 300
 """Points of a curve while the hand is on a slider; all of them when it rests."""
+TOLD_S = 0.1
+"""By which numbers come after the curves of a move: what is sent with these is drawn before them."""
 Move = tuple[int, str, float]
+Told = tuple[Move, Glance]
 
 
 class AddView(View):
@@ -30,6 +35,7 @@ class AddView(View):
         self._built: tuple[Any, ...] = ()
         self._sliders: dict[tuple[int, str], tuple[Any, Any]] = {}
         self.moves = Latest[Move](self._move)
+        self.told = Latest[Told](self._tell)
         with ui.element("div").classes("two"):
             with ui.element("section").classes("card pinned below"):
                 heading("Measured and predicted")
@@ -112,7 +118,7 @@ class AddView(View):
             for name, value in entry.term.values:
                 slider, number = self._sliders.get((k, name), (None, None))
                 if slider is not None:
-                    slider.set_value(value)
+                    slider.show(value)
                     number.set_value(float(f"{value:.5g}"))
 
     def _entry(self, k: int, entry: Entry) -> None:
@@ -142,12 +148,10 @@ class AddView(View):
         with ui.row().classes("w-full items-center no-wrap gap-2"):
             with ui.column().classes("gap-0").style("flex: 1 1 auto; min-width: 0"):
                 quiet(f"{said}{shown}, {low:.3g} to {high:.3g}")
-                slider = ui.slider(min=low, max=high, step=(high - low) / STEPS, value=value).props(
-                    f'aria-label="{escape(f"{said} of {placed(entry.name)}{shown}")}"'
-                )
+                slider = Slider(low, high, (high - low) / STEPS, value,
+                                lambda e: self.moves.ask((k, name, float(e.args))), self._release)  # fmt: skip
+                slider.props(f'aria-label="{escape(f"{said} of {placed(entry.name)}{shown}")}"')
                 slider.mark(f"slider-{k}-{name}")
-                slider.on("update:model-value", lambda e: self.moves.ask((k, name, float(e.args))), throttle=0.02)
-                slider.on("change", self._release)
                 for label, a, b in entry.intervals:
                     if label == name and high > low:
                         left, right = (min(max((v - low) / (high - low), 0.0), 1.0) for v in (a, b))
@@ -165,7 +169,7 @@ class AddView(View):
         self._sliders[(k, name)] = (slider, number)
 
     async def _move(self, move: Move) -> None:
-        """While the hand is on the slider: the curve first, the error over all trials when there is a moment for it."""
+        """While the hand is on the slider: the curve first, numbers when there is a moment for them."""
         k, name, value = move
         session, place = self.session, self.page.place
         if place is None or k >= len(session.bench.entries):
@@ -174,15 +178,22 @@ class AddView(View):
         if glance is None:
             return
         self.curves.draw(glance.series, points=SKETCHED)
+        background_tasks.create(self.told.ask((move, glance)))
+
+    async def _tell(self, told: Told) -> None:
+        """The value and the error of a move, unless the hand is off the slider by then: what is settled is told otherwise."""
+        await asyncio.sleep(TOLD_S)
+        (k, name, value), glance = told
+        session, error = self.session, glance.error
+        if error is None and not self.moves.newer:
+            error = await of(session.attempt(session.glance_whole))
+        if not session.gripped:
+            return
         number = self._sliders.get((k, name), (None, None))[1]
         if number is not None:
             number.set_value(float(f"{value:.5g}"))
-        if glance.error is not None:
-            self.page.show_error(glance.error)
-        elif not self.moves.newer:
-            error = await of(session.attempt(session.glance_whole))
-            if error is not None:
-                self.page.show_error(error)
+        if error is not None:
+            self.page.show_error(error)
 
     async def _release(self) -> None:
         # The last move may still be on its way.

@@ -12,6 +12,7 @@ from ee_dist.discrepancy.compare import by_trial
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.workbench import charts
 from ee_dist.workbench.pages.curves import Curves
+from ee_dist.workbench.pages.plot import Plot
 from ee_dist.workbench.pages.robot import RobotPanel
 from ee_dist.workbench.pages.view import View, heading, of, quiet
 from ee_dist.workbench.sight import Cloud
@@ -33,10 +34,10 @@ class CompareView(View):
             with ui.element("section").classes("card"):
                 heading("Where it fails: channel by trial")
                 quiet("Click on a cell to look at it. Arrow keys move on from there.")
-                self.map = ui.plotly(charts.heat(np.zeros((1, 1)), ["-"], ["-"], None)).classes("w-full").mark("map")
+                self.map = Plot().mark("map")
                 self.map.on("plotly_click", self._clicked)
                 heading("By regime")
-                self.regimes = ui.plotly(charts.bars([], [], 1.0)).classes("w-full")
+                self.regimes = Plot()
         with ui.element("section").classes("card"):
             heading("Residual against what the joint did")
             self.cloud_note = quiet()
@@ -59,13 +60,13 @@ class CompareView(View):
                 for line in account.lines:
                     quiet(line)
             regimes = seen.found.regimes
-            self.regimes.update_figure(
+            self.regimes.draw(
                 charts.bars([r.name for r in regimes], [r.error for r in regimes], seen.found.noise_floor)
             )
         if topics & {"seen", "place"}:
             names = [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)]
             cells = by_trial(problem, np.nan_to_num(seen.residual, posinf=0.0))
-            self.map.update_figure(charts.heat(cells, problem.channels, names, place))
+            self.map.draw(charts.heat(cells, problem.channels, names, place))
             self._parts = await of(session.do(sight.clouds, seen.residual, place))
         self.curves.draw(await of(session.do(sight.series, seen.terms, place)))
         self._draw_clouds(problem.layout.units[place[1]])
@@ -82,13 +83,13 @@ class CompareView(View):
         if len(figures) != len(self._plots):
             self.clouds.clear()
             with self.clouds:
-                self._plots = [ui.plotly(f).classes("w-full") for f in figures]
+                self._plots = [Plot(f) for f in figures]
             for plot in self._plots:
                 plot.on("plotly_selected", self._brushed)
                 plot.on("plotly_deselect", self._unbrushed)
         else:
             for plot, figure in zip(self._plots, figures, strict=True):
-                plot.update_figure(figure)
+                plot.draw(figure)
 
     def _clicked(self, event: Any) -> None:
         points = (event.args or {}).get("points") or []

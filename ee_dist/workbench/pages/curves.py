@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from nicegui import ui
 
 from ee_dist.discrepancy.problem import Series
 from ee_dist.discrepancy.words import plain
@@ -13,6 +12,7 @@ from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
 from ee_dist.workbench import charts
 from ee_dist.workbench.pages.desk import Desk
+from ee_dist.workbench.pages.plot import Plot
 from ee_dist.workbench.thin import POINTS, stretch
 
 HOVERED = "(e) => window.robotAt?.(e.points[0].x)"
@@ -24,7 +24,7 @@ class Curves:
 
     def __init__(self, page: Desk, height: int = 400) -> None:
         self.page, self.height = page, height
-        self.plot = ui.plotly(charts.overlay(_empty(), "", height=height)).classes("w-full")
+        self.plot = Plot(height=height)
         self.plot.on("plotly_relayout", self._zoomed)
         self.plot.on("plotly_hover", js_handler=HOVERED)
         self.drawn = 0
@@ -36,7 +36,8 @@ class Curves:
         better: Array | None = None,
         points: int = POINTS,
     ) -> None:
-        """``mark`` (T,) over the residual, ``better`` (T,) over the prediction; ``points`` that are drawn at most."""
+        """``mark`` (T,) over the residual, ``better`` (T,) over the prediction; ``points`` that are drawn at most: fewer than
+        all are for a hand that waits for them."""
         sight = self.page.session.sight
         if series is None or sight is None:
             return
@@ -51,7 +52,11 @@ class Curves:
         if mark is not None:
             shown = (mark[0], np.interp(part.curve.times_s, series.times_s, mark[1]))
         key = f"{series.trial}:{series.channel}:{begin_s is None}"
-        self.plot.update_figure(charts.overlay(part.curve, key, self.page.brushed_s, shown, self.height))
+        figure = charts.overlay(part.curve, key, self.page.brushed_s, shown, self.height)
+        if points < POINTS:
+            self.plot.follow(figure)
+        else:
+            self.plot.draw(figure)
         self.drawn += 1
 
     def _zoomed(self, event: Any) -> None:
@@ -63,8 +68,3 @@ class Curves:
         else:
             return
         self.page.changed("span")
-
-
-def _empty() -> Overlay:
-    nothing = np.zeros(0)
-    return Overlay("", "", "1", nothing, nothing, nothing)

@@ -7,6 +7,7 @@ from nicegui import ui
 from ee_dist.discrepancy.words import placed
 from ee_dist.workbench import charts, verbs
 from ee_dist.workbench.pages.curves import Curves
+from ee_dist.workbench.pages.plot import Plot
 from ee_dist.workbench.pages.view import View, heading, of, quiet
 from ee_dist.workbench.results import REFUSED, Ranked
 
@@ -32,7 +33,7 @@ class ExplainView(View):
         with ui.element("div").classes("two") as self.found:
             with ui.element("section").classes("card"):
                 heading("Ranked, with 95 % intervals")
-                self.ranking = ui.plotly(charts.ranking(["-"], [0.0], [(0.0, 0.0)], ["not"])).classes("w-full")
+                self.ranking = Plot()
                 self.list = ui.column().classes("w-full gap-0")
             with ui.element("section").classes("card stays"):
                 heading("Its mark in the residual")
@@ -65,7 +66,7 @@ class ExplainView(View):
                 for k, c in enumerate(found.candidates):
                     self._candidate(k, c)
             if found.candidates:
-                self.ranking.update_figure(
+                self.ranking.draw(
                     charts.ranking(
                         [placed(c.name) for c in found.candidates],
                         [c.explained for c in found.candidates],

@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from ee_dist.export.plan import FORMATS
+from ee_dist.export import FORMATS
 from ee_dist.workbench.pages.view import View, heading, quiet
 from ee_dist.workbench.session import MODEL_FILE
 

@@ -17,23 +17,17 @@ from ee_dist.workbench.pages.compare import CompareView
 from ee_dist.workbench.pages.explain import ExplainView
 from ee_dist.workbench.pages.keep import KeepView
 from ee_dist.workbench.pages.start import StartView
-from ee_dist.workbench.pages.view import View, gauge, of
+from ee_dist.workbench.pages.view import View, dress, gauge, of
 from ee_dist.workbench.pages.watch import WatchView
 from ee_dist.workbench.session import Session
 from ee_dist.workbench.sight import Place
 from ee_dist.workbench.worker import BusyError
 
-# A chart in a tab that is put away is told to fit its place, and complains that it has none: it fits itself when it is back.
-CALM = (
-    "<script>addEventListener('unhandledrejection', (e) => "
-    "{ if (String(e.reason).includes('displayed plot div')) e.preventDefault(); });</script>"
-)
 UNSAID = "<script>if (location.search) history.replaceState(null, '', location.pathname);</script>"
 """The token has become a cookie: it need not stand in the address bar and in the browser's memory."""
 MOVES = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
 IDLE_S = 4.0
 """After which the process of the long verbs is started: not while a page needs the processor to come up."""
-STYLE = Path(__file__).with_name("style.css")
 FOLLOW = Path(__file__).with_name("follow.js")
 KEYS = "Keys: 1 to 5 choose a view, arrows another trial or channel in Compare, e explains, u takes back, Esc cancels a search."
 
@@ -68,14 +62,16 @@ class Page:
                 loop.call_soon_threadsafe(self.changed, topic)
 
         client.on_delete(self.session.listen(hear))
-        ui.add_css(STYLE)
-        ui.add_head_html(CALM + UNSAID)
+        dress()
+        ui.add_head_html(UNSAID)
         ui.add_head_html(f"<script>{FOLLOW.read_text()}</script>")
         ui.colors(primary="#0072b2", positive="#009e73", negative="#c04a00")
         with ui.element("main").classes("bench"):
             self._head()
             with ui.column().classes("w-full gap-3") as self.started:
-                self.start.build()
+                # What is open stays open: there is nothing to drop a file on then.
+                if self.session.measured is None:
+                    self.start.build()
             with ui.column().classes("w-full gap-2") as self.opened:
                 with (
                     ui.tabs(on_change=lambda: self.changed("tab"))
@@ -87,8 +83,9 @@ class Page:
                     "w-full bg-transparent"
                 ):
                     for view, tab in zip(self.views, tabs, strict=True):
-                        with ui.tab_panel(tab).classes("p-0"), ui.column().classes("w-full gap-3"):
-                            view.build()
+                        with ui.tab_panel(tab).classes("p-0"):
+                            view.panel = ui.column().classes("w-full gap-3")
+                    self.views[0].set_up()
                 ui.label(KEYS).classes("quiet")
         ui.keyboard(on_key=self._key, ignore=["input", "select", "textarea"])
         ui.timer(IDLE_S, self.session.worker.warm, once=True)
@@ -139,7 +136,8 @@ class Page:
                     for view in self.views:
                         view.stale |= topics & view.topics
                     front = self.in_front
-                    if front is not None and front.stale and self.session.seen is not None:
+                    front.set_up()
+                    if front.stale and self.session.seen is not None:
                         stale, front.stale = front.stale, set()
                         await front.draw(stale)
                     if topics & {"opened", "seen", "notice"}:
@@ -148,7 +146,7 @@ class Page:
             self._drawing = False
 
     @property
-    def in_front(self) -> View | None:
+    def in_front(self) -> View:
         return next((v for v in self.views if v.name == self.tabs.value), self.views[0])
 
     def _draw_head(self, topics: set[str]) -> None:

@@ -15,8 +15,9 @@ from ee_dist.recording.records import DIAGNOSIS, REPAIR, RunRecord
 from ee_dist.tasks.config import ConfigError
 from ee_dist.viewing import story
 from ee_dist.workbench import charts
+from ee_dist.workbench.pages.plot import Plot
 from ee_dist.workbench.pages.robot import shown
-from ee_dist.workbench.pages.view import heading, quiet
+from ee_dist.workbench.pages.view import dress, heading, quiet
 
 EVERY_S = 2.0
 
@@ -85,7 +86,7 @@ class RecoveryPage:
 
     def build(self) -> None:
         self.client = ui.context.client
-        ui.add_css(Path(__file__).with_name("style.css"))
+        dress()
         with ui.element("main").classes("bench"), ui.column().classes("w-full gap-3"):
             with ui.element("header").classes("card"):
                 self.title = ui.label("").style("font-weight:600")
@@ -93,16 +94,16 @@ class RecoveryPage:
             with ui.element("div").classes("two"):
                 with ui.element("section").classes("card"):
                     heading("How far it went, trial by trial")
-                    self.distance = ui.plotly(charts.course([], "m")).classes("w-full")
+                    self.distance = Plot(charts.course([], "m"))
                 with ui.element("section").classes("card"):
                     heading("What it believes has changed")
                     self.beliefs = ui.column().classes("gap-1").mark("beliefs")
                 with ui.element("section").classes("card"):
                     heading("Repair: best distance by generation")
-                    self.repair = ui.plotly(charts.course([], "m")).classes("w-full")
+                    self.repair = Plot(charts.course([], "m"))
                 with ui.element("section").classes("card"):
                     heading("Diagnosis: least error by generation")
-                    self.diagnosis = ui.plotly(charts.course([], "error")).classes("w-full")
+                    self.diagnosis = Plot(charts.course([], "error"))
             with ui.element("section").classes("card"):
                 heading("Robot and ghost")
                 ui.button("Show in 3-D", icon="view_in_ar", on_click=self._show).props("outline no-caps")
@@ -131,7 +132,7 @@ class RecoveryPage:
         self.state.set_text(
             f"{running}; {len(trials)} trials, {len(run.generations)} generations. {self.followed.note}"
         )
-        self.distance.update_figure(
+        self.distance.draw(
             charts.course(
                 [("measured", [t.log.travel_m for t in trials], charts.MEASURED)], "m", places=[t.name for t in trials]
             )
@@ -142,7 +143,7 @@ class RecoveryPage:
         )
         for plot, phase, unit, colour in courses:
             own: Any = [g.best for g in run.generations if g.phase == phase]
-            plot.update_figure(charts.course([(phase, own, colour)], unit))
+            plot.draw(charts.course([(phase, own, colour)], unit))
         self.beliefs.clear()
         with self.beliefs:
             for k, r in sorted(story.beliefs(run).items()):

@@ -6,13 +6,23 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 from html import escape
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from nicegui import ui
 
 from ee_dist.workbench.pages.desk import Desk
+from ee_dist.workbench.pages.plot import preload
 
 T = TypeVar("T")
+SHEETS = [Path(__file__).with_name(name) for name in ("base.css", "style.css")]
+
+
+def dress() -> None:
+    """The looks of a page, and what its charts need, in its head."""
+    for sheet in SHEETS:
+        ui.add_css(sheet)
+    ui.add_head_html(preload())
 
 
 async def of(future: Future[T]) -> T:
@@ -46,7 +56,8 @@ class Latest(Generic[T]):
 
 
 class View:
-    """A tab of the page. ``topics``: what it shows; drawn when one of them changed and the tab is in sight."""
+    """A tab of the page. ``topics``: what it shows; drawn when one of them changed and the tab is in sight. ``panel``: where it
+    goes."""
 
     name = ""
     icon = ""
@@ -55,6 +66,15 @@ class View:
     def __init__(self, page: Desk) -> None:
         self.page, self.session = page, page.session
         self.stale: set[str] = set(self.topics)
+        self.panel: ui.column | None = None
+        self._set_up = False
+
+    def set_up(self) -> None:
+        """Build it in its panel, when it first comes to the front."""
+        if self.panel is not None and not self._set_up:
+            self._set_up = True
+            with self.panel:
+                self.build()
 
     def build(self) -> None:
         """Make the elements."""

@@ -10,6 +10,7 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.tasks.results.labels import axis_of, drawn
 from ee_dist.workbench import charts
 from ee_dist.workbench.bench import Step
+from ee_dist.workbench.pages.plot import Plot
 from ee_dist.workbench.pages.view import View, heading, quiet
 
 
@@ -24,7 +25,7 @@ class WatchView(View):
                 "Squares: on data that the values were not fitted to. Circles: where they were fitted. A hand that watches "
                 "the error has seen all the data, so what it sets (diamonds) has no held-out error: judge and fit it to get one."
             )
-            self.plot = ui.plotly(charts.ladder((), 1.0)).classes("w-full")
+            self.plot = Plot()
             self.steps = ui.column().classes("w-full gap-0").mark("ladder")
 
     async def draw(self, topics: set[str]) -> None:
@@ -34,7 +35,7 @@ class WatchView(View):
         ladder, problem = session.bench.ladder, session.sight.problem
         told, floor = problem.told, drawn(problem, session.seen.found.noise_floor)
         shown = [replace(s, error_fit=drawn(problem, s.error_fit), error_heldout=_drawn(problem, s)) for s in ladder]
-        self.plot.update_figure(charts.ladder(shown, floor, axis_of(problem)))
+        self.plot.draw(charts.ladder(shown, floor, axis_of(problem)))
         self.steps.clear()
         with self.steps:
             for s in ladder:
