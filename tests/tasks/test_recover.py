@@ -32,7 +32,7 @@ KEYS = {
 def finished(tmp_path_factory, tiny):
     """One small run of scenario 8, as a user starts it."""
     folder = tmp_path_factory.mktemp("run")
-    command = [sys.executable, "-m", "ee_dist", "+scenario=8", "evaluator=serial", *tiny]
+    command = [sys.executable, "-m", "ee_dist", "+scenario=8", "evaluator=serial", *tiny, "budget.polish=1"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     (summary,) = folder.glob("logs/recover/*/summary.json")
