@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hydra._internal.hydra import Hydra
 
 # Under every import mode of pytest.
 sys.path.insert(0, str(Path(__file__).parent))
@@ -40,6 +41,15 @@ class Outcome:
         return json.loads((run / "summary.json").read_text())
 
 
+_mode = Hydra.get_mode
+
+
+def mode_of(hydra: Hydra, config_name: str | None, overrides: list[str]) -> Any:
+    """Hydra composes all settings once to learn hydra.mode, and again to run: half of what it takes to refuse a mistake.
+    Where a command line says nothing of Hydra there is no such setting."""
+    return _mode(hydra, config_name, overrides) if any("hydra" in word for word in overrides) else None
+
+
 @pytest.fixture
 def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
     """``cli("+scenario=8", ...)``: each call runs in a folder of its own."""
@@ -50,6 +60,7 @@ def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFi
         folder.mkdir()
         monkeypatch.chdir(folder)
         monkeypatch.setattr(sys, "argv", ["ee_dist", *arguments])
+        monkeypatch.setattr(Hydra, "get_mode", mode_of)
         capfd.readouterr()
         try:
             status = main()
