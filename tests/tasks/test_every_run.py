@@ -59,20 +59,19 @@ def test_the_runs_of_a_sweep_go_side_by_side_with_the_same_digests(cli, tiny):
     assert len(digests[0]) == 2
 
 
-@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
-def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny, engine):
-    """A generation in any chunks, and once with polish, the largest batch of a run, by what is least alike."""
+@pytest.mark.parametrize(("engine", "workers"), [("pybullet", 1), ("mujoco", 2)])
+def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny, engine, workers):
+    """A generation in any pieces, and once with polish, the largest batch of a run."""
     base = ["+scenario=3", f"engine={engine}", *tiny, "budget.compensating_trials=1"]
+    here, elsewhere = ["evaluator=serial"], ["evaluator=ray", "evaluator.workers=3", "evaluator.cache=false"]
     same = [
-        ["evaluator=serial"],
-        in_threes := ["evaluator=serial", "evaluator.cache=false", "evaluator.chunk=3"],
-        ["evaluator=ray", "evaluator.workers=1"],
-        ["evaluator=ray", "evaluator.workers=2", "evaluator.chunk=1"],
-        in_three_processes := ["evaluator=ray", "evaluator.workers=3", "evaluator.cache=false"],
+        here,
+        ["evaluator=serial", "evaluator.cache=false", "evaluator.chunk=3"],
+        ["evaluator=ray", f"evaluator.workers={workers}", "evaluator.chunk=1"],
+        elsewhere,
     ]
     digests = {cli(*base, *extra).summary()["result_digest"] for extra in same}
     assert len(digests) == 1
-    both = in_three_processes, in_threes
-    polished = {cli(*base, "budget.polish=1", *extra).summary()["result_digest"] for extra in both}
+    polished = {cli(*base, "budget.polish=1", *extra).summary()["result_digest"] for extra in (elsewhere, here)}
     assert len(polished) == 1 and polished != digests
-    assert cli(*base, "evaluator=serial", "seed=1").summary()["result_digest"] not in digests
+    assert cli(*base, *here, "seed=1").summary()["result_digest"] not in digests
