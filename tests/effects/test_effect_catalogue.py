@@ -25,7 +25,7 @@ from ee_dist.trials.log import SensorLog
 
 ROBOTS = {r.name: r for r in (quadruped(), servo_pendulum(), linear_stage())}
 NAMES = tuple(CATALOGUE)
-STEPS = 300
+STEPS, LONG = 150, 300
 WEIGHTS = tuple(np.random.default_rng(7).uniform(-1, 1, weight_count(8, 8)))
 SILENT_ALONE = {"missed_touch"}
 
@@ -43,13 +43,17 @@ def neutral(effect: Effect, target: str) -> Term:
     return term(effect.name, target, **effect.neutral_values())
 
 
-@pytest.fixture(scope="module")
-def logs(pybullet: PyBulletEngine) -> dict[Term, SensorLog]:
+def walked(engine: PyBulletEngine, steps: int) -> dict[Term, SensorLog]:
     """The quadruped walking on one network under every corner of every effect at every target, in one go."""
     robot = quadruped()
     terms = [t for e in CATALOGUE.values() for target in e.targets(robot) for t in corners(e, robot, target)]
-    found = pybullet.rollout([Rollout(apply(robot, (t,)), Network(WEIGHTS), STEPS, 1, pose=True) for t in terms])
+    found = engine.rollout([Rollout(apply(robot, (t,)), Network(WEIGHTS), steps, 1, pose=True) for t in terms])
     return dict(zip(terms, found, strict=True))
+
+
+@pytest.fixture(scope="module")
+def logs(pybullet: PyBulletEngine) -> dict[Term, SensorLog]:
+    return walked(pybullet, STEPS)
 
 
 @pytest.fixture(scope="module")
@@ -105,15 +109,25 @@ def test_every_effect_does_nothing_at_its_neutral_values(name: str, pybullet: Py
         assert same(log, found[0]), target
 
 
+def check_finite(t: Term, log: SensorLog) -> None:
+    assert log.finite, t
+    assert log.base_pose is not None
+    assert np.isfinite(log.base_pose).all(), t
+    # A robot that a step has blown up is finite too, but not where robots walk.
+    assert np.abs(log.base_pose[:, 2]).max() < 0.5, t
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_every_effect_stays_finite_at_its_bounds(name: str, logs: dict[Term, SensorLog]) -> None:
     for t, log in logs.items():
         if t.effect == name:
-            assert log.finite, t
-            assert log.base_pose is not None
-            assert np.isfinite(log.base_pose).all(), t
-            # A robot that a step has blown up is finite too, but not where robots walk.
-            assert np.abs(log.base_pose[:, 2]).max() < 0.5, t
+            check_finite(t, log)
+
+
+@pytest.mark.slow
+def test_every_effect_stays_finite_at_its_bounds_for_twice_as_long(pybullet: PyBulletEngine) -> None:
+    for t, log in walked(pybullet, LONG).items():
+        check_finite(t, log)
 
 
 @pytest.mark.parametrize("name", NAMES)

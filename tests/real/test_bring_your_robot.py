@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import subprocess
 import sys
@@ -15,12 +17,14 @@ sys.path.insert(0, str(ROOT / "tests" / "tasks"))
 
 from schemas import validated  # noqa: E402
 
+from ee_dist.__main__ import main  # noqa: E402
+
 FAULT = "coulomb_friction@elbow:torque_nm=0.35"
 QUICK = ("engine=mujoco", "evaluator=serial", "task.rerun=false")
 
 
-def run(*arguments: str, fails: bool = False) -> str:
-    """A command of the page; its output, or its complaint."""
+def run(*arguments: str) -> None:
+    """A program in a process of its own, as a reader of the page starts it."""
     done = subprocess.run(
         [sys.executable, *arguments],
         cwd=ROOT,
@@ -29,12 +33,26 @@ def run(*arguments: str, fails: bool = False) -> str:
         check=False,
         env=os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)},
     )
-    assert (done.returncode != 0) == fails, done.stderr
-    return done.stderr if fails else done.stdout
+    assert done.returncode == 0, done.stderr
+
+
+def job(*arguments: str) -> tuple[int, str]:
+    """The same program without a new process, which takes longer to load than most commands to run: status and complaint."""
+    said, before = io.StringIO(), sys.argv
+    sys.argv = ["ee_dist", *arguments]
+    with contextlib.chdir(ROOT), contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+        try:
+            status = main()
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        finally:
+            sys.argv = before
+    return status, said.getvalue()
 
 
 def task(out: Path, *arguments: str) -> dict[str, Any]:
-    run("-m", "ee_dist", *arguments, f"hydra.run.dir={out}")
+    status, said = job(*arguments, f"hydra.run.dir={out}")
+    assert status == 0, said
     return validated(out / "summary.json")
 
 
@@ -43,7 +61,9 @@ def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("arm")
     run("tools/make_arm_csv.py", "--out", str(folder / "csv"), "--fault", FAULT)
     mapping = "task.mapping=docs/examples/arm_csv.yaml"
-    found = task(folder / "import", "task=import", f"measured={folder / 'csv'}", mapping)
+    out = folder / "import"
+    run("-m", "ee_dist", "task=import", f"measured={folder / 'csv'}", mapping, f"hydra.run.dir={out}")
+    found = validated(out / "summary.json")
     assert [t["trial"] for t in found["trials"]] == ["run1", "run2"]
     assert all(t["resampled"] and not t["suspicious"] for t in found["trials"])
     return folder
@@ -77,9 +97,8 @@ def test_mistakes_are_one_line(imported: Path, tmp_path: Path) -> None:
     lines = (imported / "csv" / "run1.csv").read_text().splitlines()
     broken.write_text("\n".join([lines[0].replace("q2_deg", "q2"), *lines[1:]]))
     mapping = "task.mapping=docs/examples/arm_csv.yaml"
-    said = run(
-        "-m", "ee_dist", "task=import", f"measured={broken}", mapping, f"hydra.run.dir={tmp_path / 'a'}", fails=True
-    )
+    status, said = job("task=import", f"measured={broken}", mapping, f"hydra.run.dir={tmp_path / 'a'}")
+    assert status == 2
     assert "no column 'q2_deg'; did you mean" in said
     assert len(said.strip().splitlines()) == 1
     assert not list((tmp_path / "a").glob("*.mcap*"))

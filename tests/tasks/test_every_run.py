@@ -8,6 +8,8 @@ from itertools import cycle
 import pytest
 
 METRICS = ("rolling_mean", "distance")
+POLISHED = 8
+"""The scenario whose diagnoses are polished too, by either metric: what is tried there is the same for all."""
 
 
 @pytest.mark.parametrize(("scenario", "metric"), [*zip(range(1, 14), cycle(METRICS), strict=False), (8, METRICS[0])])
@@ -16,6 +18,7 @@ def test_every_scenario_runs_with_either_metric(cli, scenario, metric):
         f"+scenario={scenario}", f"metric={metric}", "evaluator=serial", "budget=quick", "budget.population=4",
         "budget.generations=1", "budget.diagnosis_population=4", "budget.diagnosis_generations=1", "budget.crossovers=1",
         "budget.compensating_trials=1", "budget.steps=62", "budget.tournament=2",
+        f"budget.polish={int(scenario == POLISHED)}",
     )  # fmt: skip
     assert outcome.status == 0, outcome.err
     assert outcome.summary()["scenario"] == scenario
@@ -56,16 +59,19 @@ def test_the_runs_of_a_sweep_go_side_by_side_with_the_same_digests(cli, tiny):
     assert len(digests[0]) == 2
 
 
-@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
-def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny, engine):
+@pytest.mark.parametrize(("engine", "workers"), [("pybullet", 1), ("mujoco", 2)])
+def test_one_digest_wherever_it_runs_and_another_for_another_seed(cli, tiny, engine, workers):
+    """A generation in any pieces, and once with polish, the largest batch of a run."""
     base = ["+scenario=3", f"engine={engine}", *tiny, "budget.compensating_trials=1"]
+    here, elsewhere = ["evaluator=serial"], ["evaluator=ray", "evaluator.workers=3", "evaluator.cache=false"]
     same = [
-        ["evaluator=serial"],
+        here,
         ["evaluator=serial", "evaluator.cache=false", "evaluator.chunk=3"],
-        ["evaluator=ray", "evaluator.workers=1"],
-        ["evaluator=ray", "evaluator.workers=2", "evaluator.chunk=1"],
-        ["evaluator=ray", "evaluator.workers=3", "evaluator.cache=false"],
+        ["evaluator=ray", f"evaluator.workers={workers}", "evaluator.chunk=1"],
+        elsewhere,
     ]
     digests = {cli(*base, *extra).summary()["result_digest"] for extra in same}
     assert len(digests) == 1
-    assert cli(*base, "evaluator=serial", "seed=1").summary()["result_digest"] not in digests
+    polished = {cli(*base, "budget.polish=1", *extra).summary()["result_digest"] for extra in (elsewhere, here)}
+    assert len(polished) == 1 and polished != digests
+    assert cli(*base, *here, "seed=1").summary()["result_digest"] not in digests

@@ -28,11 +28,16 @@ KEYS = {
 }  # fmt: skip
 
 
+PASSES = 2
+"""Compensating trials, each after a diagnosis: the second is of more trials than the first, as all later ones are."""
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory, tiny):
     """One small run of scenario 8, as a user starts it."""
     folder = tmp_path_factory.mktemp("run")
-    command = [sys.executable, "-m", "ee_dist", "+scenario=8", "evaluator=serial", *tiny]
+    command = [sys.executable, "-m", "ee_dist", "+scenario=8", "evaluator=serial", *tiny, "budget.polish=1",
+               f"budget.compensating_trials={PASSES}"]  # fmt: skip
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     (summary,) = folder.glob("logs/recover/*/summary.json")
@@ -42,9 +47,9 @@ def finished(tmp_path_factory, tiny):
 def test_summary_has_the_documented_keys(finished):
     _, _, summary = finished
     assert set(summary) >= KEYS
-    assert len(summary["distance_m"]["trials"]) == 4
-    assert len(summary["hypotheses"]) == 4
-    assert [len(f) for f in summary["fitness"]] == [3] * 5
+    assert len(summary["distance_m"]["trials"]) == PASSES
+    assert len(summary["hypotheses"]) == PASSES
+    assert [len(f) for f in summary["fitness"]] == [3] * (PASSES + 1)
     assert summary["truth"][0] == {"effect": "part_lost", "target": "upper_rear_left", "values": {}}
     counts = summary["evaluations"]
     assert counts["simulated"] < counts["asked"]
@@ -72,13 +77,13 @@ def test_plain_mcap_lists_every_trial_and_hypothesis(finished):
         for _, channel, _, _ in reader.iter_decoded_messages():
             counts[channel.topic] = counts.get(channel.topic, 0) + 1
         names = {a.name for a in reader.iter_attachments()}
-    assert counts["/hardware/trial"] == 6, "intact, after the change, four compensating"
-    assert counts["/prediction/trial"] == 6, "each forecast by the pass that chose its controller"
-    assert counts["/hindsight/trial"] == 4, "each diagnosed"
-    assert counts["/hardware/rows"] == 6 * 80
-    assert counts["/repair/generation"] == 5 * 3
-    assert counts["/diagnosis/generation"] == 4 * 3
-    assert counts["/diagnosis/hypothesis"] >= 4 * (3 + 1)
+    assert counts["/hardware/trial"] == PASSES + 2, "intact, after the change, the compensating ones"
+    assert counts["/prediction/trial"] == PASSES + 2, "each forecast by the pass that chose its controller"
+    assert counts["/hindsight/trial"] == PASSES, "each diagnosed"
+    assert counts["/hardware/rows"] == (PASSES + 2) * 80
+    assert counts["/repair/generation"] == (PASSES + 1) * 3
+    assert counts["/diagnosis/generation"] == PASSES * 3
+    assert counts["/diagnosis/hypothesis"] >= PASSES * (3 + 1)
     assert {"robot.json", "config.yaml"} <= names
 
 
@@ -87,7 +92,7 @@ def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
     folder, out, summary = finished
     believed = [tuple(from_dict({"effect": t["effect"], "target": t["target"], **t["values"]}) for t in h)
                 for h in summary["hypotheses"]]  # fmt: skip
-    assert len(believed) == 4
+    assert len(believed) == PASSES
 
     with (folder / "recovery.mcap").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
@@ -99,12 +104,12 @@ def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
     assert [m.error for m in final] == summary["diagnosis_error"]
     assert {m.stage for m in messages} == {"evolving", "evolved", "polished", "pruned"}
     stages = [{m.stage: m.error for m in messages if m.pass_index == k and not m.rank and m.stage != "evolving"}
-              for k in range(4)]  # fmt: skip
+              for k in range(PASSES)]  # fmt: skip
     assert stages == summary["diagnosis_stages"]
 
     run = read_run(folder / "recovery.mcap")
     acted_on = {t.index: t.believed for t in run.trials if t.source == PREDICTION}
-    assert [acted_on[k + 2] for k in range(4)] == believed, "the model of the next controller is the one believed"
+    assert [acted_on[k + 2] for k in range(PASSES)] == believed, "the model of the next controller is the one believed"
 
     scene = documents(folder / "recovery.rrd")["/texts/result"]
     rows = re.findall(r"^- Diagnosis \d \(error (\S+), as evolved \S+\): (.*)$", scene, re.MULTILINE)
@@ -125,7 +130,7 @@ def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
         if line[column:].strip() and folded:
             folded[-1].append(line[column:].strip())
     cells = [" ".join(words) for words in folded if set("".join(words)) != {"─"}]
-    assert cells[1:5] == [told(h).replace("; ", " ") for h in believed], "after the intact robot's"
+    assert cells[1 : PASSES + 1] == [told(h).replace("; ", " ") for h in believed], "after the intact robot's"
 
 
 def test_the_recipes_of_the_page_on_recordings_tell_the_same(finished, tmp_path, monkeypatch, capsys):
@@ -161,7 +166,7 @@ def test_the_recorded_trials_are_what_the_hardware_did(finished):
     truth = [from_dict(t) for t in json.loads(run.metadata["truth"])]
     hardware = {t.index: t for t in run.trials if t.source == HARDWARE}
     engine = PyBulletEngine()
-    for index in (1, 5):
+    for index in (1, PASSES + 1):
         recorded = hardware[index]
         (again,) = engine.rollout([Rollout(apply(run.robot, truth), recorded.driver, len(recorded.log), pose=True)])
         assert again.sensors.tobytes() == recorded.log.sensors.tobytes()
@@ -170,7 +175,7 @@ def test_the_recorded_trials_are_what_the_hardware_did(finished):
     assert [round(t.log.base_pose[-1, 0] - t.log.base_pose[0, 0], 12) for t in hardware.values()][2:] == [
         round(m, 12) for m in summary["distance_m"]["trials"]
     ]
-    assert {t.index for t in run.trials if t.source == PREDICTION} == set(range(6))
+    assert {t.index for t in run.trials if t.source == PREDICTION} == set(range(PASSES + 2))
     assert {g.phase for g in run.generations} == {REPAIR, DIAGNOSIS}
 
 

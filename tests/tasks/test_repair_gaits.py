@@ -32,7 +32,7 @@ def own_ray():
 
 def test_a_run_tells_its_map_and_has_one_digest_wherever_it_runs(cli, tiny, own_ray):
     close_evaluators()  # what runs before this one simulated is not simulated again
-    outcome = cli(*GAITS, *tiny, "evaluator=serial")
+    outcome = cli(*tiny, *GAITS, "evaluator=serial")
     assert outcome.status == 0, outcome.err
     summary = outcome.summary()
     repair = summary["repair"]
@@ -47,15 +47,15 @@ def test_a_run_tells_its_map_and_has_one_digest_wherever_it_runs(cli, tiny, own_
     assert {g.phase for g in run.generations} == {REPAIR, DIAGNOSIS, MAP}
     assert [g.generation for g in run.generations if g.phase == MAP] == [0, 1, 2]
     assert "map of the intact robot: best" in outcome.out
-    again = cli(*GAITS, *tiny, "evaluator=ray", "evaluator.workers=2", "evaluator.chunk=3").summary()
+    again = cli(*tiny, *GAITS, "evaluator=ray", "evaluator.workers=2", "evaluator.chunk=3").summary()
     assert again["result_digest"] == summary["result_digest"]
     assert (
-        cli(*GAITS, *tiny, "evaluator=serial", "repair.bins=2").summary()["config_digest"] != summary["config_digest"]
+        cli(*tiny, *GAITS, "evaluator=serial", "repair.bins=2").summary()["config_digest"] != summary["config_digest"]
     )
 
 
 def test_a_stopped_run_goes_on_to_the_same_bytes(cli, tiny, tmp_path, monkeypatch):
-    whole = cli(*GAITS, *tiny, "evaluator=serial", f"hydra.run.dir={tmp_path}/whole")
+    whole = cli(*tiny, *GAITS, "evaluator=serial", f"hydra.run.dir={tmp_path}/whole")
     assert whole.status == 0, whole.err
     close_evaluators()
     real, calls = SerialEvaluator.evaluate, [0]
@@ -67,9 +67,9 @@ def test_a_stopped_run_goes_on_to_the_same_bytes(cli, tiny, tmp_path, monkeypatc
         return real(self, jobs)
 
     monkeypatch.setattr(SerialEvaluator, "evaluate", evaluate)
-    assert cli(*GAITS, *tiny, "evaluator=serial", f"hydra.run.dir={tmp_path}/run").status == 1
+    assert cli(*tiny, *GAITS, "evaluator=serial", f"hydra.run.dir={tmp_path}/run").status == 1
     close_evaluators()
-    assert cli(*GAITS, *tiny, "evaluator=serial", f"resume={tmp_path}/run").status == 0
+    assert cli(*tiny, *GAITS, "evaluator=serial", f"resume={tmp_path}/run").status == 0
     one, other = (json.loads((tmp_path / n / "summary.json").read_text()) for n in ("whole", "run"))
     assert one["result_digest"] == other["result_digest"]
     assert (tmp_path / "whole" / "recovery.mcap").read_bytes() == (tmp_path / "run" / "recovery.mcap").read_bytes()

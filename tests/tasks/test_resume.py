@@ -46,7 +46,7 @@ def test_a_stopped_run_goes_on_and_ends_with_the_same_bytes(cli, tiny, tmp_path,
     real = PhysicalRobot.trial
     monkeypatch.setattr(PhysicalRobot, "trial", lambda self, *a: (made.append(self.trials), real(self, *a))[1])
     stopping(10**9)
-    assert cli(*FAST, *tiny, f"hydra.run.dir={tmp_path}/whole").status == 0
+    assert cli(*tiny, *FAST, f"hydra.run.dir={tmp_path}/whole").status == 0
     assert len(made) == 3
     made.clear()
     out = tmp_path / "run"
@@ -54,7 +54,7 @@ def test_a_stopped_run_goes_on_and_ends_with_the_same_bytes(cli, tiny, tmp_path,
     where = f"hydra.run.dir={out}"
     for after in (2, 1, 3, 2, 3, 10**9):
         stopping(after)
-        outcome = cli(*FAST, *tiny, where)
+        outcome = cli(*tiny, *FAST, where)
         statuses.append(outcome.status)
         where = f"resume={out}"
     assert statuses == [1, 1, 1, 1, 1, 0]
@@ -64,7 +64,7 @@ def test_a_stopped_run_goes_on_and_ends_with_the_same_bytes(cli, tiny, tmp_path,
     assert resumed["result_digest"] == whole["result_digest"]
     assert (out / "recovery.mcap").read_bytes() == (tmp_path / "whole" / "recovery.mcap").read_bytes()
     assert not (out / "unfinished").exists()
-    again = cli(*FAST, *tiny, where)
+    again = cli(*tiny, *FAST, where)
     assert (again.status, len(made)) == (0, 3)
     assert "finished already" in again.out
 
@@ -72,14 +72,14 @@ def test_a_stopped_run_goes_on_and_ends_with_the_same_bytes(cli, tiny, tmp_path,
 def test_what_cannot_be_resumed_is_said_in_one_line(cli, tiny, tmp_path, stopping):
     out = tmp_path / "run"
     stopping(2)
-    assert cli(*FAST, *tiny, f"hydra.run.dir={out}").status == 1
+    assert cli(*tiny, *FAST, f"hydra.run.dir={out}").status == 1
     kept = sorted(p.name for p in (out / "unfinished").iterdir())
     assert kept == ["run.json", "simulated.bin"]
     stopping(10**9)
     for arguments, said in (
-        ((*FAST, *tiny, "seed=3", f"resume={out}"), "the run there has other settings (seed=0)"),
-        ((*FAST, *tiny, f"resume={tmp_path}/nowhere"), "no run was begun there"),
-        ((*FAST, *tiny, f"hydra.run.dir={out}"), "holds something already"),
+        ((*tiny, *FAST, "seed=3", f"resume={out}"), "the run there has other settings (seed=0)"),
+        ((*tiny, *FAST, f"resume={tmp_path}/nowhere"), "no run was begun there"),
+        ((*tiny, *FAST, f"hydra.run.dir={out}"), "holds something already"),
     ):
         outcome = cli(*arguments)
         assert outcome.status == 2
@@ -90,9 +90,9 @@ def test_what_cannot_be_resumed_is_said_in_one_line(cli, tiny, tmp_path, stoppin
     content = json.loads((out / "unfinished" / "run.json").read_text())
     content["versions"]["mujoco"] = "0.1"
     (out / "unfinished" / "run.json").write_text(json.dumps(content))
-    assert "it was begun with mujoco 0.1, here is" in cli(*FAST, *tiny, f"resume={out}").err
+    assert "it was begun with mujoco 0.1, here is" in cli(*tiny, *FAST, f"resume={out}").err
     (out / "unfinished" / "run.json").write_text("[" * 9)
-    assert "is damaged" in cli(*FAST, *tiny, f"resume={out}").err
+    assert "is damaged" in cli(*tiny, *FAST, f"resume={out}").err
 
 
 @pytest.mark.slow
@@ -127,7 +127,7 @@ def test_explain_and_improve_go_on_where_they_stopped(cli, tmp_path, stopping, v
 
 
 def test_a_sweep_goes_on_where_it_stopped(cli, tiny, tmp_path, stopping):
-    sweep = ("-m", *FAST[1:], *tiny, "+scenario=1,9")
+    sweep = ("-m", *tiny, *FAST[1:], "+scenario=1,9")
     stopping(when=lambda: any((tmp_path / "sweep").rglob("summary.json")))
     assert cli(*sweep, f"hydra.sweep.dir={tmp_path}/sweep").status == 1
     (done,) = (tmp_path / "sweep").rglob("summary.json")
