@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ee_dist.discrepancy.ways.force_balance.balance import Balance
 from ee_dist.discrepancy.ways.force_balance.motion import Processing
 from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
+from ee_dist.discrepancy.ways.force_balance.weight import weightless
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.measurements.sampling import decimated
@@ -174,14 +176,17 @@ class ForceBalance(Problem):
             lines += describe(self.remains(hypothesis, k), unit, "m" if unit == "N" else "rad")
         return lines
 
-    @property
+    @cached_property
     def notes(self) -> list[str]:
+        light = weightless(self.models, self.balances, self.size)
+        found = [light] if light else []
         if self.processing.keep_every <= self.asked.keep_every:
-            return []
+            return found
         step_s = float(np.median(np.diff(self.measured[0].log.times_s)))
         return [
+            *found,
             f"The positions are so noisy that they were smoothed more than usual: motion and forces above "
-            f"{0.5 / (self.processing.keep_every * step_s):.2g} Hz are not compared."
+            f"{0.5 / (self.processing.keep_every * step_s):.2g} Hz are not compared.",
         ]
 
     def noise_floor(self) -> tuple[float, str]:
