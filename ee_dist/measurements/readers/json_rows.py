@@ -51,18 +51,20 @@ def read_json(file: Path, options: Options) -> tuple[Recorded, ...]:
 def _are_trials(entries: Any) -> bool:
     """Whether entries are trials with columns rather than rows: lists in each that are equally long, and longer than a robot
     has joints or of another length in the next."""
-    if not all(isinstance(e, Mapping) for e in entries):
-        return False
-    found = [_longest(_flat(e)) for e in entries]
-    if any(len(columns) < 2 for columns in found):
-        return False
+    found = []
+    for entry in entries:
+        found.append(_longest(_flat(entry)) if isinstance(entry, Mapping) else {})
+        if len(found[-1]) < 2:
+            return False
     lengths = {len(next(iter(columns.values()))) for columns in found}
-    return min(lengths) >= LONG or (len(lengths) > 1 and min(lengths) > 1)
+    return bool(lengths) and (min(lengths) >= LONG or (len(lengths) > 1 and min(lengths) > 1))
 
 
 def _longest(flat: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """The longest lists of an entry, but for those of texts."""
-    lists = {k: v for k, v in flat.items() if isinstance(v, list) and v and not any(isinstance(c, str) for c in v)}
+    """The longest lists of an entry, but for those of texts and of further entries."""
+    lists = {
+        k: v for k, v in flat.items() if isinstance(v, list) and v and not any(isinstance(c, (str, Mapping)) for c in v)
+    }
     most = max(map(len, lists.values()), default=0)
     return {k: v for k, v in lists.items() if len(v) == most}
 
