@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from way_samples import measured, problem_by, samples
 
+from ee_dist.discrepancy.account import compare_account
 from ee_dist.discrepancy.compare import circumstances, compare
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
@@ -35,14 +36,16 @@ def trials_without_weight(robot: Robot, trials: tuple[MeasuredTrial, ...]) -> tu
     return tuple(out)
 
 
-def test_torques_that_carry_no_weight_are_told() -> None:
+def test_torques_that_carry_no_weight_are_told_before_anything_is_believed() -> None:
     robot, trials = samples()["arm"].robot, measured("arm")
-    assert not [n for n in ForceBalance(trials, robot).notes if "weight" in n]
+    assert not ForceBalance(trials, robot).doubts
     light = trials_without_weight(robot, trials)
-    (said,) = [n for n in ForceBalance(light, robot).notes if "weight" in n]
-    assert "gravity_m_s2: 0" in said
+    p = ForceBalance(light, robot)
+    assert "gravity_m_s2: 0" in p.doubts
+    told = compare_account(p, compare(p, p.residuals([()])[0]), ())
+    assert any(line.startswith("Before this is believed: the measured torques do not carry") for line in told.first)
     floating = replace(robot, world=replace(robot.world, gravity_m_s2=0.0))
-    assert not ForceBalance(light, floating).notes
+    assert not ForceBalance(light, floating).doubts
 
 
 def held(trial: MeasuredTrial, every: int) -> MeasuredTrial:

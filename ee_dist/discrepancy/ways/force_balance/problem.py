@@ -177,16 +177,17 @@ class ForceBalance(Problem):
         return lines
 
     @cached_property
+    def doubts(self) -> str:
+        return weightless(self.models, self.balances, self.size)
+
+    @property
     def notes(self) -> list[str]:
-        light = weightless(self.models, self.balances, self.size)
-        found = [light] if light else []
         if self.processing.keep_every <= self.asked.keep_every:
-            return found
+            return []
         step_s = float(np.median(np.diff(self.measured[0].log.times_s)))
         return [
-            *found,
             f"The positions are so noisy that they were smoothed more than usual: motion and forces above "
-            f"{0.5 / (self.processing.keep_every * step_s):.2g} Hz are not compared.",
+            f"{0.5 / (self.processing.keep_every * step_s):.2g} Hz are not compared."
         ]
 
     def noise_floor(self) -> tuple[float, str]:

@@ -42,6 +42,6 @@ def weightless(models: Sequence[Robot], balances: Sequence[Balance], scale: Arra
     if not weighed or abs(both / weighed) > CARRIED or without_it > MOSTLY * with_it:
         return ""
     return (
-        f"The measured torques do not carry the weight that the model has ({both / weighed:.2f} of it): is gravity left out of "
+        f"the measured torques do not carry the weight that the model has ({both / weighed:.2f} of it): is gravity left out of "
         "them, as by controllers that compensate it? 'gravity_m_s2: 0' in the robot's description says so."
     )
