@@ -109,7 +109,12 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     )
     sure += f"; the noise floor is {found.floor_source}."
     settled = ratio < CLOSE and not left
-    return Account(head, error, sure, (*lines, *problem.notes), settled, CONTENT if settled else "")
+    return Account(head, error, sure, (*lines, *problem.notes), settled, _before(problem, CONTENT if settled else ""))
+
+
+def _before(problem: Problem, advice: str) -> str:
+    """The advice, and before it what is to be put right first."""
+    return " ".join(t for t in (problem.doubts and f"Before this is believed: {problem.doubts}", advice) if t)
 
 
 def _times(ratio: float) -> str:
@@ -189,7 +194,15 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
     tied = found.verdict == EFFECT and best is not None and best.tied_with
     alike = ahead is not None and ahead.separation < ENOUGH
-    return Account(head, error, sure, (*lines, *problem.notes), good, advice, planner if tied and not alike else "")
+    return Account(
+        head,
+        error,
+        sure,
+        (*lines, *problem.notes),
+        good,
+        _before(problem, advice),
+        planner if tied and not alike else "",
+    )
 
 
 def _error(problem: Problem) -> str:
@@ -296,7 +309,9 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     there = {t.name for t in found.terms}
     tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in there for r in steps)
-    return Account(head, error, sure, (*lines, *problem.notes), settled, advice, planner if tied else "")
+    return Account(
+        head, error, sure, (*lines, *problem.notes), settled, _before(problem, advice), planner if tied else ""
+    )
 
 
 def added(found: Improvement) -> list[Term]:

@@ -9,13 +9,16 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import released
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.engines.drivers import Commands
+from ee_dist.measurements.signals import change
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, SensorLog
 
 PARTED = 9.0
 """Mean square of a value, over its noise floor, at which prediction and measurement have parted."""
-MOVING_SHARE = 0.02
-"""Commanded speed, as a share of the largest one of the joint, from which a joint counts as moving."""
+MOVING_SHARE = 0.05
+"""Speed, as a share of the largest one of the joint in the trial, from which a joint counts as moving."""
+SPEED_OVER_S = 0.04
+"""Time over which a position is averaged before its change is a speed; three readings at least."""
 NEAR_LIMIT = 0.8
 """Share of half the range beyond which a joint is near its limit."""
 
@@ -153,7 +156,7 @@ class Circumstances:
 
 
 def circumstances(problem: Problem, k: int) -> Circumstances:
-    """From the measured log alone: commands, and torque and touch channels where there are any."""
+    """From the measured log alone: commands, and position, torque and touch channels where there are any."""
     trial, robot = problem.measured[k], problem.robot
     log = trial.log
     sent = trial.driver.values[: len(log)] if isinstance(trial.driver, Commands) else log.commands
@@ -166,13 +169,24 @@ def circumstances(problem: Problem, k: int) -> Circumstances:
 
     feet = [i for i, s in enumerate(robot.sensors) if s.kind == "touch"]
     torques = log.torques if log.torques is not None else np.full_like(command, np.nan)
+    position = of("position", log.joints if log.joints is not None else command)
     return Circumstances(
-        of("position", log.joints if log.joints is not None else command),
-        np.gradient(command, float(np.median(np.diff(log.times_s))), axis=0),
+        position,
+        of("velocity", _change(position, log)),
         command,
         of("torque", torques),
         log.sensors[:, feet] > 0,
     )
+
+
+def _change(position: Array, log: SensorLog) -> Array:
+    """The speed (T, M) of positions. Of what was read: a command may be a torque, and one that is held from row to row stands
+    still between them."""
+    read = log.readings
+    if len(read) < 4:
+        return np.zeros_like(position)
+    speed = change(position[read], float(np.median(np.diff(log.times_s[read]))), SPEED_OVER_S)
+    return np.stack([np.interp(log.times_s, log.times_s[read], s) for s in speed.T], axis=1)
 
 
 def rows_of(problem: Problem, k: int, times_s: Array) -> Array:

@@ -87,7 +87,7 @@ def improve(
             climb(_rung(search, judged))
     else:
         exchanges, looked, spread, anew = 0, -1, 0, 0
-        stopped = f"{most} effects were added, which is as many as task.most allows"
+        stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             others = _offered(pool, current, ladder)
             last = _examined(search, current, others, effort)

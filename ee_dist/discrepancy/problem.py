@@ -136,6 +136,11 @@ class Problem(ABC):
         """What of these measurements is not compared, or not as it was recorded, and why: every verb says so."""
         return []
 
+    @property
+    def doubts(self) -> str:
+        """What about these measurements is to be put right before anything that is found in them is believed; empty: nothing."""
+        return ""
+
     @cached_property
     def trials(self) -> tuple[str, ...]:
         return tuple(t.name for t in self.measured)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.folders import own_names
 from ee_dist.measurements.mapping import Clock, Mapping
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.table import Recorded, Table
@@ -25,17 +26,17 @@ def trials_of(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
         found = _joined(files, mapping)
     else:
         found = []
+        names = own_names(files)
         for file in files:
             several = read(file, mapping.reading)
             for r in several:
-                found += _split(_named(r, file, len(files) > 1 and bool(r.name)), mapping)
+                found += _split(_named(r, names[file], len(files) > 1 and bool(r.name)), mapping)
     if len(found) > MOST_TRIALS:
         raise MeasurementError(f"{files[0]}: {len(found)} trials; at most {MOST_TRIALS} at once: name fewer files")
     return found
 
 
-def _named(recorded: Recorded, file: Path, both: bool) -> Recorded:
-    own = file.stem if file.suffix else file.name
+def _named(recorded: Recorded, own: str, both: bool) -> Recorded:
     return replace(recorded, name=f"{own} {recorded.name}" if both else recorded.name or own)
 
 
@@ -85,30 +86,37 @@ def _short(cell: str) -> str:
 
 def _joined(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
     """Trials whose tables are files of their own, matched by what stands at {trial} in their names."""
-    tables: dict[str, dict[str, Table]] = {}
+    parts: dict[Path, tuple[str, str]] = {}
     for file in files:
         for name, clock in mapping.tables.items():
             found = _pattern(clock).fullmatch(file.name)
             if found:
-                several = read(file, mapping.reading)
-                if len(several) > 1 or len(several[0].tables) > 1:
-                    raise MeasurementError(f"{file}: holds several tables or trials; expected one for {quoted(name)}")
-                trial = found["trial"]
-                tables.setdefault(trial, {})[name] = replace(several[0].tables[0], name=name)
+                parts[file] = (found["trial"], name)
                 break
-    if not tables:
+    if not parts:
         shapes = ", ".join(c.file for c in mapping.tables.values())
         raise MeasurementError(f"{mapping.source}: tables: none of the {len(files)} files is named like {shapes}")
+    # Where the names alone do not tell trials apart, each folder is one.
+    apart = len(set(parts.values())) < len(parts)
+    tables: dict[tuple[Path | None, str], dict[str, Table]] = {}
+    for file, (trial, name) in parts.items():
+        several = read(file, mapping.reading)
+        if len(several) > 1 or len(several[0].tables) > 1:
+            raise MeasurementError(f"{file}: holds several tables or trials; expected one for {quoted(name)}")
+        key = (file.parent if apart else None, trial)
+        tables.setdefault(key, {})[name] = replace(several[0].tables[0], name=name)
+    folders = own_names([f for f, _ in tables if f is not None])
     out = []
-    for trial, parts in tables.items():
+    for (folder, trial), halves in tables.items():
         for name, clock in mapping.tables.items():
-            if name not in parts:
-                there = next(iter(parts.values())).path
+            if name not in halves:
+                there = next(iter(halves.values())).path
                 raise MeasurementError(
                     f"{there}: its other half is missing: no {clock.file.replace('{trial}', trial)} beside it "
                     f"for {quoted(name)}; name the folder, or both files"
                 )
-        out.append(Recorded(trial.strip("_- .") or trial or "trial", tuple(parts[n] for n in mapping.tables)))
+        own = " ".join(w for w in (folders[folder] if folder else "", trial.strip("_- .")) if w)
+        out.append(Recorded(own or trial or "trial", tuple(halves[n] for n in mapping.tables)))
     return out
 
 

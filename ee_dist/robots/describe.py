@@ -133,7 +133,7 @@ def _of_file(kind: str, data: Mapping[str, Any], folder: Path, where: str) -> tu
 
 def robot_of(name: str, source: str | None = None, drives: str | None = None) -> tuple[Robot, tuple[str, ...]]:
     """The robot of three settings: a name or file; or ``urdf`` or ``mjcf`` with the file ``source`` and the description
-    ``drives`` that goes with it.
+    ``drives`` that goes with it, which may itself name a file of either kind.
 
     Raises RobotError.
     """
@@ -148,7 +148,7 @@ def robot_of(name: str, source: str | None = None, drives: str | None = None) ->
     data = dict(_yaml(path))
     if source is not None:
         data[name] = str(Path(source).resolve())
-    if name not in data:
+    if not any(kind in data for kind in READERS):
         setting = "robot.urdf" if name == "urdf" else "robot.file"
         raise RobotError(f"{path}: names no {name.upper()}; add '{name}: FILE' or give {setting}=FILE")
     return _described(data, path.parent, str(path))

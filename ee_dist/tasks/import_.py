@@ -20,6 +20,7 @@ from rich.table import Table
 from ee_dist.basics.files import write_whole
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.folders import recordings_in
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping
 from ee_dist.measurements.mapping_file import read_mapping
@@ -69,9 +70,9 @@ def run(config: Config, options: Options, out: Path) -> None:
             raise ConfigError(f"task.{given[0]}= is for an import without a mapping; write it into {options.mapping}")
         mapping = read_mapping(options.mapping)
         robot, notes = robot_of_mapping(mapping, config)
-        files = files_of(config.measured, mapping.reading.kind)
+        files, left = files_of(config.measured, mapping.reading.kind)
     else:
-        files = files_of(config.measured)
+        files, left = files_of(config.measured)
         robot, notes = robot_of(config.robot.name, config.robot.urdf, config.robot.drives)
         if not robot.drives:
             raise ConfigError(
@@ -79,6 +80,7 @@ def run(config: Config, options: Options, out: Path) -> None:
             )
         proposal = proposal_for(files, robot, hints)
         mapping = written(proposal, config, files, out, console)
+    notes = (*notes, *left)
     found = import_files(files, mapping, robot)
     reports = [report for _, report in found]
     text = describe(reports)
@@ -183,8 +185,8 @@ def sources_of(mapping: Mapping, config: Config) -> str:
     return sources_text(named, more=robot.drives or robot.name)
 
 
-def files_of(measured: Any, kind: str | None = None) -> list[Path]:
-    """The files that ``measured`` names: one, several, or all of a readable format in a folder, by name.
+def files_of(measured: Any, kind: str | None = None) -> tuple[list[Path], list[str]]:
+    """The files that ``measured`` names: one, several, or all of a readable format in a folder, by name. And notes.
 
     Raises MeasurementError where there are none.
     """
@@ -192,20 +194,22 @@ def files_of(measured: Any, kind: str | None = None) -> list[Path]:
         raise MeasurementError("measured=: which file? name one, several as [a.csv,b.csv], or a folder")
     names = measured if isinstance(measured, (list, tuple)) else [measured]
     files: list[Path] = []
+    notes: list[str] = []
     for name in names:
         path = Path(str(name))
         if path.is_dir() and kind_of(path) is None:
-            inside = sorted(f for f in path.iterdir() if kind_of(f) is not None and kind in (None, kind_of(f)))
+            inside, remarks = recordings_in(path, kind)
             if not inside:
                 wanted = [s for s, k in FORMATS.items() if kind in (None, k)]
                 raise MeasurementError(f"{path}: no file to import in this folder; expected {', '.join(wanted)}")
             files += inside
+            notes += remarks
         else:
             files.append(path)
     twice = [f for k, f in enumerate(files) if f.resolve() in [g.resolve() for g in files[:k]]]
     if twice:
         raise MeasurementError(f"measured={twice[0]}: the same file twice; name each once")
-    return files
+    return files, notes
 
 
 def digest_of(records: list[TrialRecord]) -> str:

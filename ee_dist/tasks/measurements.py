@@ -58,6 +58,7 @@ def load(config: Config) -> Measurements:
     runs = [read_run(f) for f in files]
     robot = runs[0].robot
     trials: list[MeasuredTrial] = []
+    short: list[tuple[str, SensorLog]] = []
     for file, run in zip(files, runs, strict=True):
         _same_robot(file, run, robot)
         found = [t for t in run.trials if t.source == HARDWARE]
@@ -65,10 +66,18 @@ def load(config: Config) -> Measurements:
             raise LogError(f"{file}: no hardware trial in it; expected a log of task=trial or task=import")
         held = _held(file, run)
         for t in found:
+            if len(t.log.readings) < FEWEST_ROWS:
+                short.append((f"{file}, {t.name}", t.log))
+                continue
             # What an import says about a trial (a gain, a payload) comes on top of how it was held.
             setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
             trials.append(MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup))
+    if not trials:
+        raise LogError(_too_short(*short[0]))
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
+    if short:
+        more = f", and {len(short) - 1} more as short" if len(short) > 1 else ""
+        remarks.append(f"Left out: {_too_short(*short[0])}{more}.")
     if config.model is None:
         # By name only where the name says all: a log may bring sensors of its own, or a body with other numbers.
         named = robot.name in BUILT_IN and not differences(BUILT_IN[robot.name](), robot)
@@ -142,8 +151,7 @@ def _of_others(path: Path) -> bool:
 def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
     """The log with its channels in the robot's order. Raises LogError in one line for what cannot be compared."""
     if len(log.readings) < FEWEST_ROWS:
-        what = "rows" if log.filled is None else "readings"
-        raise LogError(f"{where}: {len(log.readings)} {what}; at least {FEWEST_ROWS} are needed")
+        raise LogError(_too_short(where, log))
     _names(where, "joint", log.motor_names, robot.motor_names)
     _names(where, "channel", log.sensor_names, robot.sensor_names)
     order = [log.sensor_names.index(n) for n in robot.sensor_names]
@@ -175,6 +183,11 @@ def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
         commands=np.array(log.commands[:, motors]),
         motor_names=robot.motor_names,
     )
+
+
+def _too_short(where: str, log: SensorLog) -> str:
+    what = "rows" if log.filled is None else "readings"
+    return f"{where}: {len(log.readings)} {what}; at least {FEWEST_ROWS} are needed"
 
 
 def _names(where: str, what: str, have: Sequence[str], want: Sequence[str]) -> None:

@@ -36,7 +36,9 @@ def account(tied: list[str], explained: float = 1.0) -> Account:
         tried=9,
         as_it_was=False,
     )
-    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[])
+    problem = SimpleNamespace(
+        robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts=""
+    )
     return explain_account(problem, found, None)  # type: ignore[arg-type]
 
 
@@ -105,6 +107,7 @@ def compared(error: float, left: list[Leftover]) -> Account:
         natural_name="error",
         natural_unit="mm",
         notes=[],
+        doubts="",
         channels=("a_b",),
         trials=("sway",),
     )
@@ -145,7 +148,9 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         held_out="motions that were not fitted", alternatives=[],
     )  # fmt: skip
     start = SimpleNamespace(added=(), dropped=(), tied_with=[], error_heldout=5.0, held_out="", name="")
-    problem = SimpleNamespace(robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[])
+    problem = SimpleNamespace(
+        robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts=""
+    )
     for verdict, share, said in (
         (EXPLAINED, 1.0, "Nothing else is left above the noise."),
         (BETTER, 0.9979, "More than noise is left on motions that were not fitted: 99.7 % of"),

@@ -25,6 +25,9 @@ NEARLY = 12
 """Power of a correlation: 0.99 counts 0.89, and 0.9 counts 0.28."""
 ALIKE = 0.5
 """Share of one another that the ratios of speed and change of position have at all joints, or it is chance."""
+EMPTY = 0.2
+"""Share of a column's cells that may be empty and yet be filled by straight lines: what a logger skips now and then, or reads
+in turn with something else."""
 SILENT = Reading(None, None, None, None, "", False, False)
 """What a name says that says nothing."""
 _GENERAL = frozenset(["joint", "link", "motor", "axis", "drive", "servo", "arm", "robot", "j"])
@@ -62,15 +65,26 @@ def joint_words(joints: Sequence[str]) -> dict[str, frozenset[str]]:
     return {j: (w - shared - _GENERAL) or (w - shared) or w for j, w in all_words.items()}
 
 
-def series_of(table: Table) -> dict[str, Array]:
-    """Every column of finite numbers, by address."""
+def series_of(table: Table, filled: bool = False) -> dict[str, Array]:
+    """Every column of finite numbers, by address; ``filled``: with those of which a few cells are empty, on lines between."""
     found: dict[str, Array] = {}
     for address in table.addresses():
         try:
-            found[address] = table.numbers(address)
+            values = table.numbers(address, gaps=filled)
         except MeasurementError:
             continue
+        good = np.isfinite(values)
+        if not good.all():
+            if good.mean() < 1 - EMPTY or good.sum() < 2:
+                continue
+            values = np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+        found[address] = values
     return found
+
+
+def empty_cells(table: Table, column: str) -> int:
+    """How many cells of a column of numbers are empty."""
+    return int(np.isnan(table.numbers(column, gaps=True)).sum())
 
 
 def blocks_of(
@@ -80,7 +94,7 @@ def blocks_of(
     the column of the time by table."""
     found: list[Block] = []
     for table in recorded.tables:
-        series = {a: v for a, v in series_of(table).items() if a != times.get(table.name)}
+        series = {a: v for a, v in series_of(table, filled=True).items() if a != times.get(table.name)}
         words = joint_words(joints)
         families: dict[str, list[tuple[str, Reading, str | None]]] = {}
         for address in series:

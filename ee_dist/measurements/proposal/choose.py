@@ -38,7 +38,11 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     v.blocks = [v.even(b) for b in blocks_of(timed, v.robot.motor_names, order, known) if len(b.values) > 20]
     position = v.pick(ranked_positions(v))
     if position is None:
+        _time_choice(v, timed.tables[0].name)
         ask_for_positions(v)
+        v.out.choices += [
+            Choice("commands", m, {"column": "???"}, UNKNOWN, "not looked for yet") for m in robot.motor_names
+        ]
         return v.out
     v.position = position
     v.position.block.used = True

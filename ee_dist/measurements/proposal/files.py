@@ -53,6 +53,10 @@ def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Tabl
         kinds.setdefault(tuple(table.columns), []).append((file, table))
     if len(kinds) < 2 or len({len(v) for v in kinds.values()}) != 1:
         return None
+    stems = [{f.stem for f, _ in v} for v in kinds.values()]
+    if all(len(s) == 1 for s in stems):
+        # A folder for each trial, in which the files are always called the same.
+        return {f.stem: (f"{f.stem}{{trial}}{f.suffix}", t) for (f, t), *_ in kinds.values()}
     words = [set.intersection(*({w.lower() for w in _CUT.split(f.stem)} for f, _ in v)) for v in kinds.values()]
     out: dict[str, tuple[str, Table]] = {}
     for k, members in enumerate(kinds.values()):

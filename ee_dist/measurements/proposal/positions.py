@@ -57,7 +57,11 @@ def ask_for_positions(v: View) -> None:
             "with the joints in the order of the columns, else write them into the mapping"
         )
     else:
-        v.out.ask(f"no columns look like the positions of {names}; write them into the mapping")
+        mute = [b.name for b in v.blocks if v.moves(b) and b.reading.command is None and b.reading.kind is None]
+        asked = f"; is it {' or '.join(mute[:3])}?" if mute else ";"
+        v.out.ask(
+            f"no columns are called the positions of {names}{asked} write the right ones into the mapping, with their unit"
+        )
     for m in v.robot.sensors:
         v.out.choices.append(Choice("sensors", m.name, {"column": "???"}, UNKNOWN, "not found"))
 

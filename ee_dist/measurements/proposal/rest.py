@@ -39,7 +39,7 @@ def add_switches(v: View) -> None:
     left: list[str] = []
     for table in v.recorded.tables:
         place = {"table": table.name} if len(v.recorded.tables) > 1 else {}
-        for name, values in series_of(table).items():
+        for name, values in series_of(table, filled=True).items():
             if name in used or name == table.clock:
                 continue
             words = set(tokens(name))

@@ -39,15 +39,17 @@ def add_speeds(v: View) -> None:
     positions = v.sensor_names("position")
     if chosen is None:
         able = [s.block.name for s in found if s.score >= 3]
-        why = (
-            f"{' or '.join(able)} could be it: estimated from the position"
-            if able
-            else "no column: estimated from the position"
-        )
+        poor = [s for s in found if s.block.reading.kind == SPEED and not s.block.reading.weak and v.moves(s.block)]
+        why = "no column: estimated from the position"
+        if able:
+            why = f"{' or '.join(able)} could be it: estimated from the position"
+        elif poor:
+            fit = abs(v.derivative(v.position.block, poor[0].block).correlation)
+            why = f"{poor[0].block.name} hardly is the change of the positions (correlation {fit:.2f}): estimated from them"
         for name, of in zip(names, positions, strict=True):
             if name and of:
                 entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / v.step(v.position.block), 3))}
-                v.out.choices.append(Choice("sensors", name, entry, LIKELY if able else SURE, why))
+                v.out.choices.append(Choice("sensors", name, entry, LIKELY if able or poor else SURE, why))
         return
     chosen.block.used = True
     v.add("sensors", names, chosen.block, speed_units(v, chosen.block), chosen.why)

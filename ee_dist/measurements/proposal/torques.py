@@ -13,7 +13,7 @@ from ee_dist.measurements.proposal.blocks import BY_NUMBER, BY_PLACE, Block
 from ee_dist.measurements.proposal.model import FIT, LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.view import Scored, View
-from ee_dist.measurements.proposal.words import CURRENT, TORQUE
+from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE
 from ee_dist.measurements.units import UNITS
 from ee_dist.robots.instruments import MOTOR_TORQUE
 from ee_dist.trials.log import Array
@@ -90,6 +90,13 @@ def add_torques(v: View) -> None:
                 if n:
                     v.out.choices.append(Choice("sensors", n, {"column": "???"}, UNKNOWN, "not found"))
         return
+    if chosen.block.reading.kind == CURRENT and v.hints.gains is None and not any(sensed) and _led(v):
+        # A robot that is led by its commands is compared without torques.
+        v.out.notes.append(
+            f"motor currents ({chosen.block.name}) are left out; with task.gains=[N.m per A, one for each joint], or "
+            f"task.gains={FIT}, they are the torques of a balance of forces"
+        )
+        return
     chosen.block.used = True
     units = torque_units(v, chosen.block)
     _check_order(v, chosen.block)
@@ -97,6 +104,13 @@ def add_torques(v: View) -> None:
     if any(sensed):
         v.add("sensors", sensed, chosen.block, units, chosen.why, level)
     v.add("torques", list(v.robot.motor_names), chosen.block, units, chosen.why, level)
+
+
+def _led(v: View) -> bool:
+    """Whether drives obey positions or speeds, and columns are called commands of such."""
+    kinds = {d.command for d in v.robot.drives if d.command != "none"}
+    asked = {b.reading.kind for b in v.blocks if b.reading.command and v.moves(b)}
+    return bool(kinds) and kinds <= asked & {POSITION, SPEED}
 
 
 def _as_current(v: View, block: Block) -> tuple[float, list[str]]:
@@ -167,6 +181,7 @@ def torque_units(v: View, block: Block) -> UnitChoice:
     if current and not gains:
         return UnitChoice((), UNKNOWN, "a current whose gain cannot be estimated")
     entries, turned, unclear, checked = [], [], [], 0
+    sizes: list[float] = []
     for k, unit in enumerate(kinds):
         stated = block.units[k] if block.units else None
         entry: dict[str, Any] = {"unit": stated if stated in ("N.m", "mN.m", "N", "mN") else unit}
@@ -180,8 +195,7 @@ def torque_units(v: View, block: Block) -> UnitChoice:
                 entry["unit"] = f"m{unit}"
                 size *= 1e-3
             checked += 0.3 < size < 3
-            if not 0.05 < size < 20:
-                return UnitChoice((), UNKNOWN, f"{size:.3g} times what the motion needs in {entry['unit']}")
+            sizes.append(size)
         if relations is not None and relations[k].correlation < -0.4:
             # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
             r = relations[k]
@@ -197,6 +211,9 @@ def torque_units(v: View, block: Block) -> UnitChoice:
             else:
                 unclear.append(v.joints[k].name)
         entries.append(entry)
+    # A unit is that of all joints: at one alone friction may be many times what a slow motion needs.
+    if sizes and not 0.05 < float(np.median(sizes)) < 20:
+        return UnitChoice((), UNKNOWN, f"{np.median(sizes):.3g} times what the motion needs in {entries[0]['unit']}")
     said = (
         "current times a gain estimated from what the motion needs"
         if v.hints.gains == FIT

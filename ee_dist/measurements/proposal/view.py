@@ -9,7 +9,7 @@ import numpy as np
 
 from ee_dist.measurements import signals
 from ee_dist.measurements.alignment import match, one_epoch
-from ee_dist.measurements.proposal.blocks import BY_NAME, BY_NUMBER, BY_PLACE, Block
+from ee_dist.measurements.proposal.blocks import BY_NAME, BY_NUMBER, BY_PLACE, Block, empty_cells
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.time import TimeChoice
 from ee_dist.measurements.proposal.units import UnitChoice
@@ -20,6 +20,8 @@ from ee_dist.trials.log import Array
 
 TIED = 1.0
 """Scores closer than this are no decision."""
+ROUNDED = 0.6
+"""Steps of the coarser column by which two that hold one reading may differ: it was rounded when it was written."""
 
 
 @dataclass
@@ -88,16 +90,15 @@ class View:
         return signals.lead(values, measured.values, self.step(measured))
 
     def pick(self, found: list[Scored], least: float = 2.0) -> Scored | None:
-        """The best, if it is good enough and clearly before the next; equal numbers are no rivals."""
+        """The best, if it is good enough and clearly before the next. The same reading twice is no rival of itself: of counts
+        and what a logger made of them, the one whose name states a unit is taken."""
         if not found or found[0].score < least:
             return None
-        for rival in found[1:]:
-            same = rival.block.values.shape == found[0].block.values.shape and np.allclose(
-                rival.block.values, found[0].block.values
-            )
-            if found[0].score - rival.score < TIED and not same:
-                return None
-        return found[0]
+        close = [s for s in found if found[0].score - s.score < TIED]
+        if not all(_same_reading(s.block, found[0].block) for s in close):
+            return None
+        stated = [s for s in close if s.block.unit is not None and s.score >= least]
+        return stated[0] if found[0].block.unit is None and stated else found[0]
 
     def moves(self, b: Block) -> bool:
         return any(signals.moves(c) for c in b.values.T)
@@ -112,7 +113,8 @@ class View:
 
     def entry(self, block: Block, k: int, more: dict[str, Any]) -> dict[str, Any]:
         place = {"table": block.table.name} if len(self.recorded.tables) > 1 else {}
-        return place | {"column": block.columns[k]} | more
+        gaps = {"gaps": "interpolate"} if empty_cells(block.table, block.columns[k]) else {}
+        return place | {"column": block.columns[k]} | more | gaps
 
     def add(
         self, group: str, names: list[str], block: Block, units: UnitChoice, why: list[str], sure: str = SURE
@@ -125,7 +127,9 @@ class View:
                 continue
             more = units.entries[k] if units.entries else {"unit": "???"}
             still = "; does not move" if not signals.moves(block.values[:, k]) else ""
-            self.out.choices.append(Choice(group, name, self.entry(block, k, more), level, text + still))
+            empty = empty_cells(block.table, block.columns[k])
+            filled = f"; {empty} of {len(block.table)} cells are empty, filled by straight lines" if empty else ""
+            self.out.choices.append(Choice(group, name, self.entry(block, k, more), level, text + still + filled))
 
     def sensor_names(self, kind: str) -> list[str]:
         """The sensor of a kind at each driven joint, "" where there is none."""
@@ -148,6 +152,32 @@ class View:
         assert self.hints.gains is not None and not isinstance(self.hints.gains, str)
         order = list(self.hints.joints or self.robot.motor_names)
         return [float(self.hints.gains[order.index(m)]) for m in self.robot.motor_names]
+
+
+def _same_reading(a: Block, b: Block) -> bool:
+    """Whether two blocks are equal, or one is the other by a scale and an offset at each joint, to within its own steps."""
+    if a.values.shape == b.values.shape and np.allclose(a.values, b.values):
+        return True
+    if a.table is not b.table or len(a.columns) != len(b.columns):
+        return False
+    pairs = [
+        (a.table.numbers(x, gaps=True), a.table.numbers(y, gaps=True))
+        for x, y in zip(a.columns, b.columns, strict=True)
+    ]
+    return all(_rounded(x, y) or _rounded(y, x) for x, y in pairs)
+
+
+def _rounded(fine: Array, coarse: Array) -> bool:
+    """Whether ``coarse`` (T,) is ``fine`` (T,) in another unit, in whole steps; empty cells (NaN) at the same rows."""
+    good = np.isfinite(fine)
+    if not np.array_equal(good, np.isfinite(coarse)):
+        return False
+    fine, coarse = fine[good], coarse[good]
+    steps = np.diff(np.unique(coarse))
+    if not signals.moves(fine) or not len(steps):
+        return False
+    slope, offset = np.polyfit(fine, coarse, 1)
+    return bool(np.abs(coarse - slope * fine - offset).max() <= ROUNDED * steps.min())
 
 
 def can_be(b: Block, kind: str) -> bool:

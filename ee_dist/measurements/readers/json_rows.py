@@ -1,4 +1,4 @@
-"""JSON: a header and a list of rows, a list of rows alone, columns by name, or one row a line."""
+"""JSON: a header and a list of rows, a list of rows alone, columns by name, one row a line, or a list of trials of columns."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from ee_dist.measurements.table import Recorded, Table
 
 DEEPEST = 6
 """Mappings inside a row are columns of their own, ``state.q``, down to this depth."""
+LONG = 40
+"""Numbers in a list from which it is a column rather than what all joints had in a row."""
 TEXT_BYTES = 8
 """What a byte of JSON takes in memory once it is read, at most."""
 
 
 def read_json(file: Path, options: Options) -> tuple[Recorded, ...]:
-    """One trial with one table. Raises MeasurementError."""
+    """One trial with one table, or several such. Raises MeasurementError."""
     bounded(file, file.stat().st_size * TEXT_BYTES, "convert it to Parquet")
     data = _parsed(file)
     header: dict[str, Any] = {}
@@ -41,7 +43,45 @@ def read_json(file: Path, options: Options) -> tuple[Recorded, ...]:
         header = {str(k): v for k, v in data.items() if k != name}
     elif not (isinstance(data, list) and data and isinstance(data[0], Mapping)):
         raise MeasurementError(f"{file}: no list named {quoted(options.records)} in it; the file is not a mapping")
+    if _are_trials(rows):
+        return tuple(_trial(file, k, entry, header) for k, entry in enumerate(rows))
     return (Recorded("", (Table(file, _columns(file, rows), header),)),)
+
+
+def _are_trials(entries: Any) -> bool:
+    """Whether entries are trials with columns rather than rows: lists in each that are equally long, and longer than a robot
+    has joints or of another length in the next."""
+    found = []
+    for entry in entries:
+        found.append(_longest(_flat(entry)) if isinstance(entry, Mapping) else {})
+        if len(found[-1]) < 2:
+            return False
+    lengths = {len(next(iter(columns.values()))) for columns in found}
+    return bool(lengths) and (min(lengths) >= LONG or (len(lengths) > 1 and min(lengths) > 1))
+
+
+def _longest(flat: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """The longest lists of an entry, but for those of texts and of further entries."""
+    lists = {
+        k: v for k, v in flat.items() if isinstance(v, list) and v and not any(isinstance(c, (str, Mapping)) for c in v)
+    }
+    most = max(map(len, lists.values()), default=0)
+    return {k: v for k, v in lists.items() if len(v) == most}
+
+
+def _trial(file: Path, index: int, entry: Mapping[str, Any], header: Mapping[str, Any]) -> Recorded:
+    """An entry as a trial: its long lists are columns, the rest says something of it. It is counted, for kinds come again."""
+    flat = _flat(entry)
+    columns = _longest(flat)
+    rest = {k: v for k, v in flat.items() if k not in columns}
+    word = next((v for v in rest.values() if isinstance(v, str) and v), "")
+    return Recorded(f"{word} {index + 1}".strip(), (Table(file, columns, {**header, **rest}),))
+
+
+def _flat(entry: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    _flatten(entry, "", flat, 0)
+    return flat
 
 
 def _parsed(file: Path) -> Any:

@@ -152,7 +152,7 @@ def signature_section(
         angle = "m" if problem.robot.joint(problem.robot.motor_names[j or 0]).kind == "slide" else "rad"
         for label, key in (
             (f"position ({angle})", "position"),
-            (f"commanded speed ({angle}/s)", "speed"),
+            (f"speed ({angle}/s)", "speed"),
             (f"command ({angle})", "command"),
             (f"load ({'N' if angle == 'm' else 'N.m'})", "load"),
         ):

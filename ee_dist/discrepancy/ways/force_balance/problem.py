@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ee_dist.discrepancy.ways.force_balance.balance import Balance
 from ee_dist.discrepancy.ways.force_balance.motion import Processing
 from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
+from ee_dist.discrepancy.ways.force_balance.weight import weightless
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.measurements.sampling import decimated
@@ -173,6 +175,10 @@ class ForceBalance(Problem):
         for k, unit in enumerate(self.layout.units):
             lines += describe(self.remains(hypothesis, k), unit, "m" if unit == "N" else "rad")
         return lines
+
+    @cached_property
+    def doubts(self) -> str:
+        return weightless(self.models, self.balances, self.size)
 
     @property
     def notes(self) -> list[str]:
