@@ -51,7 +51,12 @@ def test_an_import_estimates_gains_from_what_the_motion_needs_and_says_so(tmp_pa
         table[f"{motor}_current_A"] = log.torques[:, k] / per_ampere
         table[f"{motor}_goal_rad"] = log.commands[:, k]
     table.to_csv(tmp_path / "a.csv", index=False)
-    asked = proposal_for([tmp_path / "a.csv"], sample.robot, Hints())
+    left_out = proposal_for([tmp_path / "a.csv"], sample.robot, Hints())
+    assert not left_out.questions, "a robot led by its commands is compared without torques"
+    assert any("are left out" in n and "task.gains=fit" in n for n in left_out.notes)
+    unled = table[[c for c in table if not c.endswith("_goal_rad")]]
+    unled.to_csv(tmp_path / "b.csv", index=False)
+    asked = proposal_for([tmp_path / "b.csv"], sample.robot, Hints())
     assert any("task.gains=fit" in q for q in asked.questions)
     found = proposal_for([tmp_path / "a.csv"], sample.robot, Hints(gains=FIT))
     assert not found.questions

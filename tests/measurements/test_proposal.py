@@ -183,6 +183,11 @@ def test_nothing_unknown_goes_without_a_question(tmp_path: Path) -> None:
     absurd = base | odd_files.spread("vel{}", m["w"]) | odd_files.spread("tau{} (Nm)", 60 * m["tau"])
     (question,) = proposal_for(odd_files.csv(absurd)(tmp_path), odd_files.robot(), Hints()).questions
     assert "times what the motion needs in N.m" in question
+    # At one joint alone: friction may be that of a slow motion many times over, another unit it is not.
+    for times, asked in ((40.0, False), (1000.0, True)):
+        one = base | odd_files.spread("vel{}", m["w"]) | odd_files.spread("tau{} (Nm)", m["tau"] * [1.0, times, 1.0])
+        questions = proposal_for(odd_files.csv(one)(tmp_path), odd_files.robot(), Hints()).questions
+        assert any("what the motion needs in N.m at shoulder" in q for q in questions) == asked, times
 
 
 @pytest.mark.parametrize(("size", "question"), [(1.0, ""), (odd_files.DEG, "degrees, or many turns in rad")])

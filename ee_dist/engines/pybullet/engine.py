@@ -19,9 +19,9 @@ from ee_dist.trials.log import Array, SensorLog
 
 WORLD_SIZES = (8, 4, 2, 1)
 """Robots a world. Eight share the cost of a call well; more cost Bullet's collision pairs."""
-WORLDS = 16
+WORLDS = 8
 """Worlds in a batch at most: robots that each lack another part need one each, and each takes some 30 MB."""
-POOL = 16
+POOL = 8
 """Worlds kept for reuse, beyond which the longest unused are closed."""
 Kind = tuple[str, tuple[float, float, float]]
 """What robots must share to stand in one world: structure and gravity."""

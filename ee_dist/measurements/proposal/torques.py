@@ -24,6 +24,8 @@ LEAST_SEEN = 0.5
 """Correlation with what the motion needs from which a gain can be estimated."""
 CLEARLY, WELL = 0.3, 0.3
 """Another order of the joints is asked for if it leaves less than this share of what the robot's leaves, and of all."""
+FAR_OFF = 300.0
+"""Times what the motion needs at a joint that friction does not explain: a unit of its own does."""
 
 
 def _needed(v: View, places: list[int] | None = None) -> tuple[Array, Array] | None:
@@ -181,7 +183,7 @@ def torque_units(v: View, block: Block) -> UnitChoice:
     if current and not gains:
         return UnitChoice((), UNKNOWN, "a current whose gain cannot be estimated")
     entries, turned, unclear, checked = [], [], [], 0
-    sizes: list[float] = []
+    sizes: dict[int, float] = {}
     for k, unit in enumerate(kinds):
         stated = block.units[k] if block.units else None
         entry: dict[str, Any] = {"unit": stated if stated in ("N.m", "mN.m", "N", "mN") else unit}
@@ -195,7 +197,7 @@ def torque_units(v: View, block: Block) -> UnitChoice:
                 entry["unit"] = f"m{unit}"
                 size *= 1e-3
             checked += 0.3 < size < 3
-            sizes.append(size)
+            sizes[k] = size
         if relations is not None and relations[k].correlation < -0.4:
             # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
             r = relations[k]
@@ -212,8 +214,13 @@ def torque_units(v: View, block: Block) -> UnitChoice:
                 unclear.append(v.joints[k].name)
         entries.append(entry)
     # A unit is that of all joints: at one alone friction may be many times what a slow motion needs.
-    if sizes and not 0.05 < float(np.median(sizes)) < 20:
-        return UnitChoice((), UNKNOWN, f"{np.median(sizes):.3g} times what the motion needs in {entries[0]['unit']}")
+    middle = float(np.median(list(sizes.values()))) if sizes else 1.0
+    if not 0.05 < middle < 20:
+        return UnitChoice((), UNKNOWN, f"{middle:.3g} times what the motion needs in {entries[0]['unit']}")
+    for k, size in sizes.items():
+        if not 1 / FAR_OFF < size < FAR_OFF:
+            unit = entries[k]["unit"]
+            return UnitChoice((), UNKNOWN, f"{size:.3g} times what the motion needs in {unit} at {v.joints[k].name}")
     said = (
         "current times a gain estimated from what the motion needs"
         if v.hints.gains == FIT
