@@ -37,7 +37,8 @@ def evaluator() -> CachedEvaluator:
 def log_of(rows: int, every: int = 1) -> SensorLog:
     filled = np.arange(rows) % every > 0
     zeros = np.zeros((rows, 1))
-    return SensorLog(0.004 * np.arange(rows), zeros, zeros.copy(), ("q",), ("rad",), ("m",), filled=filled if every > 1 else None)  # fmt: skip
+    log = SensorLog(0.004 * np.arange(rows), zeros, zeros.copy(), ("q",), ("rad",), ("m",))
+    return log if every == 1 else replace(log, filled=filled)
 
 
 def test_readings_are_as_far_apart_as_those_of_the_log_that_was_read_most_seldom() -> None:

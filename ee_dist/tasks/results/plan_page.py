@@ -61,7 +61,8 @@ def account_of(
     ]
     if every_s:
         lines.append(
-            f"Predicted of sensors that are read every {1000 * every_s:.3g} ms, as in the measurements: read more often, they tell more."
+            f"Predicted of sensors that are read every {1000 * every_s:.3g} ms, as in the measurements: read more often, they "
+            "tell more."
         )
     if found.alike and found.enough:
         pairs = [f"{names[a]} and {names[b]}" for a, b in found.alike]
