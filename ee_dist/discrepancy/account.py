@@ -304,11 +304,15 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     return Account(head, error, sure, (*lines, *problem.notes), good, advice, planner if tied else "", warnings)
 
 
+def _many_times(ratio: float) -> str:
+    return "more than 100 times" if ratio > 100 else f"{ratio:.0f} times"
+
+
 def odd_text(odd: OddOne, robot: Robot) -> str:
     """What a calibration hides, if the robot that it was made on was not in order."""
     what = "joints" if odd.term.target == odd.joint else "sensors"
     return (
-        f"Calibrated away at {plain(odd.term.target)}: {much(odd.term, robot)}, {odd.times:.2g} times what its like {what} "
+        f"Calibrated away at {plain(odd.term.target)}: {much(odd.term, robot)}, {_many_times(odd.times)} what its like {what} "
         "have: if this robot was not in order, this hides it."
     )
 

@@ -20,7 +20,7 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, known
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
-from ee_dist.discrepancy.search.slopes import follow_slopes
+from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.effects.groups import like_joints, members_of
 from ee_dist.robots.model import Robot
@@ -32,13 +32,13 @@ DEVIATIONS = 5.0
 """Robust standard deviations of its mates' values from which one is none of them,"""
 TIMES = 4.0
 """how many times as large as theirs it must be,"""
-SHARE = 0.3
+SHARE = 0.125
 """and the share of what is left above the noise without it that it must account for: where much is a little off everywhere,
 one of many values is always the largest."""
 ALIKE = 0.05
 """Share by which the numbers of like drives may differ."""
-WIDTHS = (0.12, 0.04)
-"""Finite differences of the fit, as shares of a value's room."""
+ITERATIONS, WIDTHS = 4, (0.12,)
+"""Of the fit, and its first finite difference as a share of a value's room."""
 FAMILIES = ("drive", "sensing")
 """Of effects that like joints, and sensors at them, have alike."""
 SIGMA_OF_MAD, HALF_WIDTH = 1.4826, 1.96
@@ -82,7 +82,9 @@ def calibrated_away(
     best: dict[str, OddOne] = {}
     for rest in dict.fromkeys(r.rest for r in rows):
         mine, on = [r for r in rows if r.rest == rest], search.on(rest)
-        fits = follow_slopes(on, [(Model(r.parts), r.start) for r in mine], search.everything, WIDTHS, PRIOR)
+        starts = [(Model(r.parts), r.start) for r in mine]
+        # Down the valley: large errors are softened, and there a plain slope says too little of a value and of how sure it is.
+        fits = follow_valley(on, starts, search.everything, PRIOR, ITERATIONS, WIDTHS)
         for row, fit in zip(mine, fits, strict=True):
             for odd in _odd(on, row, fit):
                 if odd.joint not in best or odd.share > best[odd.joint].share:
@@ -142,7 +144,7 @@ def _odd(search: Search, row: _Row, fit: Fit) -> Iterator[OddOne]:
         if len(mates) < FEWEST - 1:
             continue
         middle = float(np.median(off[mates]))
-        spread = SIGMA_OF_MAD * float(np.median(np.abs(off[mates] - middle)))
+        spread = _spread(off[mates] - middle)
         floor = max(float(np.median(error[mates])), float(error[k]), 1e-12)
         typical = max(float(np.median(np.abs(off[mates]))), floor)
         away, times = abs(float(off[k]) - middle) / max(spread, floor), abs(float(off[k])) / typical
@@ -159,6 +161,13 @@ def _odd(search: Search, row: _Row, fit: Fit) -> Iterator[OddOne]:
                 tuple(row.parts[i].target for i in mates),
                 share,
             )
+
+
+def _spread(away: Array) -> float:
+    """Standard deviation of a few values ``away`` (N,) from their middle, of which one may be odd too. The median absolute
+    deviation of seven is small by luck too often to stand alone."""
+    near = np.sort(np.abs(away))[:-1]
+    return max(SIGMA_OF_MAD * float(np.median(np.abs(away))), float(np.sqrt(np.mean(near**2))))
 
 
 def _share(search: Search, row: _Row, fit: Fit, k: int, middle: float) -> float:
