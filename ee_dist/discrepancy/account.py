@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
@@ -19,6 +20,7 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import (
     by_effect,
     is_less,
+    much,
     named,
     percent,
     phrase,
@@ -56,7 +58,7 @@ class Account:
     """``headline``: what was found, where, how much of it, and whether more is left. ``error``: of the models, beside the
     noise floor. ``sure``: how sure it is. ``advice``: what to do next, where a command does not say it. ``lines``: what speaks
     for it and what stays open. ``good``: whether the question is settled. ``planner``: the command that finds the trial which
-    tells apart what is tied, where something is."""
+    tells apart what is tied, where something is. ``warnings``: what may make all of it wrong."""
 
     headline: str
     error: str
@@ -65,12 +67,13 @@ class Account:
     good: bool
     advice: str = ""
     planner: str = ""
+    warnings: tuple[str, ...] = ()
 
     @property
     def first(self) -> list[str]:
         """What comes below the headline before anything else."""
         planned = f"{PLAN} {self.planner}" if self.planner else ""
-        return [line for line in (self.error, self.sure, self.advice, planned) if line]
+        return [line for line in (*self.warnings, self.error, self.sure, self.advice, planned) if line]
 
     @property
     def words(self) -> list[str]:
@@ -309,8 +312,22 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     there = {t.name for t in found.terms}
     tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in there for r in steps)
-    return Account(
-        head, error, sure, (*lines, *problem.notes), settled, _before(problem, advice), planner if tied else ""
+    warnings = tuple(odd_text(o, robot) for o in found.odd)
+    good = settled and not warnings
+    more = (*lines, *problem.notes)
+    return Account(head, error, sure, more, good, _before(problem, advice), planner if tied else "", warnings)
+
+
+def _many_times(ratio: float) -> str:
+    return "more than 100 times" if ratio > 100 else f"{ratio:.0f} times"
+
+
+def odd_text(odd: OddOne, robot: Robot) -> str:
+    """What a calibration hides, if the robot that it was made on was not in order."""
+    what = "joints" if odd.term.target == odd.joint else "sensors"
+    return (
+        f"Calibrated away at {plain(odd.term.target)}: {much(odd.term, robot)}, {_many_times(odd.times)} what its like {what} "
+        "have: if this robot was not in order, this hides it."
     )
 
 

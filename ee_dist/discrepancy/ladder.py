@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.examine import Examined
@@ -35,7 +36,8 @@ class Rung:
 class Improvement:
     """``terms``: the final model, fitted on all data. ``verdict``: ``explained`` (nothing is left above the noise),
     ``better_not_explained``, ``unexplained`` (nothing could be added) or ``nothing_missing``; ``explained``: the share of the
-    squared error above the noise that the model takes off held-out data. ``last``: what was tried on top of it."""
+    squared error above the noise that the model takes off held-out data. ``last``: what was tried on top of it. ``odd``: of a
+    calibration, the joints whose values stand out from those of like joints (see calibrated_away.py)."""
 
     verdict: str
     explained: float
@@ -49,6 +51,7 @@ class Improvement:
     left: list[Leftover]
     stopped: str
     last: Examined | None = None
+    odd: list[OddOne] = field(default_factory=list)
 
     def ties(self, step: int) -> list[str]:
         """What the measurements do not tell from the effect that step ``step`` (from 1) of ``effect=auto`` added."""

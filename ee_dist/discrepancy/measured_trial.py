@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -92,6 +93,23 @@ def evenly_read(log: SensorLog) -> SensorLog:
         external=lines(log.external),
         filled=None,
     )
+
+
+def reading_s(trials: Iterable[MeasuredTrial]) -> float:
+    """Time from one reading of the sensors to the next, s, in the trial where that is longest; 0 where all were read in
+    every row."""
+    seldom = [t.log for t in trials if t.log.filled is not None]
+    return max((float(np.median(np.diff(log.times_s[log.readings]))) for log in seldom), default=0.0)
+
+
+def read_every(log: SensorLog, every_s: float) -> SensorLog:
+    """A simulated log as if its sensors had been read every ``every_s`` (0: in every row), from its first row on."""
+    if not every_s or len(log) < 2:
+        return log
+    rows = np.arange(0.0, len(log) - 0.5, max(1.0, every_s / float(log.times_s[1] - log.times_s[0])))
+    filled = np.ones(len(log), dtype=bool)
+    filled[np.round(rows).astype(int)] = False
+    return replace(log, filled=filled) if filled.any() else log
 
 
 def speeds_of(log: SensorLog, robot: Robot) -> Array:

@@ -4,7 +4,9 @@ A prediction is compared as the verdict will compare it: on the channels and sca
 noise and by the spread of equally good models. Explanations whose values are not settled could come nearer to one
 another once they are fitted to the new trial too: what their values make up for, within what was measured already, is no
 difference (designs that discriminate between models: Atkinson and Fedorov 1975; Buzzi-Ferraris and Forzatti 1983). And a
-difference counts as far as a bootstrap over windows of time would hold it to be more than chance.
+difference counts as far as a bootstrap over windows of time would hold it to be more than chance. Where sensors were read
+more seldom than the model steps, the trial to come is read as seldom: ``every_s`` everywhere here is the time between
+readings, s, and 0 where there is one in every row.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from itertools import combinations
 import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import bootstrap
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, read_every, setup_of
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.prediction import clean
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop, soften
@@ -45,7 +47,7 @@ LIBRARY = (
 ENOUGH = 4.0
 """Standard deviations from which a trial is expected to tell two explanations apart."""
 SHORTEST = 60
-"""Rows of a trial that can be compared: a window of the open-loop way."""
+"""Readings of a trial that can be compared: a window of the open-loop way."""
 TOGETHER = 400_000
 """Robot-steps that are simulated between two words on the progress."""
 FARTHEST = 0.5
@@ -76,12 +78,18 @@ class PlannedTrial:
 
 
 def next_trials(
-    robot: Robot, tied: Sequence[Hypothesis], evaluator: Evaluator, library: Sequence[Excitation] = LIBRARY
+    robot: Robot,
+    tied: Sequence[Hypothesis],
+    evaluator: Evaluator,
+    library: Sequence[Excitation] = LIBRARY,
+    every_s: float = 0.0,
 ) -> list[PlannedTrial]:
     """Excitations by how well they separate the hypotheses for their length, the best first."""
     if len(tied) < 2:
         return []
-    found = predicted(robot, [Contender(h) for h in tied], library, evaluator)
+    # A network in the loop reads its sensors in every row, and cannot be followed from fewer readings.
+    some = [e for e in library if not every_s or e.weights(robot) is None]
+    found = predicted(robot, [Contender(h) for h in tied], some, evaluator, every_s=every_s)
     return sorted(found, key=lambda p: -p.separation / np.sqrt(p.excitation.seconds))
 
 
@@ -93,6 +101,7 @@ def predicted(
     left: float = 1.0,
     windows: int = 0,
     progress: Progress = quiet,
+    every_s: float = 0.0,
 ) -> list[PlannedTrial]:
     """How far apart the contenders, the best first, are on each excitation, in the order given.
 
@@ -104,7 +113,7 @@ def predicted(
     size = max(1, int(TOGETHER // (models * max((e.steps(robot) for e in excitations), default=1))))
     for k in range(0, len(excitations), size):
         some = excitations[k : k + size]
-        out += _predicted(robot, contenders, some, evaluator, left, windows)
+        out += _predicted(robot, contenders, some, evaluator, left, windows, every_s)
         progress("trying motions", min(1.0, (k + size) / len(excitations)))
     return out
 
@@ -116,10 +125,11 @@ def _predicted(
     evaluator: Evaluator,
     left: float,
     windows: int,
+    every_s: float,
 ) -> list[PlannedTrial]:
     best = contenders[0].hypothesis
-    ahead = ahead_of(robot, best, excitations, evaluator)
-    usable = [k for k, t in enumerate(ahead) if t.log.finite and len(t.log) >= SHORTEST]
+    ahead = ahead_of(robot, best, excitations, evaluator, every_s)
+    usable = [k for k, t in enumerate(ahead) if t.log.finite and len(t.log.readings) >= SHORTEST]
     none = tuple(0.0 for _ in combinations(contenders, 2))
     out = [PlannedTrial(e, 0.0, none) for e in excitations]
     if not usable:
@@ -139,7 +149,11 @@ def _predicted(
 
 
 def ahead_of(
-    robot: Robot, best: Hypothesis, excitations: Sequence[Excitation], evaluator: Evaluator
+    robot: Robot,
+    best: Hypothesis,
+    excitations: Sequence[Excitation],
+    evaluator: Evaluator,
+    every_s: float = 0.0,
 ) -> list[MeasuredTrial]:
     """Trials that were not made yet, as one explanation predicts them."""
     model = apply(robot, best)
@@ -153,7 +167,7 @@ def ahead_of(
         )
     logs = evaluator.evaluate(jobs)
     return [
-        MeasuredTrial(str(e), log, driver, setup_of(e))
+        MeasuredTrial(str(e), read_every(log, every_s), driver, setup_of(e))
         for e, log, driver in zip(excitations, logs, drivers, strict=True)
     ]
 
@@ -243,9 +257,10 @@ def parting(
     pair: tuple[int, int],
     excitation: Excitation,
     evaluator: Evaluator,
+    every_s: float = 0.0,
 ) -> Parting:
     """Where ``pair`` of the explanations part most on a trial."""
-    ahead = ahead_of(robot, explanations[0], [excitation], evaluator)
+    ahead = ahead_of(robot, explanations[0], [excitation], evaluator, every_s)
     problem = OpenLoop(ahead, robot, evaluator, before=explanations[0])
     one, other = (problem.smooth(problem.residuals([explanations[k]])[0]) for k in pair)
     width, layout = len(problem.channels), problem.layout
@@ -254,7 +269,7 @@ def parting(
     segment, channel = divmod(int(np.argmax(cell)), width)
     mine = (layout.segment_of == segment) & layout.reading
     series = [next(s for s in problem.series(h) if s.channel == channel) for h in explanations]
-    half = problem.block * robot.time_step_s / 2
+    half = problem.block * (every_s or robot.time_step_s) / 2
     return Parting(
         channel,
         float(layout.time_s[mine].min()) - half,

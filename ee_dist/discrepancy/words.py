@@ -38,6 +38,11 @@ def told(term: Term, robot: Robot | None = None) -> str:
     return named(term) + (f" ({', '.join(shown)})" if shown else "")
 
 
+def much(term: Term, robot: Robot | None = None) -> str:
+    """``zero offset 0.04 rad``: what, and how much of it, without the place."""
+    return " ".join([plain(term.effect), ", ".join(_value(term, key, value, robot) for key, value in term.values)])
+
+
 def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
     if value < 0 and CATALOGUE[term.effect].parameter(key).on_top:
         return f"{-value:.3g}{_unit(term, key, robot)} less than described"

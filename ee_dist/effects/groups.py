@@ -6,6 +6,7 @@ controller. One number for all of them is a simpler explanation than one number 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from ee_dist.robots.model import Drive, Robot
@@ -25,11 +26,7 @@ def groups(robot: System) -> dict[str, tuple[str, ...]]:
     joints = robot.motor_names
     if len(joints) > 1:
         found[ALL_JOINTS] = joints
-        alike: dict[tuple[object, ...], list[str]] = {}
-        for drive in robot.drives:
-            alike.setdefault(tuple(getattr(drive, f) for f in _SETTINGS), []).append(drive.joint)
-        classes = [tuple(names) for names in alike.values() if 1 < len(names) < len(joints)]
-        found |= {JOIN.join(names): names for names in classes}
+        found |= {JOIN.join(names): names for names in like_joints(robot) if len(names) < len(joints)}
     parts = tuple(p.name for p in robot.parts[0 if robot.free_base else 1 :])
     if len(parts) > 1:
         found["all_parts"] = parts
@@ -39,6 +36,28 @@ def groups(robot: System) -> dict[str, tuple[str, ...]]:
             found[f"all_{kind}_sensors"] = names
     taken = {n for names in found.values() for n in names}
     return {name: members for name, members in found.items() if name not in taken}
+
+
+def like_joints(robot: Robot, within: float = 0.0) -> list[tuple[str, ...]]:
+    """Driven joints of equal drives, or of drives whose numbers differ by a share ``within`` at most (files that derive a gain
+    from a joint's inertia give four equal motors four numbers): each class of two or more, in the order of the robot."""
+    alike: list[list[Drive]] = []
+    for drive in robot.drives:
+        mates = next((c for c in alike if _alike(c[0], drive, within)), None)
+        if mates is None:
+            alike.append([drive])
+        else:
+            mates.append(drive)
+    return [tuple(d.joint for d in mates) for mates in alike if len(mates) > 1]
+
+
+def _alike(one: Drive, other: Drive, within: float) -> bool:
+    for name in _SETTINGS:
+        a, b = getattr(one, name), getattr(other, name)
+        near = isinstance(a, float) and isinstance(b, float) and math.isclose(a, b, rel_tol=within)
+        if a != b and not near:
+            return False
+    return True
 
 
 def members_of(robot: System, target: str, allowed: tuple[str, ...]) -> tuple[str, ...]:

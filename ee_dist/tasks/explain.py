@@ -10,12 +10,13 @@ from rich.console import Console
 
 from ee_dist.discrepancy.account import Account, explain_account
 from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
+from ee_dist.discrepancy.measured_trial import reading_s
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import AUTO, Config
-from ee_dist.tasks.measurements import load
+from ee_dist.tasks.measurements import load, with_known_noise
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import asked, planning, setting
@@ -68,7 +69,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         ahead: PlannedTrial | None = None
         if len(found.tied) > 1 and measured.robot.name in BUILT_IN:
             tied = [(*found.fixed, *c.hypothesis) for c in found.tied[:MOST_TIED]]
-            ahead = next(iter(next_trials(measured.robot, tied, evaluator_of(config))), None)
+            # As noisy and as seldom read as these: what a simulation reads is exact, and read in every row.
+            robot, every_s = with_known_noise(measured), reading_s(measured.trials)
+            ahead = next(iter(next_trials(robot, tied, evaluator_of(config), every_s=every_s)), None)
     account = explain_account(problem, found, ahead, planning(out, problem.robot))
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.account import Account, improve_account
+from ee_dist.discrepancy.calibrated_away import calibrated_away
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve
 from ee_dist.discrepancy.ladder import Improvement, Rung
@@ -139,10 +140,12 @@ def calibrated(
     most: int = MOST,
     progress: Progress = quiet,
 ) -> tuple[Improvement, dict[str, Any]]:
-    """The model of an untouched robot, and what goes into a file beside it: what it still leaves on each channel in each
-    trial beyond noise, and how much of that an effect takes off although nothing is wrong."""
+    """The model of an untouched robot, with what one of its joints has far more of than those like it, and what goes into a
+    file beside it: what it still leaves on each channel in each trial beyond noise, and how much of that an effect takes off
+    although nothing is wrong."""
     robot, problem = measured.robot, open_loop(measured, config)
     found = improve(problem, shared(pool, robot), measured.model, wanted, most=most, progress=progress)
+    found.odd = calibrated_away(problem, found.terms, pool, progress)
     unmodelled = unmodelled_by(problem, found.residual)
     again = open_loop(replace(measured, unmodelled=unmodelled, model=found.terms), config)
     gained = gained_untouched(explain(again, pool, found.terms, progress=progress))

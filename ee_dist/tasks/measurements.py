@@ -12,6 +12,7 @@ import numpy as np
 from ee_dist.basics.names import nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
+from ee_dist.discrepancy.ways.open_loop.scale import channel_scale
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, from_entries
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
@@ -101,6 +102,13 @@ def load(config: Config) -> Measurements:
         by,
         tuple(remarks),
     )
+
+
+def with_known_noise(measured: Measurements) -> Robot:
+    """The robot of the measurements, its sensors as noisy as these say where it declares no noise."""
+    robot = measured.robot
+    noise = channel_scale(robot, measured.trials).noise
+    return replace(robot, sensors=tuple(replace(s, noise=float(n)) for s, n in zip(robot.sensors, noise, strict=True)))
 
 
 def _held(file: Path, run: RunRecord) -> list[Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +13,10 @@ from rich.console import Console
 
 from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.contenders import contenders, suspected
+from ee_dist.discrepancy.measured_trial import reading_s
 from ee_dist.discrepancy.plan import Contender, Plan, parting, predicted, ranked
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
-from ee_dist.discrepancy.ways.open_loop.scale import channel_scale
 from ee_dist.robots.agree import differences
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
@@ -24,7 +24,7 @@ from ee_dist.robots.ranges import command_unit
 from ee_dist.robots.serial import robot_to_dict
 from ee_dist.tasks.config import Config, ConfigError, one_of
 from ee_dist.tasks.explained import Explained, explained, fitting
-from ee_dist.tasks.measurements import FEWEST_ROWS, Measurements, load
+from ee_dist.tasks.measurements import FEWEST_ROWS, load, with_known_noise
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import command, setting
 from ee_dist.tasks.results.plan_page import account_of, of_plan, plan_page, show_plan
@@ -96,7 +96,8 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     measured = load(found.config)
     robot = with_known_noise(measured)
     fitting(found, robot)
-    wanted = motions(robot, options, config.seed)
+    every_s = reading_s(measured.trials)
+    wanted = motions(robot, options, config.seed, every_s)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     suspects = [parse(robot, text) for text in options.suspects]
@@ -118,20 +119,21 @@ def run(config: Config, options: Options, out: Path) -> Plan:
             rivals.append(Contender((*rivals[0].hypothesis, *suspected(chosen, SUSPECTED))))
         evaluator = evaluator_of(found.config)
         windows = len(problem.segments)
-        result = ranked(len(rivals), predicted(robot, rivals, wanted, evaluator, left, windows, progress))
-        shown = parting(robot, [c.hypothesis for c in rivals], result.closest, result.best.excitation, evaluator)
+        result = ranked(len(rivals), predicted(robot, rivals, wanted, evaluator, left, windows, progress, every_s))
+        best, models = result.best.excitation, [c.hypothesis for c in rivals]
+        shown = parting(robot, models, result.closest, best, evaluator, every_s)
     out.mkdir(parents=True, exist_ok=True)
-    best = result.best.excitation
     write_whole(out / CSV, as_csv(robot, best))
     trial = ["task=trial", *robot_settings(robot, out), setting("task.noise", f"{noise_share(robot):.3g}"),
              setting("engine", found.config.engine.name), f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
-    explanations = list(zip(names, [c.hypothesis for c in rivals], strict=True))
+    explanations = list(zip(names, models, strict=True))
     account = account_of(
-        robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED
-    )
+        robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED,
+        every_s,
+    )  # fmt: skip
     digest = digest_of([(t.excitation, [round(s, 9) for s in t.separations]) for t in result.trials])
     rest = of_plan(result, explanations, found.folder, measured.files, options.limits, account)
-    rest |= {"csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}
+    rest |= {"reading_s": every_s or robot.time_step_s, "csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}
     write_summary(out, "plan", found.config, options, watch, digest, rest)
     write_page(
         plan_page(robot, result, explanations, shown, account, measured.files, command(trial) if result.enough else ""),
@@ -152,14 +154,17 @@ def nothing_tied(found: Explained) -> str:
     return f"{where}: nothing is tied with {found.explanations[0][0]}: no further trial is needed to tell; {more}"
 
 
-def motions(robot: Robot, options: Options, seed: int) -> list[Excitation]:
-    """The trials to choose from. Raises ConfigError where commands can drive nothing, or within the limits nothing moves."""
+def motions(robot: Robot, options: Options, seed: int, every_s: float = 0.0) -> list[Excitation]:
+    """The trials to choose from, of sensors that are read every ``every_s`` (0: in every row). Raises ConfigError where
+    commands can drive nothing, a trial has too few readings, or within the limits nothing moves."""
     if not driven(robot):
         raise ConfigError(f"{robot.name}: it has no drive that obeys commands, so that no trial can be planned for it")
-    rows = round(options.seconds / robot.time_step_s)
+    step_s = every_s or robot.time_step_s
+    rows = round(options.seconds / step_s)
     if rows < FEWEST_ROWS:
+        what = f"readings, {1000 * step_s:.3g} ms apart," if every_s else "rows"
         raise ConfigError(
-            f"task.seconds={options.seconds:g}: {rows} rows of {robot.name}; at least {FEWEST_ROWS} are needed to compare"
+            f"task.seconds={options.seconds:g}: {rows} {what} of {robot.name}; at least {FEWEST_ROWS} are needed to compare"
         )
     found = family(robot, options.limits, options.kinds or PLANNED, options.fixtures, seed, options.draws)
     if not found:
@@ -167,13 +172,6 @@ def motions(robot: Robot, options: Options, seed: int) -> list[Excitation]:
             f"task.excursion={options.excursion:g}, task.speed={options.speed:g}: within these limits nothing moves; allow more"
         )
     return found
-
-
-def with_known_noise(measured: Measurements) -> Robot:
-    """The robot of the measurements, its sensors as noisy as these say where it declares no noise."""
-    robot = measured.robot
-    noise = channel_scale(robot, measured.trials).noise
-    return replace(robot, sensors=tuple(replace(s, noise=float(n)) for s, n in zip(robot.sensors, noise, strict=True)))
 
 
 def noise_share(robot: Robot) -> float:

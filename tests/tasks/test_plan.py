@@ -51,6 +51,7 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     found = json.loads((plan / "summary.json").read_text())
     assert found["engine"] == "mujoco", "as the run that it goes on from"
     assert found["enough"] and found["best"]["enough"] and not found["alike"]
+    assert found["reading_s"] == 0.004
     assert [t["separation"] for t in found["trials"]] == sorted(
         (t["separation"] for t in found["trials"]), reverse=True
     )
@@ -92,6 +93,28 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     taken, _ = run("task=import", "robot=servo_pendulum", f"measured={plan / 'recorded.csv'}")
     back = read_run(taken / "measured.mcap").trials[0].log
     assert np.allclose(back.commands, log.commands, atol=1e-6)
+
+
+def test_a_log_of_30_hz_is_planned_for_at_30_hz(run, cli):
+    """As a hobby arm is logged: the plan says what a trial comes to that is read as seldom as the one before."""
+    first, _ = run("task=trial", "robot=servo_pendulum", "task.excitations=['sway:seconds=4,amplitude=0.03,seed=1']",
+                   "task.noise=0.001", HIDDEN, "engine=mujoco")  # fmt: skip
+    log = read_run(first / "trial.mcap").trials[0].log
+    rows = np.round(np.arange(0, len(log), 1 / 30 / 0.004)).astype(int)
+    seen = {"time_s": log.times_s, "servo_command (rad)": log.commands[:, 0],
+            "servo_position (rad)": log.sensors[:, 0], "servo_speed (rad/s)": log.sensors[:, 1]}  # fmt: skip
+    pd.DataFrame(seen).iloc[rows].to_csv(first / "slow.csv", index=False)
+    taken, _ = run("task=import", "robot=servo_pendulum", f"measured={first / 'slow.csv'}")
+    before, _ = run("task=explain", f"measured={taken}", SUSPECTS, "task.rerun=false", *QUICK)
+    few = ("task.suspects=[backlash@servo]", "task.kinds=[sway,multisine]", "task.draws=1", "evaluator=serial")
+    plan, outcome = run("task=plan", f"task.explained={before}", "task.seconds=3", *few)
+    found = json.loads((plan / "summary.json").read_text())
+    assert found["reading_s"] == pytest.approx(1 / 30, abs=0.003)
+    said = f"read every {1000 * found['reading_s']:.3g} ms"
+    assert any(said in line for line in found["words"])
+    assert said in (plan / "report.html").read_text() and "Predicted of sensors" in outcome.out
+    outcome = cli("task=plan", f"task.explained={before}", "task.seconds=1", *few)
+    assert outcome.status == 2 and "readings" in outcome.err and "at least 60" in outcome.err
 
 
 def test_a_run_of_improve_gives_its_model_and_that_with_what_was_tied_in_its_place(tmp_path):

@@ -195,6 +195,7 @@ def test_a_model_is_calibrated_on_an_untouched_robot_and_its_calibration_holds_o
     found, _ = run(cli, "task=improve", "effect=auto", log, only, "task.calibrate=true", "task.rerun=false", *QUICK)
     beside = yaml.safe_load((found / "model.calibration.yaml").read_text())
     assert beside["way"] == "open_loop" and beside["gained"] >= 0
+    assert json.loads((found / "summary.json").read_text())["calibrated_away"] == []
     model = f"model={found / 'model.yaml'}"
     explained, _ = run(cli, "task=explain", log, model, only, "task.rerun=false", *QUICK)
     summary = json.loads((explained / "summary.json").read_text())
@@ -205,6 +206,21 @@ def test_a_model_is_calibrated_on_an_untouched_robot_and_its_calibration_holds_o
     wrong = cli("task=improve", "effect=auto", log, "task.calibrate=true", "task.by=free_run", *QUICK)
     assert wrong.status == 2 and "use task.by=open_loop" in wrong.err
     assert len(wrong.err.strip().splitlines()) == 1
+
+
+def test_a_calibration_on_a_robot_with_a_fault_says_what_it_hides(cli):
+    plan = "task.excitations=['multisine:seconds=2.4,amplitude=0.6,seed=1,fixture=stand']"
+    hidden = "hidden=[{effect: zero_offset, target: knee_front_right, offset_rad: 0.1}]"
+    tried, _ = run(cli, "task=trial", "robot=quadruped_lab", "engine=mujoco", plan, "task.noise=0.005", hidden)
+    only = "task.only=[zero_offset,coulomb_friction]"
+    found, told = run(cli, "task=improve", "effect=auto", f"measured={tried}", only, "task.calibrate=true",
+                      "task.rerun=false", *QUICK)  # fmt: skip
+    (odd,) = json.loads((found / "summary.json").read_text())["calibrated_away"]
+    assert (odd["effect"], odd["target"], odd["joint"]) == ("zero_offset", "knee_front_right", "knee_front_right")
+    assert len(odd["like"]) == 7 and odd["times"] > 4
+    line = "Calibrated away at knee front right: zero offset 0."
+    for text in (told.out, (found / "report.html").read_text(), (found / "model.yaml").read_text()):
+        assert line in " ".join(text.replace("#", " ").split())
 
 
 @pytest.mark.parametrize("by", WAYS)

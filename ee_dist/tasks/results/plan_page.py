@@ -30,10 +30,17 @@ SHOWN = 10
 
 
 def account_of(
-    robot: Robot, found: Plan, explanations: Explanations, trial: str, fitted: bool, left_out: int = 0
+    robot: Robot,
+    found: Plan,
+    explanations: Explanations,
+    trial: str,
+    fitted: bool,
+    left_out: int = 0,
+    every_s: float = 0.0,
 ) -> Account:
     """What to record, what it is expected to tell, what stays alike, and how to do it. ``fitted``: whether the values were
-    let come nearer to one another, as far as measurements leave them open."""
+    let come nearer to one another, as far as measurements leave them open. ``every_s``: time between readings of the sensors,
+    where they are read more seldom than rows are."""
     best, names = found.best, [placed(n) for n, _ in explanations]
     e, closest = best.excitation, f"{names[found.closest[0]]} from {names[found.closest[1]]}"
     what = f"{e.told(robot).replace('_', ' ')} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}"
@@ -52,6 +59,11 @@ def account_of(
         else "Their values count as certain, as they were fitted: a trial may promise more than it keeps.",
         f"The commands, for a robot of your own: plan.csv. On a simulated one: {trial}",
     ]
+    if every_s:
+        lines.append(
+            f"Predicted of sensors that are read every {1000 * every_s:.3g} ms, as in the measurements: read more often, they "
+            "tell more."
+        )
     if found.alike and found.enough:
         pairs = [f"{names[a]} and {names[b]}" for a, b in found.alike]
         lines.append(f"No trial within these limits tells these apart: {listed(pairs)}.")

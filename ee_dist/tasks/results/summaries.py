@@ -128,4 +128,16 @@ def of_improvement(problem: Problem, found: Improvement, account: Account, path:
         "stopped": found.stopped,
         "not_earned": [of_judged(problem, c) for c in (found.last.judged if found.last else []) if not c.earned],
         "left": of_left(found.left),
+        "calibrated_away": [
+            {
+                **entry,
+                "joint": o.joint,
+                "typical": o.typical,
+                "times": o.times,
+                "deviations": o.deviations,
+                "like": list(o.mates),
+                "share": o.share,
+            }
+            for o, entry in zip(found.odd, hypothesis_list(tuple(o.term for o in found.odd)), strict=True)
+        ],
     }

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
 from ee_dist.discrepancy.problem import Layout, Problem, Series, joints_of
 from ee_dist.discrepancy.ways.open_loop.predictability import MEMBERS, ensemble
 from ee_dist.discrepancy.ways.open_loop.prediction import (
@@ -89,7 +89,7 @@ class OpenLoop(Problem):
         members: int = MEMBERS,
     ) -> None:
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
-        spacing = max((_spacing_s(t.log) for t in trials if t.log.filled is not None), default=0.0)
+        spacing = reading_s(trials)
         self.block = block if not spacing else min(block, max(1, round(BLOCK_S / spacing)))
         self.window = window // self.block * self.block
         block, window = self.block, self.window
@@ -349,11 +349,6 @@ class OpenLoop(Problem):
         rollouts = [rollout_of(t, m) for t, m in zip(self.measured, models, strict=True)]
         true = self.evaluator.evaluate([Job(r, ToSensors()) for r in rollouts])
         return [report(m, v) for m, v in zip(models, true, strict=True)]
-
-
-def _spacing_s(log: SensorLog) -> float:
-    """From one reading to the next, s."""
-    return float(np.median(np.diff(log.times_s[log.readings])))
 
 
 def _spans(robot: Robot) -> Array:
