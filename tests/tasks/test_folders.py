@@ -68,6 +68,15 @@ def test_results_are_not_overwritten_unless_told_so(cli, tmp_path, tiny):
     assert read_run(out / "recovery.mcap").metadata["seed"] == "1"
 
 
+def test_what_an_earlier_run_left_is_told_from_what_this_one_wrote(cli, tmp_path):
+    trial = cli("task=trial", "robot=servo_pendulum", "engine=mujoco", f"hydra.run.dir={tmp_path}/t")
+    assert trial.status == 0, trial.err
+    ask = ("task=compare", f"measured={tmp_path}/t/trial.mcap", "engine=mujoco", f"hydra.run.dir={tmp_path}/c")
+    assert "of an earlier run" not in cli(*ask).out
+    listed = [line for line in cli(*ask, "task.rerun=false", "overwrite=true").out.splitlines() if "earlier" in line]
+    assert len(listed) == 1 and "compare.rrd  (of an earlier run)" in listed[0]
+
+
 @pytest.mark.parametrize(("arguments", "said"), [
     (["hydra.run.dir="], "hydra.run.dir=: which folder?"),
     (["-m", "hydra.sweep.dir="], "hydra.sweep.dir=: which folder?"),

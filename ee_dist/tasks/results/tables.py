@@ -17,6 +17,7 @@ from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import percent, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.tasks.folder import SETTINGS
 from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import step_phrase, worst_trials
 from ee_dist.tasks.results.values import kinds_of, within
@@ -88,14 +89,21 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
     """What speaks for it, the files, and last the finding with how sure it is and the command to type next."""
     for line in account.lines:
         console.print(line, highlight=False, markup=False)
-    for file in sorted(p.name for p in out.iterdir() if p.is_file() and not p.name.startswith(".")):
-        console.print(f"  {os.path.relpath(out / file)}", highlight=False, markup=False, soft_wrap=True)
+    for file in sorted(p for p in out.iterdir() if p.is_file() and not p.name.startswith(".")):
+        stale = "  (of an earlier run)" if _older(file, out / SETTINGS) else ""
+        console.print(f"  {os.path.relpath(file)}{stale}", highlight=False, markup=False, soft_wrap=True)
     console.print(account.headline, highlight=False, markup=False, style="bold")
     for line in account.first:
         whole = bool(account.planner) and line.endswith(account.planner)  # a command is for copying
         console.print(line, highlight=False, markup=False, soft_wrap=whole)
     if following:
         console.print(f"Next: {command(following)}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _older(file: Path, settings: Path) -> bool:
+    """Whether a file was there before this run put its settings beside it: with overwrite=true what it does not write stays."""
+    begun = [p.stat().st_mtime for p in settings.glob("*.yaml")]
+    return bool(begun) and file.stat().st_mtime < min(begun)
 
 
 def typed(terms: Hypothesis) -> str:
