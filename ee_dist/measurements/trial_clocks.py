@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ee_dist.measurements.alignment import Match, match, one_epoch
+from ee_dist.measurements.alignment import Match, match, one_clock
 from ee_dist.measurements.clocks import Clocked, clocked, loosely_clocked
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Even, Mapping
@@ -61,8 +61,10 @@ class TrialClocks:
                 continue
             if found.table.clock is not None and self.main.table.clock is not None:
                 continue
-            if one_epoch(self.main.times_s, found.times_s):
-                self.done.append(f"{name}: its clock and that of {self.first} count from one epoch: taken as the same")
+            if one_clock(self.main.times_s, found.times_s):
+                self.done.append(
+                    f"{name}: its clock and that of {self.first} count from one epoch, or stamp the same rows: taken as the same"
+                )
                 continue
             fit = self._fit(name)
             if fit is None or not fit.clear:
