@@ -57,7 +57,9 @@ def add_speeds(v: View) -> None:
         "sensors", [n * (k not in odd) for k, n in enumerate(names)], chosen.block,
         speed_units(v, chosen.block, odd), chosen.why,
     )  # fmt: skip
-    _estimate(v, [n * (k in odd) for k, n in enumerate(names)], positions, LIKELY, [odd.get(k, "") for k in range(len(names))])
+    _estimate(
+        v, [n * (k in odd) for k, n in enumerate(names)], positions, LIKELY, [odd.get(k, "") for k in range(len(names))]
+    )
 
 
 def _estimate(v: View, names: list[str], positions: list[str], sure: str, why: list[str]) -> None:
