@@ -85,7 +85,7 @@ class TrialClocks:
             )
 
     def _fit(self, name: str) -> Match | None:
-        """The offset of a table by its commands against positions (or speeds), or its speeds against theirs."""
+        """The offset of a table by its commands against positions, speeds or torques, or its speeds against theirs."""
         targets = {s.name: (s.kind, s.target) for s in self.robot.sensors}
         of_joint = {targets[n]: c for n, c in self.mapping.sensors.items() if isinstance(c, Column) and n in targets}
         kinds = {d.joint: command_kind(d) for d in self.robot.drives}
@@ -96,11 +96,12 @@ class TrialClocks:
             if c.table != name or group not in ("sensors", "commands"):
                 continue
             kind, joint = targets[channel] if group == "sensors" else (kinds[channel], channel)
-            base = of_joint.get(("position", joint))
-            if base is None or kind not in ("position", "velocity", "speed") or base.table == name:
+            base = self.mapping.torques.get(joint) if kind == "torque" else of_joint.get(("position", joint))
+            known = ("position", "velocity", "speed", "torque")
+            if base is None or kind not in known or base.table != self.first:
                 continue
             own = base.sign * base.scale * here.table.numbers(base.column)
-            if kind != "position":
+            if kind in ("velocity", "speed"):
                 own = np.gradient(own, here.times_s)
             pairs.append((own, c.sign * c.scale * there.table.numbers(c.column)))
             held_between = held_between or group == "commands"

@@ -17,6 +17,7 @@ from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints, Proposal
+from ee_dist.measurements.proposal.words import role_of
 from ee_dist.measurements.proposal.write import as_yaml
 from ee_dist.robots.describe import load_robot
 
@@ -116,3 +117,52 @@ def test_one_clock_is_told_by_its_uneven_stamps(other, same: bool) -> None:  # t
 def test_counted_stamps_prove_nothing() -> None:
     t = np.arange(ROWS) * STEP_S
     assert not one_clock(t, t), "each of two loggers may count from its own start"
+
+
+def pair(folder: Path, seed: int, late_s: float) -> list[Path]:
+    """What was asked for and what was measured, in files with the same columns, the second with a clock of its own."""
+    folder.mkdir(parents=True)
+    rng = np.random.default_rng(seed)
+    t = np.arange(ROWS) * STEP_S
+    torque = sum(rng.uniform(0.2, 0.4) * np.sin(w * t + rng.uniform(0, 6)) for w in (1.3, 2.9, 4.7, 7.7))
+    shown = np.interp(t + late_s, t, torque)
+    angle = sum(0.3 * np.sin(w * t + k) for k, w in enumerate((1.1, 2.3)))
+    for name, position, asked in (("desired", 0 * t, torque), ("measured", angle, shown)):
+        frame = {"time": t, "position": position, "velocity": np.gradient(position, t), "torque": asked}
+        pd.DataFrame(frame).to_csv(folder / f"data_{name}.csv", index=False)
+    return sorted(folder.glob("*.csv"))
+
+
+def test_what_was_asked_for_is_no_trial_beside_what_was_measured(tmp_path: Path) -> None:
+    described = samples.robot_file(tmp_path, ("shoulder",))
+    described.write_text(described.read_text().replace("kp: 20", "command: torque"))
+    robot, _ = load_robot(described)
+    files = [f for k in range(2) for f in pair(tmp_path / "raw" / f"run_{k}", k, 0.3)]
+    proposal = proposal_for(files, robot, Hints())
+    assert not proposal.questions
+    columns = {
+        c.name: (c.entry["table"], c.entry["column"]) for c in proposal.choices if c.group in ("sensors", "commands")
+    }
+    assert columns["position_shoulder"] == ("data_measured", "position")
+    assert columns["shoulder"] == ("data_desired", "torque")
+    path = tmp_path / "mapping.yaml"
+    path.write_text(as_yaml(proposal, described.name, "log"))
+    found = import_files(files, read_mapping(path), robot)
+    assert [record.name for record, _ in found] == ["run_0", "run_1"]
+    assert all(any("-0.3" in d and "added to its clock" in d for d in report.done) for _, report in found), (
+        "by their torques"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "role"),
+    [
+        ("data_desired", True),
+        ("state_motor", False),
+        ("/arm/command", True),
+        ("/control/joint_states", None),
+        ("run_1", None),
+    ],
+)
+def test_what_a_file_or_topic_is_called(name: str, role: bool | None) -> None:
+    assert role_of(name) is role
