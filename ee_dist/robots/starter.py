@@ -22,7 +22,7 @@ DAMPING = 0.7
 """Of an assumed controller against the inertia that its joint feels, as a share of critical."""
 TORQUE_PER_INERTIA = 50.0
 """rad/s^2 that an assumed torque limit gives a joint beside holding a metre's weight of what it carries."""
-ROTOR_SPEEDS_UP = 1000.0
+ROTOR_SPEEDS_UP = 250.0
 """rad/s^2 (m/s^2) that a motor gives its own rotor, seen through its gear: of hobby servos and the drives of arms 100 to 400.
 Without any rotor a light last link follows an assumed controller within microseconds, which no simulation steps through."""
 
@@ -125,8 +125,8 @@ def _drive(joint: Joint, body: Body, inertia: Mapping[str, float]) -> tuple[dict
         limit = float(known["torque_limit"])
         moved, rotor = inertia[joint.name], []
         if not known.get("rotor_inertia"):
-            known["rotor_inertia"] = _rounded(limit / ROTOR_SPEEDS_UP)
-            moved, rotor = moved + known["rotor_inertia"], ["rotor_inertia"]
+            known["rotor_inertia"] = behind = _rounded(limit / ROTOR_SPEEDS_UP)
+            moved, rotor = moved + behind, ["rotor_inertia"]
         error = min(SETTLING_RAD if joint.kind == "hinge" else SETTLING_M, 0.2 * travel(joint))
         kp = limit / error
         known |= {"command": "position", "kp": _rounded(kp)}
