@@ -17,6 +17,7 @@ from ee_dist.discrepancy.improve import EXPLAINED
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.uneven import worse_text, worse_trials
 from ee_dist.discrepancy.words import (
     by_effect,
     is_less,
@@ -288,6 +289,9 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     lines.append("The model: " + (phrase(found.terms, robot) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
+    worse = worse_trials(problem, found)
+    if worse:
+        lines.append(worse_text(problem, worse))
     settled = found.verdict in (EXPLAINED, NOTHING_MISSING)
     lines += _beside(last.error_heldout, found.noise_floor, not settled)
     if found.left:

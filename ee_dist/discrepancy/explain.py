@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Current, Effort, Examined, examine
@@ -113,9 +114,7 @@ def explain(
     progress: Progress = quiet,
 ) -> Explanation:
     """Search ``pool`` for what explains the residual that the model with ``before`` leaves."""
-    as_it_is = problem.residuals([before])[0]
-    if not np.isfinite(as_it_is).all():
-        raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
+    as_it_is = residual_as_it_is(problem, before)
     search, current = begin(problem, before, progress)
     names = {c.name for c in current.parts}
     others = [c for c in pool if c.name not in names]

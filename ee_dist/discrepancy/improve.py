@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import everywhere
 from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
@@ -64,9 +65,7 @@ def improve(
 ) -> Improvement:
     """Add ``wanted`` (an empty list: fit only what the model has), or (None) whatever of ``pool`` earns its place, to the
     model ``before``; fit everything anew. ``climbed`` hears of every step of the ladder when it is taken."""
-    as_it_is = problem.residuals([before])[0]
-    if not np.isfinite(as_it_is).all():
-        raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")
+    as_it_is = residual_as_it_is(problem, before)
     search, current = begin(problem, before, progress)
     ladder = [_start("the model as it was", before, as_it_is, problem)]
 

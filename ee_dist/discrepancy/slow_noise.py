@@ -12,11 +12,30 @@ DIFFERENCES = (2, 3, 4, 5)
 """Orders of divided differences that noise is looked for in."""
 
 
+RESTS, LEVELS, MULTIPLES = 0.1, 5, 0.9
+"""A reading comes in steps where it rests in this share of the rows, on so many levels, this share of whose gaps are whole
+multiples of the least."""
+
+
+def reading_step(values: Array) -> float:
+    """The step in which readings (R,) come; 0 where none is seen. Only readings that repeat the last one are looked at: others
+    may lie between two levels where a log was brought to another grid."""
+    rests = values[1:][np.diff(values) == 0]
+    levels = np.unique(rests)
+    if len(rests) < RESTS * len(values) or len(levels) < LEVELS:
+        return 0.0
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 1e-6 * (levels[-1] - levels[0])]
+    multiples = gaps / gaps.min()
+    return float(gaps.min()) if np.mean(np.abs(multiples - np.round(multiples)) < 0.1) > MULTIPLES else 0.0
+
+
 def slow_noise(times_s: Array, values: Array) -> Array:
     """(C,) standard deviation of the noise of readings (R, C) taken seldom, or at uneven ``times_s`` (R,), of something smooth.
 
     Divided differences of order p are free of polynomials of a lower order. The longer the steps, the more of the motion is
-    in the second ones; of several orders the one that finds least has least of it.
+    in the second ones; of several orders the one that finds least has least of it. Of readings in coarse steps that would be
+    nothing, for they mostly repeat the last: what the steps leave open is the least there is.
     """
     found = []
     for order in DIFFERENCES:
@@ -28,4 +47,5 @@ def slow_noise(times_s: Array, values: Array) -> Array:
         weights /= np.linalg.norm(weights, axis=1, keepdims=True)
         left = np.einsum("rk,rkc->rc", weights, values[rows])
         found.append(np.median(left**2, axis=0) / MEDIAN_OF_SQUARES)
-    return np.sqrt(np.min(found, axis=0)) if found else np.zeros(values.shape[1])
+    steps = np.array([reading_step(column) for column in values.T])
+    return np.maximum(np.sqrt(np.min(found, axis=0)) if found else 0.0, steps / np.sqrt(12))

@@ -18,6 +18,10 @@ CLEAR = 0.85
 APART, LEAST = 4.0, 0.02
 """Another lag must leave this many times what the best leaves, and this share more: it may not be the same motion again."""
 MOST_POINTS = 400_000
+SHARED = 0.9
+"""Share of the stamps of the shorter record that the other has, too, if one clock made both."""
+UNEVEN = 1e-6
+"""Steps that differ by this share of one were measured, not counted: two records do not have the same by chance."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,17 @@ def one_epoch(a_s: Array, b_s: Array) -> bool:
     overlap = min(a_s[-1], b_s[-1]) - max(a_s[0], b_s[0])
     shorter = min(a_s[-1] - a_s[0], b_s[-1] - b_s[0])
     return bool(min(a_s[0], b_s[0]) > EPOCH_S and overlap > 0.5 * shorter)
+
+
+def one_clock(a_s: Array, b_s: Array) -> bool:
+    """Whether two tables were stamped by one clock: they count from one epoch, or have the same uneven stamps."""
+    if one_epoch(a_s, b_s):
+        return True
+    few, many = sorted((np.unique(a_s), np.unique(b_s)), key=len)
+    steps = np.diff(few)
+    if len(few) < 10 or np.ptp(steps) < UNEVEN * np.median(steps):
+        return False
+    return float(np.isin(few, many).mean()) > SHARED
 
 
 def match(a_s: Array, a: Array, b_s: Array, b: Array, held: bool) -> Match:

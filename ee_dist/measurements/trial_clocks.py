@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ee_dist.measurements.alignment import Match, match, one_epoch
+from ee_dist.measurements.alignment import Match, match, one_clock
 from ee_dist.measurements.clocks import Clocked, clocked, loosely_clocked
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Even, Mapping
@@ -61,8 +61,10 @@ class TrialClocks:
                 continue
             if found.table.clock is not None and self.main.table.clock is not None:
                 continue
-            if one_epoch(self.main.times_s, found.times_s):
-                self.done.append(f"{name}: its clock and that of {self.first} count from one epoch: taken as the same")
+            if one_clock(self.main.times_s, found.times_s):
+                self.done.append(
+                    f"{name}: its clock and that of {self.first} count from one epoch, or stamp the same rows: taken as the same"
+                )
                 continue
             fit = self._fit(name)
             if fit is None or not fit.clear:
@@ -83,7 +85,7 @@ class TrialClocks:
             )
 
     def _fit(self, name: str) -> Match | None:
-        """The offset of a table by its commands against positions (or speeds), or its speeds against theirs."""
+        """The offset of a table by its commands against positions, speeds or torques, or its speeds against theirs."""
         targets = {s.name: (s.kind, s.target) for s in self.robot.sensors}
         of_joint = {targets[n]: c for n, c in self.mapping.sensors.items() if isinstance(c, Column) and n in targets}
         kinds = {d.joint: command_kind(d) for d in self.robot.drives}
@@ -94,11 +96,12 @@ class TrialClocks:
             if c.table != name or group not in ("sensors", "commands"):
                 continue
             kind, joint = targets[channel] if group == "sensors" else (kinds[channel], channel)
-            base = of_joint.get(("position", joint))
-            if base is None or kind not in ("position", "velocity", "speed") or base.table == name:
+            base = self.mapping.torques.get(joint) if kind == "torque" else of_joint.get(("position", joint))
+            known = ("position", "velocity", "speed", "torque")
+            if base is None or kind not in known or base.table != self.first:
                 continue
             own = base.sign * base.scale * here.table.numbers(base.column)
-            if kind != "position":
+            if kind in ("velocity", "speed"):
                 own = np.gradient(own, here.times_s)
             pairs.append((own, c.sign * c.scale * there.table.numbers(c.column)))
             held_between = held_between or group == "commands"

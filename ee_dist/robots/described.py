@@ -103,7 +103,7 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     robot = checked(robot, where)
     if body.time_step_s is None and "time_step_s" not in data:
         robot = replace(robot, time_step_s=default_step_s(robot))
-    elif coarse := too_coarse(robot):
+    if coarse := too_coarse(robot):
         notes.append(coarse)
     return robot, tuple(notes)
 

@@ -45,8 +45,22 @@ def too_coarse(robot: Robot) -> str | None:
     coarsest = coarsest_step_s(robot)
     if robot.time_step_s <= TOO_COARSE * coarsest:
         return None
-    good = next((s for s in (*STEPS_S, FINE_S, FINE_S / 2) if s <= coarsest), FINE_S / 4)
+    good = next((s for s in (*STEPS_S, FINE_S, FINE_S / 2, FINE_S / 4) if s <= coarsest), None)
+    if good is None:
+        return f"time_step_s {robot.time_step_s:g}: too coarse; {too_light(robot)}"
     return (
         f"time_step_s {robot.time_step_s:g}: too coarse for its controllers, which need {good:g} s; sensors may be read more "
         "seldom than that"
+    )
+
+
+def too_light(robot: Robot) -> str:
+    """Which drive asks for the finest steps, and what is most likely wrong with it: a line for people."""
+    inertias = felt_inertia(robot).tolist()
+    needed = [_resolved_s(d, inertia) for d, inertia in zip(robot.drives, inertias, strict=True)]
+    k = needed.index(min(needed))
+    drive, unit = robot.drives[k], "kg.m^2" if robot.joint(robot.drives[k].joint).kind == "hinge" else "kg"
+    return (
+        f"the drive of {drive.joint} (kp {drive.kp:g}, kd {drive.kd:g}) moves only {inertias[k]:.2g} {unit}, which takes "
+        f"steps of {needed[k]:.1g} s: give it the rotor_inertia of its motor, seen through the gear, or smaller gains"
     )

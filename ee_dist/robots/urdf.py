@@ -291,6 +291,13 @@ class _Reader:
             self.assumed.append(f"{where} states no limits: taken as without stops")
             return -far, far
         lower, upper = self.number(limit, "lower", where, 0.0), self.number(limit, "upper", where, 0.0)
+        blank = ("lower", "upper", "effort", "velocity")
+        if all(self.number(limit, k, where, 0.0) == 0.0 for k in blank):
+            # What a CAD program writes where nobody entered a limit: a joint that is held still would be a fixed one.
+            self.assumed.append(
+                f"{where}: its limits are all zero, as an export leaves them blank: taken as without stops"
+            )
+            return -far, far
         if not lower < upper:
             raise self.fail(where, f"its limits leave no range: lower {lower:g}, upper {upper:g}")
         return lower, upper

@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import Console
 
 from ee_dist.discrepancy.account import Account, compare_account
+from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.problem import Problem
@@ -46,7 +47,7 @@ def run(config: Config, options: Options, out: Path) -> tuple[Problem, Compariso
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     problem = way.make(measured, for_few(config))
-    residual = problem.residuals([measured.model])[0]
+    residual = residual_as_it_is(problem, measured.model)
     found = compare(problem, residual)
     left = leftovers(problem, residual)
     account = compare_account(problem, found, left)

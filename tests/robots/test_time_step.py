@@ -11,7 +11,8 @@ import pytest
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
-from ee_dist.robots.describe import load_robot
+from ee_dist.robots.describe import load_robot, read_body
+from ee_dist.robots.starter import starter
 from ee_dist.robots.time_step import FINE_S, STEPS_S, coarsest_step_s
 
 ARM = """<robot name="arm"><link name="base"/>
@@ -67,3 +68,19 @@ def test_the_motion_is_that_of_a_step_ten_times_finer(tmp_path: Path, kp: float)
         found.append(log.joints[::every])
     off = np.sqrt(np.mean((found[0] - found[1]) ** 2)) / np.sqrt(np.mean(found[1] ** 2))
     assert off < 0.04, "of the motion"
+
+
+def test_a_link_too_light_for_its_gains_is_told_and_a_starter_never_has_one(tmp_path: Path) -> None:
+    base, last = ARM.split('<link name="lower">')
+    last = last.replace('value="0.3"', 'value="0.01"').replace("1e-4", "1e-5").replace("1e-3", "1e-5")
+    light = f'{base}<link name="lower">{last.replace("0.1 0 0", "0.01 0 0")}'
+    (tmp_path / "light.urdf").write_text(light)
+    drive = {"kp": 100.0, "kd": 0.05, "torque_limit": 9.0}
+    robot, notes = load_robot({"urdf": str(tmp_path / "light.urdf"), "drives": {"a": drive, "b": drive}})
+    assert robot.time_step_s == FINE_S
+    (told,) = [n for n in notes if "too coarse" in n]
+    assert "the drive of b (kp 100, kd 0.05) moves only 1" in told and "rotor_inertia" in told
+    begun = starter(read_body("urdf", tmp_path / "light.urdf"), "urdf", "light.urdf", "light.urdf")
+    assert all(d.rotor_inertia > 0 for d in begun.robot.drives)
+    assert begun.robot.time_step_s <= coarsest_step_s(begun.robot)
+    assert any("rotor inertia" in m for m in begun.missing), "what was assumed is still to be measured"

@@ -361,3 +361,15 @@ def test_controllers_may_keep_to_the_velocity_limits_of_the_file() -> None:
     bare = replace(body, joints=tuple(replace(j, top_speed=math.inf) for j in body.joints))
     with pytest.raises(RobotError, match="velocity_limits: obeyed: the file states none"):
         robot_of_body(bare, {"drives": drives, "velocity_limits": "obeyed"}, "arm.yaml")
+
+
+def test_limits_that_an_export_left_blank_are_none(tmp_path: Path) -> None:
+    def blank(joint: ET.Element) -> None:
+        limit = joint.find("limit")
+        assert limit is not None
+        limit.attrib.update(lower="0", upper="0", effort="0", velocity="0")
+
+    body = read_urdf(changed(tmp_path, elbow=blank))
+    (elbow,) = [j for j in body.joints if j.name == "elbow"]
+    assert elbow.upper > 6 and elbow.lower < -6
+    assert any("joint 'elbow': its limits are all zero, as an export leaves them blank" in a for a in body.assumed)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.proposal.words import OTHER, TIME, Reading, read_name, tokens, unit_word
+from ee_dist.measurements.proposal.words import OTHER, TIME, Reading, read_name, role_of, tokens, unit_word
 from ee_dist.measurements.signals import derivative, relation
 from ee_dist.measurements.table import Recorded, Table
 from ee_dist.trials.log import Array
@@ -166,6 +166,9 @@ def _made(table: Table, columns: tuple[str, ...], reading: Reading, how: str, se
         (unit_word(table.units[c]) if table.units.get(c) else None) or read_name(_stem(c)).unit or reading.unit
         for c in columns
     )
+    if reading.command is None and reading is not SILENT:
+        # Tables of one trial may have the same columns: what was asked for in one file, what was measured in another.
+        reading = replace(reading, command=role_of(table.name))
     return Block(table, columns, reading, how, np.stack([series[c] for c in columns], axis=1), units)
 
 

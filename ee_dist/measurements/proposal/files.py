@@ -13,7 +13,7 @@ import numpy as np
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.model import Hints, Proposal
 from ee_dist.measurements.proposal.time import time_of
-from ee_dist.measurements.proposal.words import TIME, read_name
+from ee_dist.measurements.proposal.words import TIME, read_name, role_of
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.table import Recorded, Table
 
@@ -43,14 +43,17 @@ def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints)
 
 
 def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Table]] | None:
-    """Files of two or more kinds, equally many, with a word of its own in each kind's names: (pattern, table) by word."""
-    kinds: dict[tuple[str, ...], list[tuple[Path, Table]]] = {}
+    """Files of two or more kinds, equally many, with a word of its own in each kind's names: (pattern, table) by word. Of
+    files with the same columns those called commands are another kind than those called measurements."""
+    kinds: dict[tuple[bool | None, tuple[str, ...]], list[tuple[Path, Table]]] = {}
+    roles = [role_of(f.stem) for f in files]
+    told = True in roles and False in roles
     for k, file in enumerate(files):
         found = [first] if not k else list(read(file))
         if len(found) != 1 or len(found[0].tables) != 1:
             return None
         table = found[0].tables[0]
-        kinds.setdefault(tuple(table.columns), []).append((file, table))
+        kinds.setdefault((roles[k] if told else None, tuple(table.columns)), []).append((file, table))
     if len(kinds) < 2 or len({len(v) for v in kinds.values()}) != 1:
         return None
     stems = [{f.stem for f, _ in v} for v in kinds.values()]

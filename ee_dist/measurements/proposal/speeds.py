@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +14,8 @@ from ee_dist.measurements.proposal.units import UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View, can_be
 from ee_dist.measurements.proposal.words import SPEED
 
+AGREES = 0.8
+"""Correlation from which a speed is the change of a position."""
 SPEEDS = {"hinge": ("rad/s", "deg/s", "rpm"), "slide": ("m/s", "mm/s")}
 
 
@@ -46,30 +49,75 @@ def add_speeds(v: View) -> None:
         elif poor:
             fit = abs(v.derivative(v.position.block, poor[0].block).correlation)
             why = f"{poor[0].block.name} hardly is the change of the positions (correlation {fit:.2f}): estimated from them"
-        for name, of in zip(names, positions, strict=True):
-            if name and of:
-                entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / v.step(v.position.block), 3))}
-                v.out.choices.append(Choice("sensors", name, entry, LIKELY if able or poor else SURE, why))
+        _estimate(v, names, positions, LIKELY if able or poor else SURE, [why] * len(names))
         return
     chosen.block.used = True
-    v.add("sensors", names, chosen.block, speed_units(v, chosen.block), chosen.why)
+    odd = _odd(v, chosen.block)
+    v.add(
+        "sensors", [n * (k not in odd) for k, n in enumerate(names)], chosen.block,
+        speed_units(v, chosen.block, odd), chosen.why,
+    )  # fmt: skip
+    _estimate(
+        v, [n * (k in odd) for k, n in enumerate(names)], positions, LIKELY, [odd.get(k, "") for k in range(len(names))]
+    )
 
 
-def speed_units(v: View, block: Block) -> UnitChoice:
-    """The unit in which the numbers are the change of the positions, with the sign that this takes."""
+def _estimate(v: View, names: list[str], positions: list[str], sure: str, why: list[str]) -> None:
+    """Speeds that are estimated from the positions, for the sensors that have a name."""
+    for k, (name, of) in enumerate(zip(names, positions, strict=True)):
+        if name and of:
+            entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / v.step(v.position.block), 3))}
+            v.out.choices.append(Choice("sensors", name, entry, sure, why[k]))
+
+
+def _compared(v: View, block: Block) -> list[signals.Relation] | None:
+    """How the numbers go with the change of the positions, joint by joint; None where that is not known."""
     values = v.on(v.position.block, block)
     if values is None or not v.units.entries:
-        return UnitChoice((), UNKNOWN, "the unit of the positions is open")
+        return None
     width = max(3, round(0.04 / v.step(v.position.block)))
     truth = signals.change(v.metric(), v.step(v.position.block))
+    return signals.each(signals.smooth(signals.smooth(values, width), width), truth)
+
+
+def _seen(v: View, k: int, r: signals.Relation) -> str | None:
+    kinds = SPEEDS[v.joints[k].kind]
+    return by_ratio(r.slope, kinds, kinds[0]) if abs(r.correlation) > AGREES else None
+
+
+def _odd(v: View, block: Block) -> dict[int, str]:
+    """Joints at which the speed is no unit's times the change of the position although it is at most others, and why: a
+    gripper's position is often a share of its range. One such joint is no reason to ask about all."""
+    relations = _compared(v, block) or []
+    moving = [k for k in range(len(relations)) if signals.moves(block.values[:, k])]
+    fine = [k for k in moving if _seen(v, k, relations[k])]
+    if 2 * len(fine) <= len(moving):
+        return {}
+    return {
+        k: f"{block.columns[k]} goes as {relations[k].slope:.3g} times the change of the position (correlation "
+        f"{relations[k].correlation:.2f}), which is no unit: estimated from the position, which may be a share of a range"
+        for k in moving
+        if k not in fine and not (block.units and block.units[k])
+    }
+
+
+def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
+    """The unit in which the numbers are the change of the positions, with the sign that this takes; joints that are ``odd``
+    are not asked about."""
+    relations = _compared(v, block)
+    if relations is None:
+        return UnitChoice((), UNKNOWN, "the unit of the positions is open")
     sure, why = SURE, ""
     entries: list[dict[str, Any]] = []
-    for k, r in enumerate(signals.each(signals.smooth(signals.smooth(values, width), width), truth)):
+    for k, r in enumerate(relations):
         kind = v.joints[k].kind
         base = SPEEDS[kind][0]
-        seen = by_ratio(r.slope, SPEEDS[kind], base) if abs(r.correlation) > 0.8 else None
+        if k in odd:
+            entries.append({"unit": base})
+            continue
+        seen = _seen(v, k, r)
         stated = block.units[k] if block.units and block.units[k] in SPEEDS[kind] else None
-        if seen is None and not signals.moves(values[:, k]):
+        if seen is None and not signals.moves(block.values[:, k]):
             seen = stated or (entries[-1]["unit"] if entries else base)
         if stated and seen and stated != seen:
             return UnitChoice((), UNKNOWN, f"the name says {stated}, but beside the positions it is {seen}")
@@ -77,7 +125,7 @@ def speed_units(v: View, block: Block) -> UnitChoice:
             sure = LIKELY if stated else UNKNOWN
             why = f"{stated or 'its unit'} could not be checked: {r.slope:.3g} times the change of the positions"
         entry: dict[str, Any] = {"unit": seen or stated or "???"}
-        if r.correlation < -0.8:
+        if r.correlation < -AGREES:
             entry["sign"] = -1
         entries.append(entry)
     _checks_time(v, entries, sure)

@@ -24,6 +24,8 @@ LEAST_SEEN = 0.5
 """Correlation with what the motion needs from which a gain can be estimated."""
 CLEARLY, WELL = 0.3, 0.3
 """Another order of the joints is asked for if it leaves less than this share of what the robot's leaves, and of all."""
+BOTH_WAYS, OFTEN = 0.1, 0.05
+"""A motion needs torques of both signs where this share of the largest is passed, either way, in this share of the time."""
 FAR_OFF = 300.0
 """Times what the motion needs at a joint that friction does not explain: a unit of its own does."""
 
@@ -72,6 +74,12 @@ def add_torques(v: View) -> None:
     v.needed = _needed(v)
     for b in v.blocks:
         named = b.reading.kind in (TORQUE, CURRENT) and not b.reading.weak
+        if named and not b.used and b.reading.command is not True and v.moves(b) and _unsigned(v, b):
+            b.used = True
+            v.out.notes.append(
+                f"{b.name} never change sign, though the motion needs torques of both: they are sizes, as some servos report "
+                "their currents, and are left out"
+            )
         if b.used or b.reading.command or not v.moves(b) or not (named or (b.how == BY_PLACE and v.hints.gains)):
             continue
         score = (
@@ -106,6 +114,17 @@ def add_torques(v: View) -> None:
     if any(sensed):
         v.add("sensors", sensed, chosen.block, units, chosen.why, level)
     v.add("torques", list(v.robot.motor_names), chosen.block, units, chosen.why, level)
+
+
+def _unsigned(v: View, block: Block) -> bool:
+    """Whether no column of a block ever changes its sign, while what the motion needs of some of these joints does."""
+    values = v.on(v.position.block, block)
+    if values is None or v.needed is None or ((values < 0).any() and (values > 0).any()):
+        return False
+    needed = v.needed[0]
+    strong = np.abs(needed) > BOTH_WAYS * np.abs(needed).max(axis=0)
+    moved = [k for k in range(len(v.joints)) if signals.moves(values[:, k])]
+    return any(min((strong & (sign * needed > 0))[:, k].mean() for sign in (1, -1)) > OFTEN for k in moved)
 
 
 def _led(v: View) -> bool:

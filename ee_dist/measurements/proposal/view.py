@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.measurements import signals
-from ee_dist.measurements.alignment import match, one_epoch
+from ee_dist.measurements.alignment import match, one_clock
 from ee_dist.measurements.proposal.blocks import BY_NAME, BY_NUMBER, BY_PLACE, Block, empty_cells
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.time import TimeChoice
@@ -65,7 +65,7 @@ class View:
         if other.table.name == block.table.name:
             return other.values
         a, b = self.times[block.table.name].seconds, self.times[other.table.name].seconds
-        if not (block.table.clock is not None and other.table.clock is not None) and not one_epoch(a, b):
+        if not (block.table.clock is not None and other.table.clock is not None) and not one_clock(a, b):
             found = match(
                 a[0] + self.step(block) * np.arange(len(block.values)), block.values,
                 b[0] + self.step(other) * np.arange(len(other.values)), other.values, held=False,

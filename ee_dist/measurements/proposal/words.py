@@ -147,6 +147,13 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     )
 
 
+def role_of(name: str) -> bool | None:
+    """Whether a file or topic is called commands (True) or measurements (False); None where it is called neither, or both."""
+    words = tokens(name)
+    asked, seen = any(w in _COMMAND for w in words), any(w in _MEASURED for w in words)
+    return asked if asked != seen else None
+
+
 def _kind(kinds: list[str], texts: list[str], unit: str | None) -> tuple[str | None, bool]:
     if OTHER in kinds:
         return OTHER, False

@@ -104,12 +104,12 @@ def of_rows(values: Array, rows: Sequence[int] | None) -> Array:
 
 def digest(sensors: Array, block: int, window: int) -> Digest:
     """The digest of channels (T, S)."""
-    return Digest(
-        (block_sums(sensors, block) / block).astype(np.float32),
-        (block_sums(roughness(sensors), window) / window).astype(np.float32),
-        (block_sums(repeats(sensors), window) / window).astype(np.float32),
-        bool(np.isfinite(sensors).all()),
-    )
+    # A motion that flies apart may be finite where it was computed and not where it is kept: it must not pass for one that is.
+    with np.errstate(over="ignore", invalid="ignore"):
+        means = (block_sums(sensors, block) / block).astype(np.float32)
+        rough = (block_sums(roughness(sensors), window) / window).astype(np.float32)
+        still = (block_sums(repeats(sensors), window) / window).astype(np.float32)
+    return Digest(means, rough, still, all(bool(np.isfinite(v).all()) for v in (sensors, means, rough)))
 
 
 @lru_cache(4096)

@@ -1,0 +1,45 @@
+"""Readings in coarse steps: the steps are noise, though most readings repeat the last one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.slow_noise import reading_step, slow_noise
+
+T = np.arange(1500) * 0.02
+TICK = 2 * np.pi / 4096
+
+
+def motion(amplitude: float = 0.15) -> np.ndarray:
+    return amplitude * np.sin(0.9 * T) + 0.3 * amplitude * np.sin(2.2 * T)
+
+
+def stepped(size: float, amplitude: float = 0.15) -> np.ndarray:
+    return size * np.round(motion(amplitude) / size)
+
+
+@pytest.mark.parametrize("ticks", [1, 4])
+def test_steps_leave_what_lies_between_them_open(ticks: int) -> None:
+    values = stepped(ticks * TICK)
+    assert reading_step(values) == pytest.approx(ticks * TICK)
+    (noise,) = slow_noise(T, values[:, None])
+    assert 0.9 < noise / (ticks * TICK / np.sqrt(12)) < 3
+
+
+def test_a_log_that_was_brought_to_another_grid_has_them_still() -> None:
+    at = T[:-1] + 0.0007
+    values = np.interp(at, T, stepped(TICK))
+    assert reading_step(values) == pytest.approx(TICK)
+
+
+def test_noise_dropouts_and_rest_are_no_steps() -> None:
+    rng = np.random.default_rng(0)
+    noisy = motion() + 1e-3 * rng.standard_normal(len(T))
+    assert reading_step(noisy) == 0.0
+    for k in np.flatnonzero(rng.uniform(size=len(T)) < 0.3)[1:]:
+        noisy[k] = noisy[k - 1]
+    assert reading_step(noisy) == 0.0
+    assert reading_step(np.zeros(len(T))) == 0.0
+    (noise,) = slow_noise(T, (motion() + 1e-3 * rng.standard_normal(len(T)))[:, None])
+    assert 0.7e-3 < noise < 1.3e-3
