@@ -27,9 +27,11 @@ class Worse:
 def worse_trials(problem: Problem, found: Improvement) -> list[Worse]:
     """The worst first. One number over all motions hides that what was added suits some of them only: a load or a setting that
     is not the same in all, or an effect that is another."""
+    if len(found.ladder) < 2 or len(problem.trials) < 2:
+        return []
     first, last = found.ladder[0].held, found.ladder[-1].held
     of = np.asarray(problem.trial_of_segment)
-    if len(found.ladder) < 2 or len(problem.trials) < 2 or first.shape != last.shape or len(last) != len(of):
+    if not len(first) == len(last) == len(of):
         return []
     values = np.bincount(problem.segment_of, minlength=len(of))
     worse = []

@@ -37,7 +37,7 @@ def account(tied: list[str], explained: float = 1.0) -> Account:
         as_it_was=False,
     )
     problem = SimpleNamespace(
-        robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts=""
+        robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts="", trials=("a",)
     )
     return explain_account(problem, found, None)  # type: ignore[arg-type]
 
@@ -149,7 +149,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     )  # fmt: skip
     start = SimpleNamespace(added=(), dropped=(), tied_with=[], error_heldout=5.0, held_out="", name="")
     problem = SimpleNamespace(
-        robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts=""
+        robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts="", trials=("a",)
     )
     for verdict, share, said in (
         (EXPLAINED, 1.0, "Nothing else is left above the noise."),
