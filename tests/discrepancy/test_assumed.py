@@ -1,0 +1,97 @@
+"""Gains that a description only assumed are the first suspect, all of them together, and farther off than gains that somebody
+knew may be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from way_samples import Sample, measure, problem_by, samples
+
+from ee_dist.discrepancy.assumed import LABEL, assumed_drives
+from ee_dist.discrepancy.examine import Current, examine
+from ee_dist.discrepancy.problem import Problem, error
+from ee_dist.discrepancy.search.candidates import candidate, candidates
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.effects.catalogue import apply, term
+from ee_dist.robots.model import Robot
+
+STIFFER, DRIER = 6.0, (0.3, 0.2)
+
+
+def guessed(robot: Robot, fields: tuple[str, ...] = ("kp", "kd", "rotor_inertia")) -> Robot:
+    """Described with controllers several times as stiff, because nobody knew them."""
+    drives = tuple(replace(d, kp=STIFFER * d.kp, kd=3.0 * d.kd) for d in robot.drives)
+    return replace(robot, drives=drives, assumed=tuple((d.joint, f) for d in drives for f in fields))
+
+
+@cache
+def the_problem() -> Problem:
+    sample: Sample = samples()["arm"]
+    hidden = tuple(
+        term("coulomb_friction", j, torque_nm=c) for j, c in zip(sample.robot.motor_names, DRIER, strict=True)
+    )
+    return problem_by("open_loop", measure(sample, hidden), guessed(sample.robot))
+
+
+def test_gains_that_were_assumed_are_found_together_with_friction() -> None:
+    problem = the_problem()
+    proposal, u = assumed_drives(Search(problem), candidates(problem.robot)) or pytest.fail("nothing was proposed")
+    terms = Model(proposal.parts).hypothesis(u)
+    found = {t.effect: dict(t.values) for t in terms}
+    assert {t.target for t in terms} == {"all_joints"}
+    assert found["position_gain"]["factor"] == pytest.approx(1 / STIFFER, rel=0.15)
+    assert found["coulomb_friction"]["torque_nm"] == pytest.approx(np.mean(DRIER), rel=0.5)
+    as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
+    assert better < 0.2 * as_it_is
+
+
+def test_they_come_before_whatever_mimics_a_part_of_them() -> None:
+    problem = the_problem()
+    pool = candidates(
+        problem.robot, only=["position_gain", "speed_gain", "coulomb_friction", "part_mass", "zero_offset"]
+    )
+    best = examine(Search(problem), Current(), pool).best
+    assert best is not None
+    assert best.name == LABEL
+    assert {c.effect.name for c in best.proposal.parts} == {"position_gain", "speed_gain", "coulomb_friction"}
+
+
+@pytest.mark.parametrize("why", ["nobody guessed", "there already", "left out by the user"])
+def test_nothing_is_proposed_where(why: str) -> None:
+    problem, taken = the_problem(), []
+    pool = candidates(problem.robot)
+    if why == "nobody guessed":
+        sample = samples()["arm"]
+        problem = problem_by("open_loop", measure(sample, ()), sample.robot)
+    elif why == "there already":
+        taken = ["position_gain@all_joints"]
+    else:
+        pool = candidates(problem.robot, only=["part_mass", "position_gain"])
+    assert assumed_drives(Search(problem), pool, taken) is None
+
+
+def test_some_joints_of_several_are_named_one_by_one() -> None:
+    robot = samples()["arm"].robot
+    some = replace(guessed(robot), assumed=(("elbow", "kp"),))
+    problem = problem_by("open_loop", measure(samples()["arm"], ()), some)
+    proposal, _ = assumed_drives(Search(problem), candidates(some)) or pytest.fail("nothing was proposed")
+    assert {c.target for c in proposal.parts} == {"elbow"}
+
+
+def test_a_gain_is_looked_for_farther_off_where_it_was_assumed() -> None:
+    robot = samples()["arm"].robot
+    known, open_ = (candidate(r, "position_gain", "elbow") for r in (robot, guessed(robot)))
+    assert known.bounds == ((0.2, 5.0),)
+    assert open_.bounds[0][0] < 0.05
+
+
+def test_a_robot_is_the_same_whatever_was_assumed_of_it() -> None:
+    robot = samples()["arm"].robot
+    marked = replace(robot, assumed=(("elbow", "kp"),))
+    assert marked == robot
+    assert marked.digest == robot.digest
+    assert apply(marked, (term("coulomb_friction", "elbow", torque_nm=0.1),)).assumed == marked.assumed
