@@ -22,11 +22,14 @@ from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of
 from ee_dist.trials.log import Array
 
-TOGETHER = ("position_gain", "speed_gain", "rotor_inertia", "coulomb_friction", "viscous_friction")
+TOGETHER = ("position_gain", "speed_gain", "torque_limit", "rotor_inertia", "coulomb_friction", "viscous_friction")
+"""The limit is among them although files state one: it is often what a CAD program writes where nobody entered any."""
 GAINS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Shares of the assumed gains to look from: a guess may be off by an order of magnitude."""
 LAGS_RAD = (0.0, 0.02, 0.05)
 """Errors (rad, m) at which a joint comes to rest by dry friction, to look from: those of hobby servos."""
+LIMITS = (0.0, 0.7)
+"""Shares of the stated torque limit that are not there, to look from."""
 STARTS = 3
 """Of the starts that many are fitted."""
 LABEL = "assumed drives"
@@ -68,8 +71,13 @@ def _starts(robot: Robot, joints: Sequence[str], parts: Sequence[Candidate]) -> 
     """A grid: damping falls with the gain, so that a joint follows as fast, and friction holds as large an error."""
     stiffness = float(np.median([drive_of(robot, j).kp for j in joints]))
     found = []
-    for gain, lag in product(GAINS, LAGS_RAD):
-        values = {"position_gain": gain, "speed_gain": gain, "coulomb_friction": lag * gain * stiffness}
+    for gain, lag, limit in product(GAINS, LAGS_RAD, LIMITS):
+        values = {
+            "position_gain": gain,
+            "speed_gain": gain,
+            "torque_limit": limit,
+            "coulomb_friction": lag * gain * stiffness,
+        }
         u = [
             c.shares({c.effect.main.name: values[c.effect.name]}) if c.effect.name in values else np.zeros(c.size)
             for c in parts

@@ -7,7 +7,7 @@ them where twenty small ones would be right, and is caught there. This goes the 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from ee_dist.trials.log import Array
 
 TWIN = 0.99
 """Correlation of two effects' marks from which the data cannot hold them apart, and the one later in the catalogue stays out."""
+LEAST, MOST = -0.7, 1.0
+"""Changes of mass, as shares, that parts may have all over a robot: drawn solid and printed hollow they weigh a third. Where
+gains and friction are free too, torques have no scale but the masses: without bounds all of them may grow together."""
 FEWEST = 3
 """Effects that must be there to be fitted at once."""
 WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
@@ -114,7 +117,7 @@ class _Look:
         more than the current model."""
         robot = self.search.problem.robot
         base = _apart(robot, base, self.own)
-        few = [c for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)]
+        few = [_a_little(c) for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)]
         few = _distinct(self.calm, base, few)
         if not few or len(base.parts) + len(few) < FEWEST:
             return None
@@ -232,6 +235,13 @@ def _label(parts: Sequence[Candidate]) -> str:
         where = "parts" if mine[0].effect.family == "body" else "joints"
         names.append(mine[0].name if len(mine) == 1 else f"{kind}@each of {len(mine)} {where}")
     return " + ".join(names)
+
+
+def _a_little(c: Candidate) -> Candidate:
+    """With bounds no wider than what may be wrong with each part of a robot at once."""
+    if c.effect.family != "body":
+        return c
+    return replace(c, bounds=tuple((max(low, LEAST), min(high, MOST)) for low, high in c.bounds))
 
 
 def _group(robot: Robot, c: Candidate) -> bool:

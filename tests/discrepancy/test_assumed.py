@@ -29,9 +29,11 @@ def guessed(robot: Robot, fields: tuple[str, ...] = ("kp", "kd", "rotor_inertia"
 
 
 @cache
-def the_problem() -> Problem:
+def the_problem(limit: float = 0.0) -> Problem:
+    """``limit``: share of the stated torque limit that the robot has not."""
     sample: Sample = samples()["arm"]
-    hidden = tuple(
+    hidden = (term("torque_limit", "all_joints", loss=limit),) if limit else ()
+    hidden += tuple(
         term("coulomb_friction", j, torque_nm=c) for j, c in zip(sample.robot.motor_names, DRIER, strict=True)
     )
     return problem_by("open_loop", measure(sample, hidden), guessed(sample.robot))
@@ -45,6 +47,17 @@ def test_gains_that_were_assumed_are_found_together_with_friction() -> None:
     assert {t.target for t in terms} == {"all_joints"}
     assert found["position_gain"]["factor"] == pytest.approx(1 / STIFFER, rel=0.15)
     assert found["coulomb_friction"]["torque_nm"] == pytest.approx(np.mean(DRIER), rel=0.5)
+    as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
+    assert better < 0.2 * as_it_is
+
+
+def test_a_limit_that_was_stated_for_want_of_a_better_one_is_found_with_them() -> None:
+    problem = the_problem(limit=0.75)
+    proposal, u = assumed_drives(Search(problem), candidates(problem.robot)) or pytest.fail("nothing was proposed")
+    terms = Model(proposal.parts).hypothesis(u)
+    found = {t.effect: dict(t.values) for t in terms}
+    assert found["torque_limit"]["loss"] == pytest.approx(0.75, abs=0.05)
+    assert found["position_gain"]["factor"] == pytest.approx(1 / STIFFER, rel=0.3)
     as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
     assert better < 0.2 * as_it_is
 
