@@ -17,7 +17,7 @@ from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.effects.catalogue import EffectError
-from ee_dist.effects.groups import JOIN, groups
+from ee_dist.effects.groups import JOIN, groups, members_of
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of
 from ee_dist.trials.log import Array
@@ -56,6 +56,12 @@ def assumed_drives(
     best = [starts[k] for k in np.argsort(energies, kind="stable")[:STARTS]]
     fits = follow_valley(search, [(model, u) for u in best], search.everything)
     return Proposal(parts, LABEL), min(fits, key=lambda f: f.energy).u
+
+
+def puts_right(robot: Robot, c: Candidate) -> bool:
+    """Whether it is one of these effects, at joints whose gains were assumed."""
+    members = members_of(robot, c.target, c.effect.targets(robot)) or (c.target,)
+    return c.effect.name in TOGETHER and set(members) <= set(robot.assumed_joints("kp"))
 
 
 def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import puts_right
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
 from ee_dist.discrepancy.examine import Current, calm_trials
@@ -64,7 +65,7 @@ def everywhere(
     calm = search.among(calm_trials(search.problem, as_it_is))
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
     found, places = None if again else look.kept(current), Model(current.parts).places
-    for keep in _instead(current, own):
+    for keep in _instead(search.problem.robot, current, own):
         base = Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
         other = look.kept(base, more=not keep[own:])
         if other is not None and (
@@ -74,14 +75,16 @@ def everywhere(
     return look.steps(found) if found is not None else None
 
 
-def _instead(current: Current, own: int) -> Iterator[list[int]]:
+def _instead(robot: Robot, current: Current, own: int) -> Iterator[list[int]]:
     """Numbers of the parts to begin with, beside all of them. What was added so far may stand in for what is wrong everywhere:
-    without it; and what was found to be a little wrong everywhere for what was added last: that anew."""
-    special = [k for k, c in enumerate(current.parts) if k >= own and not c.effect.everywhere]
+    without it; and what was found to be a little wrong everywhere for what was added last: that anew. What puts assumed
+    drives right stays: nobody believes in what they were."""
+    stay = [k for k, c in enumerate(current.parts) if k < own or puts_right(robot, c)]
+    special = [k for k, c in enumerate(current.parts) if k not in stay and not c.effect.everywhere]
     if special:
-        yield list(range(own))
-        if len(special) < len(current.parts) - own:
-            yield [*range(own), *special]
+        yield stay
+        if len(stay) + len(special) < len(current.parts):
+            yield sorted([*stay, *special])
 
 
 @dataclass(frozen=True, eq=False)
