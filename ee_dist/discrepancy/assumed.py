@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
@@ -33,6 +34,19 @@ LIMITS = (0.0, 0.7)
 STARTS = 3
 """Of the starts that many are fitted."""
 LABEL = "assumed drives"
+GUESSED = (
+    "The description only guessed at what these drives do: their gains, limit, rotor and friction were found together. Write "
+    "them into it, or keep this model."
+)
+"""What is said of them in the place of an effect's physics."""
+
+
+def assumed_text(robot: Robot) -> list[str]:
+    """A line for people where a description only assumed what its controllers do."""
+    count = len(robot.assumed_joints("kp"))
+    names = listed(dict.fromkeys(f for _, f in robot.assumed if f != "command"))
+    drives = "1 drive" if count == 1 else f"{count} drives"
+    return [f"The description only assumed {names} of {drives}: explain and improve look there first."] if count else []
 
 
 def assumed_drives(

@@ -97,7 +97,9 @@ def improve(
                 if kept is not None:
                     last, current = kept, Current(current.parts, values_of(current.parts, before))
             best = last.best
-            ready = len(current.parts) != looked and anew < OFTEN and (not spread or _special(problem.robot, current, own))
+            ready = (
+                len(current.parts) != looked and anew < OFTEN and (not spread or _special(problem.robot, current, own))
+            )
             if ready and _many(search, last, len(current.parts) - own, spread > 0):
                 found = everywhere(search, current, own, pool, travelling(problem), again=spread > 0)
                 looked, anew = len(current.parts), anew + (spread > 0)

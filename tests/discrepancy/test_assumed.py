@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 from way_samples import Sample, measure, problem_by, samples
 
-from ee_dist.discrepancy.assumed import LABEL, assumed_drives
+from ee_dist.discrepancy.account import compare_account, explain_account
+from ee_dist.discrepancy.assumed import GUESSED, LABEL, assumed_drives, puts_right
+from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.everywhere import _instead
 from ee_dist.discrepancy.examine import Current, examine
+from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
@@ -95,6 +99,21 @@ def test_some_joints_of_several_are_named_one_by_one() -> None:
     assert {c.target for c in proposal.parts} == {"elbow"}
 
 
+def test_what_puts_them_right_stays_while_everything_is_fitted_and_nothing_else_does() -> None:
+    some = replace(guessed(samples()["arm"].robot), assumed=(("elbow", "kp"),))
+    of = {c: puts_right(some, candidate(some, *c)) for c in (
+        ("speed_gain", "elbow"), ("torque_limit", "elbow"), ("speed_gain", "shoulder"), ("speed_gain", "all_joints"),
+        ("zero_offset", "elbow"),
+    )}  # fmt: skip
+    assert [c for c, stays in of.items() if stays] == [("speed_gain", "elbow"), ("torque_limit", "elbow")]
+    parts = tuple(
+        candidate(some, *c) for c in (("speed_gain", "elbow"), ("zero_offset", "elbow"), ("deadband", "elbow"))
+    )
+    current = Current(parts, np.array([0.1, 0.1, 0.1]))
+    assert list(_instead(some, current, 0)) == [[0], [0, 2]]
+    assert list(_instead(samples()["arm"].robot, current, 0)) == [[], [0, 2]], "nothing was assumed"
+
+
 def test_a_gain_is_looked_for_farther_off_where_it_was_assumed() -> None:
     robot = samples()["arm"].robot
     known, open_ = (candidate(r, "position_gain", "elbow") for r in (robot, guessed(robot)))
@@ -108,3 +127,15 @@ def test_a_robot_is_the_same_whatever_was_assumed_of_it() -> None:
     assert marked == robot
     assert marked.digest == robot.digest
     assert apply(marked, (term("coulomb_friction", "elbow", torque_nm=0.1),)).assumed == marked.assumed
+
+
+def test_it_is_told_that_the_description_only_guessed() -> None:
+    problem = the_problem()
+    found = compare(problem, problem.residuals([()])[0])
+    said = compare_account(problem, found, []).lines
+    assert (
+        "The description only assumed kp, kd, rotor_inertia of 2 drives: explain and improve look there first." in said
+    )
+    pool = candidates(problem.robot, only=["position_gain", "speed_gain", "coulomb_friction", "part_mass"])
+    lines = explain_account(problem, explain(problem, pool), None).lines
+    assert GUESSED in lines
