@@ -183,7 +183,8 @@ class _Look:
         search, problem, kept, own = self.search, self.search.problem, found.model, self.own
         places = Model(kept.parts).places
         names = {c.name for c in self.current.parts}
-        gone = tuple(c.name for c in self.current.parts[own:] if c.name not in {p.name for p in kept.parts})
+        stay = {p.name for p in kept.parts}
+        gone = tuple(c.name for c in self.current.parts[own:] if not {c.name, *_taken_apart(problem.robot, c)} & stay)
         # What the ladder has already is not shown as a step again.
         chosen = [k for k, c in enumerate(kept.parts) if k < own or c.name in names]
         shown, energy = set(chosen), next(float(r @ r) for cut, r in self.cuts if cut is found.cut)
@@ -268,6 +269,11 @@ def _apart(robot: Robot, current: Current, own: int) -> Current:
                 parts.append(member)
                 values.append(np.clip(member.shares(c.values(u)), member.lower, member.upper))
     return Current(tuple(parts), np.concatenate([*values, np.zeros(0)]))
+
+
+def _taken_apart(robot: Robot, c: Candidate) -> list[str]:
+    """Names of a shared effect's members."""
+    return [f"{c.effect.name}@{m}" for m in members_of(robot, c.target, c.effect.targets(robot))]
 
 
 def _distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[Candidate]:

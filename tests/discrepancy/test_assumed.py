@@ -13,7 +13,7 @@ from way_samples import Sample, measure, problem_by, samples
 from ee_dist.discrepancy.account import compare_account, explain_account
 from ee_dist.discrepancy.assumed import GUESSED, LABEL, assumed_drives, puts_right
 from ee_dist.discrepancy.compare import compare
-from ee_dist.discrepancy.everywhere import _instead
+from ee_dist.discrepancy.everywhere import _instead, _taken_apart
 from ee_dist.discrepancy.examine import Current, examine
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.problem import Problem, error
@@ -139,3 +139,12 @@ def test_it_is_told_that_the_description_only_guessed() -> None:
     pool = candidates(problem.robot, only=["position_gain", "speed_gain", "coulomb_friction", "part_mass"])
     lines = explain_account(problem, explain(problem, pool), None).lines
     assert GUESSED in lines
+
+
+def test_a_shared_effect_that_is_taken_apart_is_not_called_dropped() -> None:
+    robot = samples()["arm"].robot
+    assert _taken_apart(robot, candidate(robot, "position_gain", "all_joints")) == [
+        "position_gain@shoulder",
+        "position_gain@elbow",
+    ]
+    assert _taken_apart(robot, candidate(robot, "position_gain", "elbow")) == []
