@@ -8,6 +8,7 @@ together, one number each for all joints of which they were assumed, from the be
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -17,7 +18,7 @@ from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
-from ee_dist.effects.catalogue import EffectError
+from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
 from ee_dist.effects.groups import JOIN, groups, members_of
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of
@@ -76,6 +77,12 @@ def puts_right(robot: Robot, c: Candidate) -> bool:
     """Whether it is one of these effects, at joints whose gains were assumed."""
     members = members_of(robot, c.target, c.effect.targets(robot)) or (c.target,)
     return c.effect.name in TOGETHER and set(members) <= set(robot.assumed_joints("kp"))
+
+
+def put_right(robot: Robot, parts: Sequence[Candidate], terms: Hypothesis) -> Robot:
+    """The robot with those of a model's terms that put assumed drives right; these are no longer assumed then."""
+    right = tuple(t for c, t in zip(parts, terms, strict=True) if puts_right(robot, c))
+    return replace(apply(robot, right), assumed=()) if right else robot
 
 
 def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ee_dist.discrepancy.assumed import puts_right
+from ee_dist.discrepancy.assumed import put_right, puts_right
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
 from ee_dist.discrepancy.examine import Current, calm_trials
@@ -120,7 +120,9 @@ class _Look:
         more than the current model."""
         robot = self.search.problem.robot
         base = _apart(robot, base, self.own)
+        around = put_right(robot, base.parts, base.hypothesis)
         few = [_a_little(c) for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)]
+        few = [candidate(around, c.effect, c.target) if puts_right(robot, c) else c for c in few]
         few = _distinct(self.calm, base, few)
         if not few or len(base.parts) + len(few) < FEWEST:
             return None
@@ -253,13 +255,14 @@ def _group(robot: Robot, c: Candidate) -> bool:
 
 
 def _apart(robot: Robot, current: Current, own: int) -> Current:
-    """The model with each shared effect of this kind taken apart into its members, with the values that they shared."""
+    """The model with each shared effect of this kind taken apart into its members, with the values that they shared. One that
+    puts assumed drives right stays: members differ from it by a little, and not from what was assumed."""
 
     parts: list[Candidate] = []
     values: list[Array] = []
     for k, (c, place) in enumerate(zip(current.parts, Model(current.parts).places, strict=True)):
         u = current.u[place]
-        if k < own or not c.effect.everywhere or not _group(robot, c):
+        if k < own or not c.effect.everywhere or not _group(robot, c) or puts_right(robot, c):
             parts.append(c)
             values.append(u)
             continue

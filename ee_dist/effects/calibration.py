@@ -112,7 +112,11 @@ def _gains(robot: Robot, target: str) -> dict[str, Range]:
     "position_gain",
     family="drive",
     targets=position_drives,
-    parameters=(Parameter("factor", "1", 0.01, 100.0, 1.0, "factor on the gain of the position controller", 0.01),),
+    parameters=(
+        Parameter(
+            "factor", "1", 0.01, 100.0, 1.0, "factor on the gain of the position controller", 0.01, by_ratio=True
+        ),
+    ),
     physics="The position controller has another gain than the model says: a setting of a trial, or a data sheet that is wrong.",
     signature="Residual command in proportion to the position error.",
     ranges=_gains,

@@ -50,3 +50,4 @@ def _not_too_much(robot: Robot, terms: Hypothesis) -> None:
                     raise EffectError(
                         f"{t}: {joint} is described with {has:g} {p.unit} of it; {-values[p.name]:g} cannot be taken off"
                     )
+        robot = apply(robot, (t,))
