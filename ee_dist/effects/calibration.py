@@ -133,10 +133,14 @@ def _steepest(robot: Robot, drive: Drive) -> tuple[float, float]:
     return own, STABLE * scales.steady(robot, drive.joint) / robot.time_step_s
 
 
+NEXT_TO_NONE = 0.01
+"""Of a gain on speed: with none at all the drive would be none that has such a gain, and no other factor could act on it."""
+
+
 def _damping(robot: Robot, target: str) -> dict[str, Range]:
     drive = scales.drive_of(robot, target)
     own, most = _steepest(robot, drive)
-    return {"factor": (0.0, min(5.0, max(1.02, (most - own) / drive.kd)))}
+    return {"factor": (NEXT_TO_NONE, min(5.0, max(1.02, (most - own) / drive.kd)))}
 
 
 @effect(

@@ -173,3 +173,11 @@ def test_units_follow_the_kind_of_joint_and_the_channel() -> None:
     assert friction.unit("damping_nm_s_rad", slider(), "joint") == "N.s/m"
     assert friction.unit("damping_nm_s_rad", QUADRUPED, "hip_front_left") == "N.m.s/rad"
     assert bias.unit("bias", slider(), "velocity") == "m/s"
+
+
+def test_a_factor_at_its_bound_leaves_others_something_to_act_on() -> None:
+    robot = QUADRUPED
+    low = {e.name: e.bounds(robot, "hip_front_left")["factor"][0] for e in (find("speed_gain"), find("position_gain"))}
+    none_left = tuple(term(name, "all_joints", factor=factor) for name, factor in low.items())
+    again = tuple(term(name, "hip_front_left", factor=0.5) for name in low)
+    assert apply(robot, (*none_left, *again)).drives[0].kd > 0
