@@ -54,10 +54,10 @@ def assumed_drives(
     search: Search, pool: Iterable[Candidate], taken: Iterable[str] = ()
 ) -> tuple[Proposal, Array] | None:
     """Gains and friction of all drives whose position gain was assumed, and values u to fit them from; None where none was,
-    where it is ``taken`` (names of candidates) already, or where fewer than two of these effects are in the pool."""
+    where it is ``taken`` (names of candidates) already, or where the pool has not the gain and another of these effects."""
     robot = search.problem.robot
     joints, names = robot.assumed_joints("kp"), {c.effect.name for c in pool}
-    if not joints:
+    if not joints or TOGETHER[0] not in names:
         return None
     parts = tuple(c for name in TOGETHER if name in names for c in _at(robot, name, joints))
     if len(parts) < 2 or {c.name for c in parts} & set(taken):

@@ -245,7 +245,7 @@ def _label(parts: Sequence[Candidate]) -> str:
 
 def _a_little(c: Candidate) -> Candidate:
     """With bounds no wider than what may be wrong with each part of a robot at once."""
-    if c.effect.family != "body":
+    if c.effect.family != "body" or c.effect.main.unit != "1":
         return c
     return replace(c, bounds=tuple((max(low, LEAST), min(high, MOST)) for low, high in c.bounds))
 
