@@ -45,6 +45,7 @@ from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.ways.open_loop.unmodelled import from_entries
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.engines.contract import Engine, EngineError
+from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import Robot
@@ -287,7 +288,7 @@ def scored(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
 
 
 def run(bench: Bench) -> Iterator[list[Case] | str]:
-    """All cases in their order; for one that the engine cannot simulate, what it said."""
+    """All cases in their order; for one that cannot be simulated or compared, what was said of it."""
     count = bench.args.cases
     if bench.args.workers < 2:
         yield from (attempt(bench, k) for k in range(count))
@@ -300,7 +301,7 @@ def run(bench: Bench) -> Iterator[list[Case] | str]:
 def attempt(bench: Bench, index: int) -> list[Case] | str:
     try:
         return bench.cases(index)
-    except EngineError as problem:
+    except (EngineError, MeasurementError) as problem:
         return str(problem)
 
 

@@ -38,6 +38,8 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import quiet
 from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.robots.describe import read_body
+from ee_dist.robots.starter import starter
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.progress_line import SearchProgress
@@ -51,6 +53,8 @@ REACH = np.array([1.0, 0.5, 0.6, 0.8, 1.0, 0.8])
 """rad: how far each joint goes."""
 SOLID = 2.5
 """How much heavier a part that is described as solid is than one that was printed."""
+EXPORTED_NM = 10.0
+"""Effort limit that a CAD program writes where nobody entered one, from which ``task=robot`` guesses a controller."""
 FITTED, HELD = ("sines", "steps", "slow"), ("reaches", "sines")
 
 
@@ -166,12 +170,18 @@ def write(out: Path, seed: int, described: str, rate_hz: float = RATE_HZ) -> dic
     """The user's files: a URDF, what it cannot say, and five logs."""
     out.mkdir(parents=True, exist_ok=True)
     heavier = SOLID if described == "solid" else 1.0
-    (out / "arm.urdf").write_text(urdf(heavier), encoding="utf-8")
+    guessed = described == "guessed"
+    body = out / "arm.urdf"
+    body.write_text(urdf(heavier, EXPORTED_NM if guessed else DRIVE["torque_limit"]), encoding="utf-8")
     joints = [f"joint_{k + 1}" for k in range(N)]
     sensors = [{"name": f"{j}_position", "kind": "position", "target": j} for j in joints]
     entry = {"urdf": "arm.urdf", "has_floor": False, "sensors": sensors}
     more = {"coulomb": 0.4, "viscous": 0.3, "rotor_inertia": 2 * DRIVE["rotor_inertia"]} if described == "rough" else {}
     entry["drives"] = dict.fromkeys(joints, DRIVE | more)
+    if guessed:
+        entry = yaml.safe_load(starter(read_body("urdf", body), "urdf", body.name, body.name).text) | {
+            "sensors": sensors
+        }
     (out / "arm.yaml").write_text(yaml.safe_dump(entry), encoding="utf-8")
     arm = Arm(seed)
     files: dict[str, list[str]] = {"fitted": [], "held": []}
@@ -210,20 +220,21 @@ def mrad(compared: Problem, terms: Hypothesis) -> float:
 
 
 def by_hand(compared: Problem) -> Hypothesis:
-    """Three numbers that all joints share, by least squares."""
+    """Three numbers that all joints share, by least squares; two gains more where the description only guessed at them."""
     drive = compared.robot.drives[0]
+    gains = ("position_gain", "speed_gain") if compared.robot.assumed else ()
 
     def terms(x: Array) -> Hypothesis:
-        friction, rotor, late = np.abs(x) - (drive.coulomb, 0.9 * drive.rotor_inertia * (drive.coulomb > 0), 0.0)
+        friction, rotor, late = np.abs(x[:3]) - (drive.coulomb, 0.9 * drive.rotor_inertia * (drive.coulomb > 0), 0.0)
         return (
             term("coulomb_friction", "all_joints", torque_nm=float(friction)),
             term("rotor_inertia", "all_joints", added_kg_m2=float(rotor)),
             term("command_delay", "all_joints", delay_s=float(late)),
+            *(term(g, "all_joints", factor=float(np.exp(v))) for g, v in zip(gains, x[3:], strict=True)),
         )
 
-    found = least_squares(
-        lambda x: compared.residuals([terms(x)])[0], [0.2, 0.005, 0.01], diff_step=0.05, x_scale=[0.1, 0.01, 0.01]
-    )
+    start, scale = [0.2, 0.005, 0.01] + [-1.0] * len(gains), [0.1, 0.01, 0.01] + [0.5] * len(gains)
+    found = least_squares(lambda x: compared.residuals([terms(x)])[0], start, diff_step=0.05, x_scale=scale)
     return terms(found.x)
 
 
@@ -232,9 +243,10 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
         "--described",
-        choices=("nearly", "rough", "solid"),
+        choices=("nearly", "rough", "solid", "guessed"),
         default="nearly",
-        help="rough: with much too much friction, and rotors twice as heavy; solid: with parts 2.5 times as heavy",
+        help="guessed: by task=robot from the URDF alone; rough: with much too much friction, and rotors twice as heavy; "
+        "solid: with parts 2.5 times as heavy",
     )
     parser.add_argument(
         "--rate", type=float, default=RATE_HZ, help="Hz of the log; other than 100: uneven, as LeRobot's 30"
@@ -250,7 +262,7 @@ def main() -> int:
         found = improve(seen, pool_of(seen), progress=progress)
     print(f"\n{'':58s}  values  fitted  never seen (mrad)")
     rows = [(r.name, r.terms) for r in found.ladder]
-    rows += [("improve, in the end", found.terms), ("three shared numbers by least squares", three)]
+    rows += [("improve, in the end", found.terms), (f"{len(three)} shared numbers by least squares", three)]
     for name, terms in rows:
         values = sum(len(t.values) for t in terms)
         print(f"{name:58.58s}  {values:6d}  {mrad(seen, terms):6.1f}  {mrad(unseen, terms):6.1f}")

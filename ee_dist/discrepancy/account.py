@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import GUESSED, LABEL, assumed_text
 from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
@@ -86,7 +87,7 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     """What compare has to say; ``left``: where more than noise is."""
     ratio = found.error / found.noise_floor if found.noise_floor else float("inf")
     off = problem.told(found.error)
-    lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}."]
+    lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}.", *assumed_text(problem.robot)]
     lines += _beside(found.error, found.noise_floor, bool(left))
     parted = [f"{t} at {s:.2f} s" for t, s in found.parted_s.items() if s is not None]
     lines.append("Prediction and measurement part: " + ("; ".join(parted) or "nowhere") + ".")
@@ -167,9 +168,10 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         error = _errors(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
         sure = f"How sure: it takes off {confidence(best)}{_rest(best.explained, not found.left)}"
         sure += f"; {_rivals(found.tried, best.tied_with)}."
-        lines.append(entry.physics)
+        guessed = best.proposal.label == LABEL
+        lines.append(GUESSED if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""
-        lines.append(f"Its mark in a residual: {entry.signature}{turned}")
+        lines += [] if guessed else [f"Its mark in a residual: {entry.signature}{turned}"]
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:

@@ -7,10 +7,11 @@ them where twenty small ones would be right, and is caught there. This goes the 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import put_right, puts_right
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
 from ee_dist.discrepancy.examine import Current, calm_trials
@@ -30,6 +31,9 @@ from ee_dist.trials.log import Array
 
 TWIN = 0.99
 """Correlation of two effects' marks from which the data cannot hold them apart, and the one later in the catalogue stays out."""
+LEAST, MOST = -0.7, 1.0
+"""Changes of mass, as shares, that parts may have all over a robot: drawn solid and printed hollow they weigh a third. Where
+gains and friction are free too, torques have no scale but the masses: without bounds all of them may grow together."""
 FEWEST = 3
 """Effects that must be there to be fitted at once."""
 WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
@@ -61,7 +65,7 @@ def everywhere(
     calm = search.among(calm_trials(search.problem, as_it_is))
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
     found, places = None if again else look.kept(current), Model(current.parts).places
-    for keep in _instead(current, own):
+    for keep in _instead(search.problem.robot, current, own):
         base = Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
         other = look.kept(base, more=not keep[own:])
         if other is not None and (
@@ -71,14 +75,16 @@ def everywhere(
     return look.steps(found) if found is not None else None
 
 
-def _instead(current: Current, own: int) -> Iterator[list[int]]:
+def _instead(robot: Robot, current: Current, own: int) -> Iterator[list[int]]:
     """Numbers of the parts to begin with, beside all of them. What was added so far may stand in for what is wrong everywhere:
-    without it; and what was found to be a little wrong everywhere for what was added last: that anew."""
-    special = [k for k, c in enumerate(current.parts) if k >= own and not c.effect.everywhere]
+    without it; and what was found to be a little wrong everywhere for what was added last: that anew. What puts assumed
+    drives right stays: nobody believes in what they were."""
+    stay = [k for k, c in enumerate(current.parts) if k < own or puts_right(robot, c)]
+    special = [k for k, c in enumerate(current.parts) if k not in stay and not c.effect.everywhere]
     if special:
-        yield list(range(own))
-        if len(special) < len(current.parts) - own:
-            yield [*range(own), *special]
+        yield stay
+        if len(stay) + len(special) < len(current.parts):
+            yield sorted([*stay, *special])
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +120,9 @@ class _Look:
         more than the current model."""
         robot = self.search.problem.robot
         base = _apart(robot, base, self.own)
-        few = [c for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)]
+        around = put_right(robot, base.parts, base.hypothesis)
+        few = [_a_little(c) for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)]
+        few = [candidate(around, c.effect, c.target) if puts_right(robot, c) else c for c in few]
         few = _distinct(self.calm, base, few)
         if not few or len(base.parts) + len(few) < FEWEST:
             return None
@@ -177,7 +185,8 @@ class _Look:
         search, problem, kept, own = self.search, self.search.problem, found.model, self.own
         places = Model(kept.parts).places
         names = {c.name for c in self.current.parts}
-        gone = tuple(c.name for c in self.current.parts[own:] if c.name not in {p.name for p in kept.parts})
+        stay = {p.name for p in kept.parts}
+        gone = tuple(c.name for c in self.current.parts[own:] if not {c.name, *_taken_apart(problem.robot, c)} & stay)
         # What the ladder has already is not shown as a step again.
         chosen = [k for k, c in enumerate(kept.parts) if k < own or c.name in names]
         shown, energy = set(chosen), next(float(r @ r) for cut, r in self.cuts if cut is found.cut)
@@ -234,18 +243,26 @@ def _label(parts: Sequence[Candidate]) -> str:
     return " + ".join(names)
 
 
+def _a_little(c: Candidate) -> Candidate:
+    """With bounds no wider than what may be wrong with each part of a robot at once."""
+    if c.effect.family != "body" or c.effect.main.unit != "1":
+        return c
+    return replace(c, bounds=tuple((max(low, LEAST), min(high, MOST)) for low, high in c.bounds))
+
+
 def _group(robot: Robot, c: Candidate) -> bool:
     return bool(members_of(robot, c.target, c.effect.targets(robot)))
 
 
 def _apart(robot: Robot, current: Current, own: int) -> Current:
-    """The model with each shared effect of this kind taken apart into its members, with the values that they shared."""
+    """The model with each shared effect of this kind taken apart into its members, with the values that they shared. One that
+    puts assumed drives right stays: members differ from it by a little, and not from what was assumed."""
 
     parts: list[Candidate] = []
     values: list[Array] = []
     for k, (c, place) in enumerate(zip(current.parts, Model(current.parts).places, strict=True)):
         u = current.u[place]
-        if k < own or not c.effect.everywhere or not _group(robot, c):
+        if k < own or not c.effect.everywhere or not _group(robot, c) or puts_right(robot, c):
             parts.append(c)
             values.append(u)
             continue
@@ -255,6 +272,11 @@ def _apart(robot: Robot, current: Current, own: int) -> Current:
                 parts.append(member)
                 values.append(np.clip(member.shares(c.values(u)), member.lower, member.upper))
     return Current(tuple(parts), np.concatenate([*values, np.zeros(0)]))
+
+
+def _taken_apart(robot: Robot, c: Candidate) -> list[str]:
+    """Names of a shared effect's members."""
+    return [f"{c.effect.name}@{m}" for m in members_of(robot, c.target, c.effect.targets(robot))]
 
 
 def _distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[Candidate]:

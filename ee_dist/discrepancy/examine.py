@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import assumed_drives
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.judge import NEAR, Judged, judge, least_energy, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
@@ -115,6 +116,8 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     ]
     starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
     starts += _families(screened, starts, least)
+    guessed = assumed_drives(now.among(busy), pool, [c.name for c in current.parts])
+    starts += [guessed] if guessed is not None else []
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
     far = nearest > FAR**2
     judged = _judged(search, current, starts, base, len(pool), leading, far)

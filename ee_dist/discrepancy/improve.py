@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import puts_right
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import everywhere
 from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
@@ -32,6 +33,7 @@ from ee_dist.discrepancy.search.search import Progress, Search, quiet
 from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 FEW = 1
@@ -95,7 +97,9 @@ def improve(
                 if kept is not None:
                     last, current = kept, Current(current.parts, values_of(current.parts, before))
             best = last.best
-            ready = len(current.parts) != looked and anew < OFTEN and (not spread or _special(current, own))
+            ready = (
+                len(current.parts) != looked and anew < OFTEN and (not spread or _special(problem.robot, current, own))
+            )
             if ready and _many(search, last, len(current.parts) - own, spread > 0):
                 found = everywhere(search, current, own, pool, travelling(problem), again=spread > 0)
                 looked, anew = len(current.parts), anew + (spread > 0)
@@ -160,9 +164,9 @@ def _examined(search: Search, current: Current, pool: Sequence[Candidate], effor
     return examine(search, current, pool, effort)
 
 
-def _special(current: Current, own: int) -> bool:
-    """Whether something was added that is no small wrong everywhere."""
-    return any(not c.effect.everywhere for c in current.parts[own:])
+def _special(robot: Robot, current: Current, own: int) -> bool:
+    """Whether something was added that is no small wrong everywhere, nor puts right what was assumed."""
+    return any(not c.effect.everywhere and not puts_right(robot, c) for c in current.parts[own:])
 
 
 def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:

@@ -16,6 +16,7 @@ from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import (
     bolted_motors,
     damped_drives,
+    is_adjustable,
     is_arm,
     motors,
     motors_with_speed_limit,
@@ -95,15 +96,31 @@ def back_emf(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, speed_limit=d.speed_limit / (1.0 + values["change"])))
 
 
+GAIN_KNOWN, GAIN_ASSUMED = (0.2, 5.0), (0.02, 20.0)
+"""Factors worth trying on a position gain that somebody knew, and on one that had to be assumed."""
+
+
+def _gains(robot: Robot, target: str) -> dict[str, Range]:
+    if (target, "kp") not in robot.assumed:
+        return {"factor": GAIN_KNOWN}
+    low, high = GAIN_ASSUMED
+    most = scales.firmest(robot, target) / scales.drive_of(robot, target).kp
+    return {"factor": (low, min(high, max(GAIN_KNOWN[1], most)))}
+
+
 @effect(
     "position_gain",
     family="drive",
     targets=position_drives,
-    parameters=(Parameter("factor", "1", 0.01, 100.0, 1.0, "factor on the gain of the position controller", 0.01),),
+    parameters=(
+        Parameter(
+            "factor", "1", 0.01, 100.0, 1.0, "factor on the gain of the position controller", 0.01, by_ratio=True
+        ),
+    ),
     physics="The position controller has another gain than the model says: a setting of a trial, or a data sheet that is wrong.",
     signature="Residual command in proportion to the position error.",
-    ranges=scales.always(factor=(0.2, 5.0)),
-    worth_proposing=is_arm,
+    ranges=_gains,
+    worth_proposing=is_adjustable,
     everywhere=True,
 )
 def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
@@ -116,10 +133,14 @@ def _steepest(robot: Robot, drive: Drive) -> tuple[float, float]:
     return own, STABLE * scales.steady(robot, drive.joint) / robot.time_step_s
 
 
+NEXT_TO_NONE = 0.01
+"""Of a gain on speed: with none at all the drive would be none that has such a gain, and no other factor could act on it."""
+
+
 def _damping(robot: Robot, target: str) -> dict[str, Range]:
     drive = scales.drive_of(robot, target)
     own, most = _steepest(robot, drive)
-    return {"factor": (0.0, min(5.0, max(1.02, (most - own) / drive.kd)))}
+    return {"factor": (NEXT_TO_NONE, min(5.0, max(1.02, (most - own) / drive.kd)))}
 
 
 @effect(
@@ -130,7 +151,7 @@ def _damping(robot: Robot, target: str) -> dict[str, Range]:
     physics="The controller damps more or less than the model says: its gain on the joint's speed is another.",
     signature="Residual command in proportion to speed while the drive is not at its limit; like viscous friction, but gone when "
     "the drive is released.",
-    worth_proposing=is_arm,
+    worth_proposing=is_adjustable,
     ranges=_damping,
 )
 def speed_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:

@@ -59,6 +59,8 @@ class Parameter:
     """Smallest change worth telling apart in a report."""
     on_top: str = ""
     """The number of a drive that the value comes on top of: below zero there is less of it than described."""
+    by_ratio: bool = False
+    """Whether ranges are walked through in equal ratios: a factor of a tenth is as far as one of ten."""
 
 
 Transform = Callable[[Any, str, Mapping[str, float]], Any]

@@ -38,13 +38,18 @@ def check_written(robot: System, terms: Hypothesis) -> None:
 
 
 def _not_too_much(robot: Robot, terms: Hypothesis) -> None:
+    """What a joint has less of than all of them share may be more than a fit left of it; the joint has none of it then."""
+    shared: set[tuple[str, str]] = set()
     for t in terms:
         entry, values = find(t.effect), dict(t.values)
+        places = entry.targets(robot)  # of a place that is none of them others say so
+        joints = members_of(robot, t.target, places) or tuple({t.target} & set(places))
+        before = set(shared)
+        shared |= {(t.effect, j) for j in joints if len(joints) > 1}
         for p in entry.parameters:
             if not p.on_top or values[p.name] >= 0:
                 continue
-            places = entry.targets(robot)  # of a place that is none of them others say so
-            for joint in members_of(robot, t.target, places) or tuple({t.target} & set(places)):
+            for joint in [j for j in joints if (t.effect, j) not in before]:
                 has = getattr(drive_of(robot, joint), p.on_top)
                 if -values[p.name] > has * (1 + ROUNDING):
                     raise EffectError(

@@ -180,15 +180,13 @@ def deadband(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 
 LIGHTER, LIGHTER_AT_LEAST = 0.9, 0.25
 """Shares of the described rotor's inertia that may not be there: files often carry what keeps a simulation steady. More than
-the smaller share only where the joint stays slow enough for its controller,"""
-STEPS = 2.8
-"""which it is with so many time steps in a radian of its own oscillation."""
+the smaller share only where the joint stays slow enough for its controller."""
 
 
 def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     drive, felt, dt = scales.drive_of(robot, target), scales.inertia(robot, target), robot.time_step_s
     stiff, damping = (drive.kp, drive.kd) if drive.command == "position" else (0.0, drive.kp)
-    spare = felt - max(stiff * (STEPS * dt) ** 2, 2.0 * damping * dt)
+    spare = felt - max(stiff * (scales.STEPS * dt) ** 2, 2.0 * damping * dt)
     rotor = drive.rotor_inertia
     less = max(LIGHTER_AT_LEAST * rotor, min(LIGHTER * rotor, spare))
     return {"added_kg_m2": (-less, max(4.0 * rotor, felt))}

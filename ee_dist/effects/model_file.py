@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
 from ee_dist.effects.described import check_written
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot, RobotError
+from ee_dist.robots.ranges import drive_of
 from ee_dist.robots.serial import robot_to_dict
 from ee_dist.robots.texts import read_text
 
@@ -36,7 +37,11 @@ class ModelFile:
 
     @property
     def model(self) -> Robot:
-        return apply(self.robot, self.terms)
+        """The robot with its effects. What these changed is no longer assumed."""
+        found = apply(self.robot, self.terms)
+        pairs = {d.joint: (d, drive_of(self.robot, d.joint)) for d in found.drives}
+        still = [(j, f) for j, f in found.assumed if getattr(pairs[j][0], f) == getattr(pairs[j][1], f)]
+        return replace(found, assumed=tuple(still))
 
 
 def read_model(path: str | Path) -> ModelFile:

@@ -15,6 +15,7 @@ __all__ = [
     "Ranges",
     "always",
     "drive_of",
+    "firmest",
     "inertia",
     "speed",
     "steady",
@@ -24,6 +25,8 @@ __all__ = [
     "weight",
 ]
 
+STEPS = 2.8
+"""Time steps in a radian of a joint's own oscillation from which its controller is simulated as it is."""
 Range = tuple[float, float]
 Ranges = Callable[[Robot, str], Mapping[str, Range]]
 
@@ -71,6 +74,11 @@ def steady(robot: Robot, joint: str) -> float:
 def stiffest(robot: Robot, joint: str) -> float:
     """The stiffest spring on the joint that its time step resolves, some twelve steps a period; N.m/rad (N/m)."""
     return 0.25 * steady(robot, joint) / robot.time_step_s**2
+
+
+def firmest(robot: Robot, joint: str) -> float:
+    """The largest gain of a position controller that the time step resolves; N.m/rad (N/m)."""
+    return inertia(robot, joint) / (STEPS * robot.time_step_s) ** 2
 
 
 def weight(robot: Robot) -> float:

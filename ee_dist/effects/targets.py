@@ -102,3 +102,8 @@ def sensor_groups(robot: Robot) -> tuple[str, ...]:
 def is_arm(robot: Robot) -> bool:
     """Bolted down, with more than one driven joint."""
     return not robot.free_base and len(robot.drives) > 1
+
+
+def is_adjustable(robot: Robot) -> bool:
+    """An arm, whose maker or user set its controllers; or any robot whose description guesses at their gains."""
+    return is_arm(robot) or bool(robot.assumed_joints("kp"))

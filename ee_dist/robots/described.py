@@ -52,6 +52,8 @@ UNITS = {
     ("motor_torque", "hinge"): "N.m",
     ("motor_torque", "slide"): "N",
 }
+ASSUMED = "assumed"
+"""Key of a drive: names of those of its numbers that nobody knows; a search puts them right first."""
 SCALE, OBEYED = "scale", "obeyed"
 """What ``velocity_limits`` of a file are: a scale for what is measured, or limits that the controllers keep to."""
 OF_JOINT = ("angle", *dict.fromkeys(kind for kind, _ in UNITS))
@@ -99,6 +101,7 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
         start_position_m=tuple(number(v, f"{where}: start_position_m") for v in start),  # type: ignore[arg-type]
         start_rotation=body.start_rotation,
         time_step_s=number(data.get("time_step_s", step), f"{where}: time_step_s"),
+        assumed=_assumed(data.get("drives"), where),
     )
     robot = checked(robot, where)
     if body.time_step_s is None and "time_step_s" not in data:
@@ -132,7 +135,7 @@ def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:
         if not isinstance(entry, Mapping):
             raise RobotError(f"{here}: expected at least 'kp' (torque per position error) or 'command: torque'")
         for key in entry:
-            if key not in known:
+            if key not in (*known, ASSUMED):
                 raise RobotError(f"{here}: unknown key {quoted(key)}; {near(str(key), known)}")
         if entry.get("command", "position") not in COMMANDS:
             raise RobotError(f"{here}: command: {quoted(entry['command'])}; expected one of {', '.join(COMMANDS)}")
@@ -141,6 +144,20 @@ def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:
         for name in moving
         if name in given or name in body.driven
     )
+
+
+def _assumed(data: Any, where: str) -> tuple[tuple[str, str], ...]:
+    """(joint, field) of what the description marks as assumed."""
+    known, found = tuple(f.name for f in fields(Drive) if f.name != "joint"), []
+    for joint, entry in (data or {}).items():
+        names, here = (entry or {}).get(ASSUMED, []), f"{where}: drives: {joint}: {ASSUMED}"
+        if not isinstance(names, list):
+            raise RobotError(f"{here}: expected a list such as [kp, kd], not {quoted(names)}")
+        for name in names:
+            if name not in known:
+                raise RobotError(f"{here}: unknown key {quoted(name)}; {near(str(name), known)}")
+            found.append((str(joint), str(name)))
+    return tuple(found)
 
 
 def _obeying(drives: tuple[Drive, ...], asked: Any, body: Body, where: str) -> tuple[Drive, ...]:
@@ -161,7 +178,7 @@ def _obeying(drives: tuple[Drive, ...], asked: Any, body: Body, where: str) -> t
 def _drive(name: str, entry: Mapping[str, Any], found: Mapping[str, float | str], where: str) -> Drive:
     here = f"{where}: drives: {name}"
     numbers: dict[str, Any] = {k: v for k, v in found.items() if k != "command"}
-    numbers |= {str(k): number(v, f"{here}: {k}") for k, v in entry.items() if k != "command"}
+    numbers |= {str(k): number(v, f"{here}: {k}") for k, v in entry.items() if k not in ("command", ASSUMED)}
     command = str(entry.get("command", found.get("command", "position")))
     if command in ("position", "speed") and "kp" not in numbers:
         raise RobotError(f"{here}: expected at least 'kp' (torque per {command} error), or 'command: torque'")

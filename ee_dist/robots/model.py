@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -225,6 +225,9 @@ class Robot:
     time_step_s: float = 0.01
     lost: tuple[str, ...] = ()
     """Names of parts broken off: kept in the description, so that channels keep their places, absent in the engine."""
+    assumed: tuple[tuple[str, str], ...] = field(default=(), compare=False)
+    """(joint, field of its drive) of what a description says only because something had to be said. No part of what the robot is:
+    a search looks there first, and farther."""
 
     # -- look-ups ----------------------------------------------------------------------------------------------------
 
@@ -239,6 +242,10 @@ class Robot:
     @property
     def sensor_names(self) -> tuple[str, ...]:
         return tuple(s.name for s in self.sensors)
+
+    def assumed_joints(self, name: str) -> tuple[str, ...]:
+        """Joints of whose drive the field of that name was assumed, in the order of the robot."""
+        return tuple(j for j in self.motor_names if (j, name) in self.assumed)
 
     def joint(self, name: str) -> Joint:
         return _find(self.joints, "name", name, "joint")

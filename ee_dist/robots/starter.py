@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from ee_dist.robots.body import Body
-from ee_dist.robots.described import GRAVITY_M_S2, robot_of_body
+from ee_dist.robots.described import ASSUMED, GRAVITY_M_S2, robot_of_body
 from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.model import Joint, Robot
 from ee_dist.robots.ranges import span, travel
@@ -52,8 +52,8 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
     by_mark: dict[str, list[str]] = {}
     lines = [f"{kind}: {_plain(source)}"]
 
-    def line(text: str, mark: str | None) -> None:
-        lines.append(text + (f"  # assumed: {mark}" if mark else ""))
+    def line(text: str, mark: str | None, said: bool = True) -> None:
+        lines.append(text + (f"  # assumed: {mark}" if mark and said else ""))
         if mark:
             by_mark.setdefault(mark, []).append(text.strip().split(":")[0])
 
@@ -69,7 +69,9 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
     drives = {j.name: _drive(j, body, _inertia(body)) for j in body.moving}
     lines.append("drives:" if drives else "drives: {}")
     for name, (entry, guessed) in drives.items():
-        line(f"  {_plain(name)}: {_flow(entry)}", ", ".join(guessed) or None)
+        known = [g for g in guessed if g in entry]
+        marked = entry | {ASSUMED: known} if known else entry
+        line(f"  {_plain(name)}: {_flow(marked)}", ", ".join(guessed) or None, known != guessed)
     assumed += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if names[3:] else ''}: {mark}"
                 for mark, names in by_mark.items()]  # fmt: skip
     if body.sensors:

@@ -71,7 +71,10 @@ def run(config: Config, options: Options, out: Path) -> None:
 
 def text_of(found: Starter) -> str:
     """The description with a head that says what it is."""
-    head = [f"# {found.robot.name}: written by task=robot; every value marked 'assumed' is a guess to be put right."]
+    head = [
+        f"# {found.robot.name}: written by task=robot; every value marked 'assumed' is a guess. Put it right and take the mark "
+        "off, or let improve find it."
+    ]
     head += [f"# missing: {m}" for m in found.missing]
     return "\n".join(head) + "\n" + found.text
 

@@ -105,6 +105,17 @@ def test_friction_that_is_described_can_be_taken_off_and_no_more(effect: str, ke
         check_written(rough, (more,))
 
 
+def test_a_joint_may_have_less_of_what_all_of_them_share() -> None:
+    less = term("coulomb_friction", "hip_front_left", torque_nm=-0.3)
+    shared = term("coulomb_friction", "all_joints", torque_nm=0.2)
+    check_written(QUADRUPED, (shared, less))
+    drives = {d.joint: d.coulomb for d in apply(QUADRUPED, (shared, less)).drives}
+    assert drives["hip_front_left"] == 0.0
+    assert drives["hip_front_right"] == 0.2
+    with pytest.raises(EffectError, match="cannot be taken off"):
+        check_written(QUADRUPED, (less, shared))
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])
 def test_a_value_that_is_no_number_is_refused(value: object) -> None:
     with pytest.raises(EffectError, match="torque_nm must be a number"):
@@ -162,3 +173,11 @@ def test_units_follow_the_kind_of_joint_and_the_channel() -> None:
     assert friction.unit("damping_nm_s_rad", slider(), "joint") == "N.s/m"
     assert friction.unit("damping_nm_s_rad", QUADRUPED, "hip_front_left") == "N.m.s/rad"
     assert bias.unit("bias", slider(), "velocity") == "m/s"
+
+
+def test_a_factor_at_its_bound_leaves_others_something_to_act_on() -> None:
+    robot = QUADRUPED
+    low = {e.name: e.bounds(robot, "hip_front_left")["factor"][0] for e in (find("speed_gain"), find("position_gain"))}
+    none_left = tuple(term(name, "all_joints", factor=factor) for name, factor in low.items())
+    again = tuple(term(name, "hip_front_left", factor=0.5) for name in low)
+    assert apply(robot, (*none_left, *again)).drives[0].kd > 0

@@ -29,7 +29,11 @@ def test_quadruped_comes_back_equal_to_the_last_bit() -> None:
 @given(mass=FLOATS, limit=FLOATS, name=st.text(st.characters(exclude_categories=["Cs"])), value=FLOATS)
 def test_any_number_and_name_comes_back(mass: float, limit: float, name: str, value: float) -> None:
     robot = quadruped().with_part("body", mass_kg=mass).with_drive("hip_rear_left", torque_limit=limit)
-    robot = replace(robot, name=name).with_law(Law(name, "hip_rear_left", ((name, value),))).without("upper_front_left")
+    robot = (
+        replace(robot, name=name, assumed=((name, "kp"),))
+        .with_law(Law(name, "hip_rear_left", ((name, value),)))
+        .without("upper_front_left")
+    )
     assert repr(robot_from_json(robot_to_json(robot))) == repr(robot)
 
 

@@ -196,6 +196,11 @@ def test_broken_xml_names_the_line(tmp_path: Path) -> None:
         ("urdf: ARM\ninertia_about: joint", "has more inertia about the joint than the .* they are about its centre"),
         ("urdf: ARM\ntime_step_s: 2", "seconds, not milliseconds"),
         ("urdf: ARM\ndrives: {elbow: {kp: .nan}}", "drives: elbow: kp: nan; expected 0 to 1e"),
+        (
+            "urdf: ARM\ndrives: {elbow: {kp: 1, assumed: kp}}",
+            r"elbow: assumed: expected a list such as \[kp, kd\], not 'kp'",
+        ),
+        ("urdf: ARM\ndrives: {elbow: {kp: 1, assumed: [kb]}}", "elbow: assumed: unknown key 'kb'; did you mean k"),
         ("urdf: ARM\ndrives: {elbow: {kp: -1}}", "drives: elbow: kp: -1; expected 0 to 1e"),
         ("urdf: ARM\ndrives: {elbow: {kp: 1e308}}", "drives: elbow: kp: 1e.308; expected 0 to 1e"),
         ("urdf: ARM\ndrives: {elbow: {kp: 1, speed_limit: 0}}", "elbow: speed_limit: 0; expected more than 0"),

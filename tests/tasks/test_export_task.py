@@ -54,6 +54,20 @@ def test_a_shim_runs_beside_plain_mujoco_in_another_process(cli, model):
     assert "elbow" in done.stdout
 
 
+def test_what_a_model_has_put_right_is_no_longer_assumed(cli, tmp_path):
+    file = tmp_path / "model.yaml"
+    file.write_text(
+        f"robot: {{urdf: {ARM}, drives: {{elbow: {{kp: 100, kd: 1, assumed: [kp, kd]}}}}}}\n"
+        "effects: [{effect: position_gain, target: elbow, factor: 0.15}]\n"
+    )
+    outcome = cli("task=export", f"model={file}", "to=yaml")
+    assert outcome.status == 0, outcome.err
+    (run,) = outcome.runs()
+    robot, _ = load_robot(run / "robot.yaml")
+    assert robot.drives[0].kp == pytest.approx(15)
+    assert robot.assumed == (("elbow", "kd"),)
+
+
 def test_a_yaml_is_the_whole_robot_and_a_urdf_says_what_it_cannot_hold(cli, model):
     file = model("  - {effect: mounting_tilt, target: table, forward_deg: 5}")
     whole = cli("task=export", f"model={file}", "to=yaml")

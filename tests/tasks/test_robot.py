@@ -22,14 +22,16 @@ def test_a_urdf_becomes_a_description_with_its_assumptions_marked(cli):
     (run,) = outcome.runs()
     assert (run / "robot.rrd").stat().st_size > 1000
     text = (run / "robot.yaml").read_text()
-    marked = [line for line in text.splitlines() if "# assumed:" in line]
+    marked = [line for line in text.splitlines() if " assumed: " in line]
     assert [line.strip().split(":")[0] for line in marked] == [
         "free_base", "# time_step_s", "gravity_m_s2", "turn", "shoulder", "elbow",
     ]  # fmt: skip
-    assert "assumed: command, kp, kd" in marked[-1]
+    guessed = ["command", "kp", "kd", "rotor_inertia"]
+    assert yaml.safe_load(text)["drives"]["elbow"]["assumed"] == guessed
     assert yaml.safe_load(text)["drives"]["shoulder"]["torque_limit"] == 6.0
     robot, _ = load_robot(run / "robot.yaml")
     assert robot.motor_names == ("turn", "shoulder", "elbow")
+    assert robot.assumed == tuple((j, f) for j in robot.motor_names for f in guessed)
     found = outcome.summary()
     assert found["degrees_of_freedom"] == 3
     assert found["mass_kg"] == pytest.approx(sum(p.mass_kg for p in robot.parts))

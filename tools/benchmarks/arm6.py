@@ -23,7 +23,7 @@ RATE_HZ = 100.0
 DRIVE = {"kp": 17.8, "kd": 0.3, "torque_limit": 2.9, "speed_limit": 6.0, "rotor_inertia": 0.02}
 
 
-def urdf(heavier: float = 1.0) -> str:
+def urdf(heavier: float = 1.0, effort: float = DRIVE["torque_limit"]) -> str:
     """The body: a chain of six revolute joints, each link a rod along x (the first along z)."""
     parts = ["<robot name='desk_arm_6'><link name='base'/>"]
     parent, at = "base", "0 0 0.05"
@@ -35,7 +35,7 @@ def urdf(heavier: float = 1.0) -> str:
             f"<link name='{name}'><inertial><origin xyz='{middle}'/><mass value='{mass}'/>"
             f"<inertia ixx='{across}' iyy='{across}' izz='{across}' ixy='0' ixz='0' iyz='0'/></inertial></link>"
             f"<joint name='joint_{k + 1}' type='revolute'><parent link='{parent}'/><child link='{name}'/>"
-            f"<origin xyz='{at}'/><axis xyz='{axis}'/><limit lower='-1.7' upper='1.7' effort='2.9' velocity='6'/></joint>"
+            f"<origin xyz='{at}'/><axis xyz='{axis}'/><limit lower='-1.7' upper='1.7' effort='{effort:g}' velocity='6'/></joint>"
         )
         parent, at = name, f"0 0 {length}" if k == 0 else f"{length} 0 0"
     return "".join([*parts, "</robot>"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,7 +20,8 @@ SHAREABLE = ("drive", "sensing", "body")
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect at a target. Its values are searched as shares ``u`` (P,) of the way from neutral to a bound.
+    """An effect at a target. Its values are searched as shares ``u`` (P,) of the way from neutral to a bound, in equal steps
+    or, of factors, in equal ratios.
 
     ``bounds`` (lower, upper) of each parameter are those worth trying on this robot; ``inert`` are parameters that do
     nothing while the others are neutral (the speed at which a friction falls off).
@@ -54,8 +56,12 @@ class Candidate:
         """Parameters by name, in their own units, within bounds."""
         found = {}
         for p, (low, high), share in zip(self.effect.parameters, self.bounds, u, strict=True):
-            room = high - p.neutral if share >= 0 else p.neutral - low
-            found[p.name] = float(min(max(p.neutral + float(share) * room, low), high))
+            end = high if share >= 0 else low
+            if p.by_ratio:
+                value = p.neutral * (end / p.neutral) ** abs(float(share))
+            else:
+                value = p.neutral + float(share) * abs(end - p.neutral)
+            found[p.name] = float(min(max(value, low), high))
         return found
 
     def shares(self, values: Mapping[str, float]) -> Array:
@@ -63,14 +69,22 @@ class Candidate:
         out = []
         for p, (low, high) in zip(self.effect.parameters, self.bounds, strict=True):
             gap = values[p.name] - p.neutral
-            room = high - p.neutral if gap >= 0 else p.neutral - low
-            out.append(gap / room if room else 0.0)
+            end = high if gap >= 0 else low
+            if end == p.neutral:
+                out.append(0.0)
+            elif p.by_ratio:
+                out.append(math.copysign(math.log(values[p.name] / p.neutral) / math.log(end / p.neutral), gap))
+            else:
+                out.append(gap / abs(end - p.neutral))
         return np.array(out)
 
     def rooms(self, u: Sequence[float] | Array) -> Array:
         """(P,) what a unit of u is in the parameters' own units, at u."""
-        sides = zip(self.effect.parameters, self.bounds, u, strict=True)
-        return np.array([high - p.neutral if share >= 0 else p.neutral - low for p, (low, high), share in sides])
+        out, values = [], self.values(u)
+        for p, (low, high), share in zip(self.effect.parameters, self.bounds, u, strict=True):
+            end = high if share >= 0 else low
+            out.append(values[p.name] * abs(math.log(end / p.neutral)) if p.by_ratio else abs(end - p.neutral))
+        return np.array(out)
 
     def term(self, u: Sequence[float] | Array) -> Term:
         return Term(self.effect.name, self.target, tuple(self.values(u).items()))

@@ -1,0 +1,113 @@
+"""What a description of drives only assumed: the first suspect, and one that no single effect stands for.
+
+A servo whose gains were guessed is off in its position gain, its damping and its friction at once, and any one of them alone
+makes the prediction hardly better: a softer controller is also too slow, one with friction too stiff. So they are proposed
+together, one number each for all joints of which they were assumed, from the best of a grid of starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from ee_dist.basics.names import listed
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
+from ee_dist.effects.groups import JOIN, groups, members_of
+from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import drive_of
+from ee_dist.trials.log import Array
+
+TOGETHER = ("position_gain", "speed_gain", "torque_limit", "rotor_inertia", "coulomb_friction", "viscous_friction")
+"""The limit is among them although files state one: it is often what a CAD program writes where nobody entered any."""
+GAINS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+"""Shares of the assumed gains to look from: a guess may be off by an order of magnitude."""
+LAGS_RAD = (0.0, 0.02, 0.05)
+"""Errors (rad, m) at which a joint comes to rest by dry friction, to look from: those of hobby servos."""
+LIMITS = (0.0, 0.7)
+"""Shares of the stated torque limit that are not there, to look from."""
+STARTS = 3
+"""Of the starts that many are fitted."""
+LABEL = "assumed drives"
+GUESSED = (
+    "The description only guessed at what these drives do: their gains, limit, rotor and friction were found together. Write "
+    "them into it, or keep this model."
+)
+"""What is said of them in the place of an effect's physics."""
+
+
+def assumed_text(robot: Robot) -> list[str]:
+    """A line for people where a description only assumed what its controllers do."""
+    count = len(robot.assumed_joints("kp"))
+    names = listed(dict.fromkeys(f for _, f in robot.assumed if f != "command"))
+    drives = "1 drive" if count == 1 else f"{count} drives"
+    return [f"The description only assumed {names} of {drives}: explain and improve look there first."] if count else []
+
+
+def assumed_drives(
+    search: Search, pool: Iterable[Candidate], taken: Iterable[str] = ()
+) -> tuple[Proposal, Array] | None:
+    """Gains and friction of all drives whose position gain was assumed, and values u to fit them from; None where none was,
+    where it is ``taken`` (names of candidates) already, or where the pool has not the gain and another of these effects."""
+    robot = search.problem.robot
+    joints, names = robot.assumed_joints("kp"), {c.effect.name for c in pool}
+    if not joints or TOGETHER[0] not in names:
+        return None
+    parts = tuple(c for name in TOGETHER if name in names for c in _at(robot, name, joints))
+    if len(parts) < 2 or {c.name for c in parts} & set(taken):
+        return None
+    model = Model(parts)
+    starts = _starts(robot, joints, parts)
+    energies = [
+        float(r @ r) if np.isfinite(r).all() else np.inf
+        for r in search.residuals([model.hypothesis(u) for u in starts])
+    ]
+    best = [starts[k] for k in np.argsort(energies, kind="stable")[:STARTS]]
+    fits = follow_valley(search, [(model, u) for u in best], search.everything)
+    return Proposal(parts, LABEL), min(fits, key=lambda f: f.energy).u
+
+
+def puts_right(robot: Robot, c: Candidate) -> bool:
+    """Whether it is one of these effects, at joints whose gains were assumed."""
+    members = members_of(robot, c.target, c.effect.targets(robot)) or (c.target,)
+    return c.effect.name in TOGETHER and set(members) <= set(robot.assumed_joints("kp"))
+
+
+def put_right(robot: Robot, parts: Sequence[Candidate], terms: Hypothesis) -> Robot:
+    """The robot with those of a model's terms that put assumed drives right; these are no longer assumed then."""
+    right = tuple(t for c, t in zip(parts, terms, strict=True) if puts_right(robot, c))
+    return replace(apply(robot, right), assumed=()) if right else robot
+
+
+def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:
+    """The effect at these joints with one set of values, under the name of their group if they have one."""
+    named = {members: name for name, members in groups(robot).items()}
+    try:
+        return [candidate(robot, effect, named.get(tuple(joints), JOIN.join(joints)))]
+    except EffectError:
+        return []
+
+
+def _starts(robot: Robot, joints: Sequence[str], parts: Sequence[Candidate]) -> list[Array]:
+    """A grid: damping falls with the gain, so that a joint follows as fast, and friction holds as large an error."""
+    stiffness = float(np.median([drive_of(robot, j).kp for j in joints]))
+    found = []
+    for gain, lag, limit in product(GAINS, LAGS_RAD, LIMITS):
+        values = {
+            "position_gain": gain,
+            "speed_gain": gain,
+            "torque_limit": limit,
+            "coulomb_friction": lag * gain * stiffness,
+        }
+        u = [
+            c.shares({c.effect.main.name: values[c.effect.name]}) if c.effect.name in values else np.zeros(c.size)
+            for c in parts
+        ]
+        found.append(np.clip(np.concatenate(u), Model(tuple(parts)).lower, Model(tuple(parts)).upper))
+    return found
