@@ -76,7 +76,8 @@ def run(config: Config, options: Options, out: Path) -> None:
         robot, notes = robot_of(config.robot.name, config.robot.urdf, config.robot.drives)
         if not robot.drives:
             raise ConfigError(
-                f"{robot.name} has no drives: describe them in a YAML (robot=urdf robot.drives=FILE.yaml)"
+                f"{robot.name} has no drives: 'task=robot urdf={config.robot.urdf or 'FILE.urdf'}' writes a description "
+                "with some to begin with; then robot=urdf robot.drives=FILE.yaml"
             )
         proposal = proposal_for(files, robot, hints)
         mapping = written(proposal, config, files, out, console)

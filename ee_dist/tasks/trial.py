@@ -72,7 +72,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     robot = with_noise(described, config.noise or options.noise)
     if not robot.drives:
         raise ConfigError(
-            f"robot: {robot.name} has no drives, so nothing moves it; name them with robot.drives=FILE.yaml"
+            f"robot: {robot.name} has no drives, so nothing moves it; name them with robot.drives=FILE.yaml, which "
+            "'task=robot urdf=FILE.urdf' begins"
         )
     hidden = hypothesis(config.hidden, robot, hidden_seed)
     apply(robot, hidden)

@@ -228,6 +228,7 @@ TRIALS: Rows = (
     ("task=trial robot=urdf", "robot=urdf needs robot.urdf=FILE.urdf, or"),
     ("task=trial robot=urdf robot.urdf=nowhere.urdf", "expected a URDF"),
     ("task=trial robot=urdf robot.urdf=arm.urdf", "name them with robot.drives=FILE.yaml"),
+    ("task=import measured=t.csv robot=urdf robot.urdf=arm.urdf", "'task=robot urdf=arm.urdf' writes a description"),
     ("task=trial robot=mjcf", "robot=mjcf needs robot.file=FILE.xml, or robot.drives=FILE.yaml"),
     ("task=trial robot=mjcf robot.file=nowhere.xml", "expected an MJCF"),
     ("task=trial robot=urdf robot.drives=list.yaml", "expected a mapping with 'robot', 'urdf' or 'mjcf'"),
