@@ -23,7 +23,7 @@ from ee_dist.tasks.results.tables import typed
 def account(tied: list[str], explained: float = 1.0) -> Account:
     best = SimpleNamespace(
         terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
-        explained=explained, held_out="windows", error_heldout=1.1,
+        explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""),
     )  # fmt: skip
     found = SimpleNamespace(
         best=best,
@@ -102,6 +102,7 @@ def compared(error: float, left: list[Leftover]) -> Account:
         error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={}, channels=[SimpleNamespace(name="a_b")]
     )  # fmt: skip
     problem = SimpleNamespace(
+        robot=servo_pendulum(),
         told=str,
         natural=lambda e: e**2,
         natural_name="error",
