@@ -32,8 +32,8 @@ from ee_dist.trials.log import Array
 TWIN = 0.99
 """Correlation of two effects' marks from which the data cannot hold them apart, and the one later in the catalogue stays out."""
 LEAST, MOST = -0.7, 1.0
-"""Changes of mass, as shares, that parts may have all over a robot: drawn solid and printed hollow they weigh a third. Where
-gains and friction are free too, torques have no scale but the masses: without bounds all of them may grow together."""
+"""Changes of mass, as shares, that parts may have all over a robot of which gains were assumed: torques have no scale then but
+the masses, and all may grow together. With gains that are known they may go farther: a load on a light part is many times it."""
 FEWEST = 3
 """Effects that must be there to be fitted at once."""
 WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
@@ -121,7 +121,9 @@ class _Look:
         robot = self.search.problem.robot
         base = _apart(robot, base, self.own)
         around = put_right(robot, base.parts, base.hypothesis)
-        few = [_a_little(c) for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)]
+        few = [
+            _a_little(robot, c) for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)
+        ]
         few = [candidate(around, c.effect, c.target) if puts_right(robot, c) else c for c in few]
         few = _distinct(self.calm, base, few)
         if not few or len(base.parts) + len(few) < FEWEST:
@@ -243,9 +245,9 @@ def _label(parts: Sequence[Candidate]) -> str:
     return " + ".join(names)
 
 
-def _a_little(c: Candidate) -> Candidate:
-    """With bounds no wider than what may be wrong with each part of a robot at once."""
-    if c.effect.family != "body" or c.effect.main.unit != "1":
+def _a_little(robot: Robot, c: Candidate) -> Candidate:
+    """Where gains were assumed, with bounds no wider than what may be wrong with each part of a robot at once."""
+    if c.effect.family != "body" or c.effect.main.unit != "1" or not robot.assumed_joints("kp"):
         return c
     return replace(c, bounds=tuple((max(low, LEAST), min(high, MOST)) for low, high in c.bounds))
 
