@@ -175,14 +175,11 @@ def write(out: Path, seed: int, described: str, rate_hz: float = RATE_HZ) -> dic
     body.write_text(urdf(heavier, EXPORTED_NM if guessed else DRIVE["torque_limit"]), encoding="utf-8")
     joints = [f"joint_{k + 1}" for k in range(N)]
     sensors = [{"name": f"{j}_position", "kind": "position", "target": j} for j in joints]
-    entry = {"urdf": "arm.urdf", "has_floor": False, "sensors": sensors}
     more = {"coulomb": 0.4, "viscous": 0.3, "rotor_inertia": 2 * DRIVE["rotor_inertia"]} if described == "rough" else {}
-    entry["drives"] = dict.fromkeys(joints, DRIVE | more)
+    entry = {"urdf": body.name, "has_floor": False, "drives": dict.fromkeys(joints, DRIVE | more)}
     if guessed:
-        entry = yaml.safe_load(starter(read_body("urdf", body), "urdf", body.name, body.name).text) | {
-            "sensors": sensors
-        }
-    (out / "arm.yaml").write_text(yaml.safe_dump(entry), encoding="utf-8")
+        entry = yaml.safe_load(starter(read_body("urdf", body), "urdf", body.name, body.name).text)
+    (out / "arm.yaml").write_text(yaml.safe_dump(entry | {"sensors": sensors}), encoding="utf-8")
     arm = Arm(seed)
     files: dict[str, list[str]] = {"fitted": [], "held": []}
     head = ",".join(["time_s", *(f"{j}_command_rad" for j in joints), *(f"{j}_position_rad" for j in joints)])
@@ -256,13 +253,13 @@ def main() -> int:
     out = args.out.resolve()
     files = write(out, args.seed, args.described, args.rate)
     seen, unseen = (problem(out, use, files[use]) for use in ("fitted", "held"))
-    three = by_hand(seen)
+    shared = by_hand(seen)
     began = time.process_time()
     with SearchProgress(Console(), quiet) as progress:
         found = improve(seen, pool_of(seen), progress=progress)
     print(f"\n{'':58s}  values  fitted  never seen (mrad)")
     rows = [(r.name, r.terms) for r in found.ladder]
-    rows += [("improve, in the end", found.terms), (f"{len(three)} shared numbers by least squares", three)]
+    rows += [("improve, in the end", found.terms), (f"{len(shared)} shared numbers by least squares", shared)]
     for name, terms in rows:
         values = sum(len(t.values) for t in terms)
         print(f"{name:58.58s}  {values:6d}  {mrad(seen, terms):6.1f}  {mrad(unseen, terms):6.1f}")

@@ -19,7 +19,7 @@ from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
-from ee_dist.effects.groups import JOIN, groups, members_of
+from ee_dist.effects.groups import JOIN, groups
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of
 from ee_dist.trials.log import Array
@@ -34,6 +34,9 @@ LIMITS = (0.0, 0.7)
 """Shares of the stated torque limit that are not there, to look from."""
 STARTS = 3
 """Of the starts that many are fitted."""
+LEAST, MOST = -0.7, 1.0
+"""Changes of mass, as shares, that parts may have all over a robot of which gains were assumed: torques have no scale then but
+the masses, and all may grow together. With gains that are known they may go farther: a load on a light part is many times it."""
 LABEL = "assumed drives"
 GUESSED = (
     "The description only guessed at what these drives do: their gains, limit, rotor and friction were found together. Write "
@@ -63,7 +66,7 @@ def assumed_drives(
     if len(parts) < 2 or {c.name for c in parts} & set(taken):
         return None
     model = Model(parts)
-    starts = _starts(robot, joints, parts)
+    starts = _starts(robot, joints, model)
     energies = [
         float(r @ r) if np.isfinite(r).all() else np.inf
         for r in search.residuals([model.hypothesis(u) for u in starts])
@@ -75,14 +78,23 @@ def assumed_drives(
 
 def puts_right(robot: Robot, c: Candidate) -> bool:
     """Whether it is one of these effects, at joints whose gains were assumed."""
-    members = members_of(robot, c.target, c.effect.targets(robot)) or (c.target,)
-    return c.effect.name in TOGETHER and set(members) <= set(robot.assumed_joints("kp"))
+    return c.effect.name in TOGETHER and {*(c.members(robot) or (c.target,))} <= {*robot.assumed_joints("kp")}
 
 
-def put_right(robot: Robot, parts: Sequence[Candidate], terms: Hypothesis) -> Robot:
-    """The robot with those of a model's terms that put assumed drives right; these are no longer assumed then."""
+def beside(robot: Robot, parts: Sequence[Candidate], terms: Hypothesis, others: Sequence[Candidate]) -> list[Candidate]:
+    """What else may be a little wrong, with ranges beside the numbers that assumed drives share in a model of these ``parts``
+    and ``terms``: a joint differs from these as from any that are known. As it is where nothing was assumed."""
+    if not robot.assumed_joints("kp"):
+        return list(others)
     right = tuple(t for c, t in zip(parts, terms, strict=True) if puts_right(robot, c))
-    return replace(apply(robot, right), assumed=()) if right else robot
+    around = replace(apply(robot, right), assumed=()) if right else robot
+    return [candidate(around, c.effect, c.target) if puts_right(robot, c) else _bounded(c) for c in others]
+
+
+def _bounded(c: Candidate) -> Candidate:
+    if c.effect.family != "body" or c.effect.main.unit != "1":
+        return c
+    return replace(c, bounds=tuple((max(low, LEAST), min(high, MOST)) for low, high in c.bounds))
 
 
 def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:
@@ -94,7 +106,7 @@ def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:
         return []
 
 
-def _starts(robot: Robot, joints: Sequence[str], parts: Sequence[Candidate]) -> list[Array]:
+def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
     """A grid: damping falls with the gain, so that a joint follows as fast, and friction holds as large an error."""
     stiffness = float(np.median([drive_of(robot, j).kp for j in joints]))
     found = []
@@ -105,9 +117,7 @@ def _starts(robot: Robot, joints: Sequence[str], parts: Sequence[Candidate]) -> 
             "torque_limit": limit,
             "coulomb_friction": lag * gain * stiffness,
         }
-        u = [
-            c.shares({c.effect.main.name: values[c.effect.name]}) if c.effect.name in values else np.zeros(c.size)
-            for c in parts
-        ]
-        found.append(np.clip(np.concatenate(u), Model(tuple(parts)).lower, Model(tuple(parts)).upper))
+        mains = [(c, c.effect.main) for c in model.parts]
+        u = [c.shares({p.name: values.get(c.effect.name, p.neutral)}) for c, p in mains]
+        found.append(np.clip(np.concatenate(u), model.lower, model.upper))
     return found

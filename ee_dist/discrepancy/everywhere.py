@@ -7,11 +7,11 @@ them where twenty small ones would be right, and is caught there. This goes the 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ee_dist.discrepancy.assumed import put_right, puts_right
+from ee_dist.discrepancy.assumed import beside, puts_right
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
 from ee_dist.discrepancy.examine import Current, calm_trials
@@ -25,15 +25,11 @@ from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.discrepancy.search.valley import follow_valley
-from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 TWIN = 0.99
 """Correlation of two effects' marks from which the data cannot hold them apart, and the one later in the catalogue stays out."""
-LEAST, MOST = -0.7, 1.0
-"""Changes of mass, as shares, that parts may have all over a robot of which gains were assumed: torques have no scale then but
-the masses, and all may grow together. With gains that are known they may go farther: a load on a light part is many times it."""
 FEWEST = 3
 """Effects that must be there to be fitted at once."""
 WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
@@ -65,7 +61,7 @@ def everywhere(
     calm = search.among(calm_trials(search.problem, as_it_is))
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
     found, places = None if again else look.kept(current), Model(current.parts).places
-    for keep in _instead(search.problem.robot, current, own):
+    for keep in instead(search.problem.robot, current, own):
         base = Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
         other = look.kept(base, more=not keep[own:])
         if other is not None and (
@@ -75,16 +71,21 @@ def everywhere(
     return look.steps(found) if found is not None else None
 
 
-def _instead(robot: Robot, current: Current, own: int) -> Iterator[list[int]]:
+def instead(robot: Robot, current: Current, own: int) -> Iterator[list[int]]:
     """Numbers of the parts to begin with, beside all of them. What was added so far may stand in for what is wrong everywhere:
     without it; and what was found to be a little wrong everywhere for what was added last: that anew. What puts assumed
     drives right stays: nobody believes in what they were."""
     stay = [k for k, c in enumerate(current.parts) if k < own or puts_right(robot, c)]
-    special = [k for k, c in enumerate(current.parts) if k not in stay and not c.effect.everywhere]
+    special = [k for k, c in enumerate(current.parts) if k >= own and stands_out(robot, c)]
     if special:
         yield stay
         if len(stay) + len(special) < len(current.parts):
             yield sorted([*stay, *special])
+
+
+def stands_out(robot: Robot, c: Candidate) -> bool:
+    """Whether it is no small wrong everywhere, nor puts right what was assumed."""
+    return not c.effect.everywhere and not puts_right(robot, c)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,12 +121,8 @@ class _Look:
         more than the current model."""
         robot = self.search.problem.robot
         base = _apart(robot, base, self.own)
-        around = put_right(robot, base.parts, base.hypothesis)
-        few = [
-            _a_little(robot, c) for c in self._others(Model(base.parts)) if c.effect.everywhere and not _group(robot, c)
-        ]
-        few = [candidate(around, c.effect, c.target) if puts_right(robot, c) else c for c in few]
-        few = _distinct(self.calm, base, few)
+        few = [c for c in self._others(Model(base.parts)) if c.effect.everywhere and not c.members(robot)]
+        few = _distinct(self.calm, base, beside(robot, base.parts, base.hypothesis, few))
         if not few or len(base.parts) + len(few) < FEWEST:
             return None
         model, u = Model((*base.parts, *few)), np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
@@ -188,7 +185,7 @@ class _Look:
         places = Model(kept.parts).places
         names = {c.name for c in self.current.parts}
         stay = {p.name for p in kept.parts}
-        gone = tuple(c.name for c in self.current.parts[own:] if not {c.name, *_taken_apart(problem.robot, c)} & stay)
+        gone = tuple(c.name for c in self.current.parts[own:] if not {c.name, *taken_apart(problem.robot, c)} & stay)
         # What the ladder has already is not shown as a step again.
         chosen = [k for k, c in enumerate(kept.parts) if k < own or c.name in names]
         shown, energy = set(chosen), next(float(r @ r) for cut, r in self.cuts if cut is found.cut)
@@ -245,17 +242,6 @@ def _label(parts: Sequence[Candidate]) -> str:
     return " + ".join(names)
 
 
-def _a_little(robot: Robot, c: Candidate) -> Candidate:
-    """Where gains were assumed, with bounds no wider than what may be wrong with each part of a robot at once."""
-    if c.effect.family != "body" or c.effect.main.unit != "1" or not robot.assumed_joints("kp"):
-        return c
-    return replace(c, bounds=tuple((max(low, LEAST), min(high, MOST)) for low, high in c.bounds))
-
-
-def _group(robot: Robot, c: Candidate) -> bool:
-    return bool(members_of(robot, c.target, c.effect.targets(robot)))
-
-
 def _apart(robot: Robot, current: Current, own: int) -> Current:
     """The model with each shared effect of this kind taken apart into its members, with the values that they shared. One that
     puts assumed drives right stays: members differ from it by a little, and not from what was assumed."""
@@ -264,11 +250,11 @@ def _apart(robot: Robot, current: Current, own: int) -> Current:
     values: list[Array] = []
     for k, (c, place) in enumerate(zip(current.parts, Model(current.parts).places, strict=True)):
         u = current.u[place]
-        if k < own or not c.effect.everywhere or not _group(robot, c) or puts_right(robot, c):
+        if k < own or not c.effect.everywhere or not c.members(robot) or puts_right(robot, c):
             parts.append(c)
             values.append(u)
             continue
-        for target in members_of(robot, c.target, c.effect.targets(robot)):
+        for target in c.members(robot):
             member = candidate(robot, c.effect, target)
             if member.name not in {p.name for p in (*parts, *current.parts)}:
                 parts.append(member)
@@ -276,9 +262,9 @@ def _apart(robot: Robot, current: Current, own: int) -> Current:
     return Current(tuple(parts), np.concatenate([*values, np.zeros(0)]))
 
 
-def _taken_apart(robot: Robot, c: Candidate) -> list[str]:
+def taken_apart(robot: Robot, c: Candidate) -> list[str]:
     """Names of a shared effect's members."""
-    return [f"{c.effect.name}@{m}" for m in members_of(robot, c.target, c.effect.targets(robot))]
+    return [f"{c.effect.name}@{m}" for m in c.members(robot)]
 
 
 def _distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[Candidate]:

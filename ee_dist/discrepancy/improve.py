@@ -12,9 +12,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.assumed import puts_right
 from ee_dist.discrepancy.base_model import residual_as_it_is
-from ee_dist.discrepancy.everywhere import everywhere
+from ee_dist.discrepancy.everywhere import everywhere, stands_out
 from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, least_energy
@@ -33,7 +32,6 @@ from ee_dist.discrepancy.search.search import Progress, Search, quiet
 from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.catalogue import Hypothesis
-from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 FEW = 1
@@ -97,9 +95,8 @@ def improve(
                 if kept is not None:
                     last, current = kept, Current(current.parts, values_of(current.parts, before))
             best = last.best
-            ready = (
-                len(current.parts) != looked and anew < OFTEN and (not spread or _special(problem.robot, current, own))
-            )
+            special = any(stands_out(problem.robot, c) for c in current.parts[own:])
+            ready = len(current.parts) != looked and anew < OFTEN and (not spread or special)
             if ready and _many(search, last, len(current.parts) - own, spread > 0):
                 found = everywhere(search, current, own, pool, travelling(problem), again=spread > 0)
                 looked, anew = len(current.parts), anew + (spread > 0)
@@ -162,11 +159,6 @@ def _examined(search: Search, current: Current, pool: Sequence[Candidate], effor
     if search.problem.rugged and len(current.u) >= LARGE:
         return examine(search.on(current.hypothesis), Current(), pool, effort)
     return examine(search, current, pool, effort)
-
-
-def _special(robot: Robot, current: Current, own: int) -> bool:
-    """Whether something was added that is no small wrong everywhere, nor puts right what was assumed."""
-    return any(not c.effect.everywhere and not puts_right(robot, c) for c in current.parts[own:])
 
 
 def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:

@@ -44,14 +44,13 @@ def _not_too_much(robot: Robot, terms: Hypothesis) -> None:
         entry, values = find(t.effect), dict(t.values)
         places = entry.targets(robot)  # of a place that is none of them others say so
         joints = members_of(robot, t.target, places) or tuple({t.target} & set(places))
-        before = set(shared)
-        shared |= {(t.effect, j) for j in joints if len(joints) > 1}
         for p in entry.parameters:
             if not p.on_top or values[p.name] >= 0:
                 continue
-            for joint in [j for j in joints if (t.effect, j) not in before]:
+            for joint in [j for j in joints if (t.effect, j) not in shared]:
                 has = getattr(drive_of(robot, joint), p.on_top)
                 if -values[p.name] > has * (1 + ROUNDING):
                     raise EffectError(
                         f"{t}: {joint} is described with {has:g} {p.unit} of it; {-values[p.name]:g} cannot be taken off"
                     )
+        shared |= {(t.effect, j) for j in joints if len(joints) > 1}

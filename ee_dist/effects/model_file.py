@@ -39,8 +39,9 @@ class ModelFile:
     def model(self) -> Robot:
         """The robot with its effects. What these changed is no longer assumed."""
         found = apply(self.robot, self.terms)
-        pairs = {d.joint: (d, drive_of(self.robot, d.joint)) for d in found.drives}
-        still = [(j, f) for j, f in found.assumed if getattr(pairs[j][0], f) == getattr(pairs[j][1], f)]
+        still = [
+            (j, f) for j, f in found.assumed if getattr(drive_of(found, j), f) == getattr(drive_of(self.robot, j), f)
+        ]
         return replace(found, assumed=tuple(still))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from ee_dist.basics.names import did_you_mean
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
-from ee_dist.robots.model import COMMANDS, Drive, Joint, Part, Robot, RobotError, Sensor, Wiring, World
+from ee_dist.robots.model import COMMANDS, DRIVE_NUMBERS, Drive, Joint, Part, Robot, RobotError, Sensor, Wiring, World
 from ee_dist.robots.numbers import checked, number
 from ee_dist.robots.pivots import PIVOT_HINT, about_centre
 from ee_dist.robots.time_step import FINE_S, default_step_s, too_coarse
@@ -127,7 +127,7 @@ def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:
     if not isinstance(given, Mapping):
         raise RobotError(f"{where}: drives: expected 'joint: {{kp: ...}}', not {quoted(data)}")
     moving = tuple(j.name for j in body.moving)
-    known = tuple(f.name for f in fields(Drive) if f.name != "joint")
+    known = ("command", *DRIVE_NUMBERS, ASSUMED)
     for name, entry in given.items():
         here = f"{where}: drives: {name}"
         if name not in moving:
@@ -135,7 +135,7 @@ def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:
         if not isinstance(entry, Mapping):
             raise RobotError(f"{here}: expected at least 'kp' (torque per position error) or 'command: torque'")
         for key in entry:
-            if key not in (*known, ASSUMED):
+            if key not in known:
                 raise RobotError(f"{here}: unknown key {quoted(key)}; {near(str(key), known)}")
         if entry.get("command", "position") not in COMMANDS:
             raise RobotError(f"{here}: command: {quoted(entry['command'])}; expected one of {', '.join(COMMANDS)}")
@@ -146,17 +146,16 @@ def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:
     )
 
 
-def _assumed(data: Any, where: str) -> tuple[tuple[str, str], ...]:
+def _assumed(drives: Mapping[str, Mapping[str, Any]] | None, where: str) -> tuple[tuple[str, str], ...]:
     """(joint, field) of what the description marks as assumed."""
-    known, found = tuple(f.name for f in fields(Drive) if f.name != "joint"), []
-    for joint, entry in (data or {}).items():
-        names, here = (entry or {}).get(ASSUMED, []), f"{where}: drives: {joint}: {ASSUMED}"
+    found = []
+    for joint, entry in (drives or {}).items():
+        names = entry.get(ASSUMED, [])
         if not isinstance(names, list):
-            raise RobotError(f"{here}: expected a list such as [kp, kd], not {quoted(names)}")
-        for name in names:
-            if name not in known:
-                raise RobotError(f"{here}: unknown key {quoted(name)}; {near(str(name), known)}")
-            found.append((str(joint), str(name)))
+            raise RobotError(
+                f"{where}: drives: {joint}: {ASSUMED}: expected a list such as [kp, kd], not {quoted(names)}"
+            )
+        found += [(joint, str(name)) for name in names]
     return tuple(found)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ee_dist.basics.names import did_you_mean
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.model import COMMANDS, DRIVE_NUMBERS, Robot, RobotError
 
@@ -95,6 +96,12 @@ def checked(robot: Robot, where: str) -> Robot:
             raise RobotError(f"{here}: command: {quoted(d.command)}; expected one of {', '.join(COMMANDS)}")
         for name, bounds in DRIVE.items():
             _within(getattr(d, name), bounds, f"{here}: {name}")
+    for joint, name in robot.assumed:
+        here = f"{where}: drives: {joint}: assumed"
+        if joint not in robot.motor_names:
+            raise RobotError(f"{here}: no drive of that name; {did_you_mean(joint, robot.motor_names)}")
+        if name not in ("command", *DRIVE_NUMBERS):
+            raise RobotError(f"{here}: unknown key {quoted(name)}; {did_you_mean(name, DRIVE_NUMBERS)}")
     for s in robot.sensors:
         for name, bounds in SENSOR.items():
             _within(getattr(s, name), bounds, f"{where}: sensors: {s.name}: {name}")

@@ -13,7 +13,7 @@ from way_samples import Sample, measure, problem_by, samples
 from ee_dist.discrepancy.account import compare_account, explain_account
 from ee_dist.discrepancy.assumed import GUESSED, LABEL, assumed_drives, puts_right
 from ee_dist.discrepancy.compare import compare
-from ee_dist.discrepancy.everywhere import _instead, _taken_apart
+from ee_dist.discrepancy.everywhere import instead, taken_apart
 from ee_dist.discrepancy.examine import Current, examine
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.problem import Problem, error
@@ -110,8 +110,8 @@ def test_what_puts_them_right_stays_while_everything_is_fitted_and_nothing_else_
         candidate(some, *c) for c in (("speed_gain", "elbow"), ("zero_offset", "elbow"), ("deadband", "elbow"))
     )
     current = Current(parts, np.array([0.1, 0.1, 0.1]))
-    assert list(_instead(some, current, 0)) == [[0], [0, 2]]
-    assert list(_instead(samples()["arm"].robot, current, 0)) == [[], [0, 2]], "nothing was assumed"
+    assert list(instead(some, current, 0)) == [[0], [0, 2]]
+    assert list(instead(samples()["arm"].robot, current, 0)) == [[], [0, 2]], "nothing was assumed"
 
 
 def test_a_gain_is_looked_for_farther_off_where_it_was_assumed() -> None:
@@ -141,10 +141,10 @@ def test_it_is_told_that_the_description_only_guessed() -> None:
     assert GUESSED in lines
 
 
-def test_a_shared_effect_that_is_taken_apart_is_not_called_dropped() -> None:
+def test_a_shared_effect_that_istaken_apart_is_not_called_dropped() -> None:
     robot = samples()["arm"].robot
-    assert _taken_apart(robot, candidate(robot, "position_gain", "all_joints")) == [
+    assert taken_apart(robot, candidate(robot, "position_gain", "all_joints")) == [
         "position_gain@shoulder",
         "position_gain@elbow",
     ]
-    assert _taken_apart(robot, candidate(robot, "position_gain", "elbow")) == []
+    assert taken_apart(robot, candidate(robot, "position_gain", "elbow")) == []

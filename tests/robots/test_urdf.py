@@ -200,6 +200,7 @@ def test_broken_xml_names_the_line(tmp_path: Path) -> None:
             "urdf: ARM\ndrives: {elbow: {kp: 1, assumed: kp}}",
             r"elbow: assumed: expected a list such as \[kp, kd\], not 'kp'",
         ),
+        ("urdf: ARM\ndrives: {elbow: {kp: 1, assumed: [joint]}}", "elbow: assumed: unknown key 'joint'"),
         ("urdf: ARM\ndrives: {elbow: {kp: 1, assumed: [kb]}}", "elbow: assumed: unknown key 'kb'; did you mean k"),
         ("urdf: ARM\ndrives: {elbow: {kp: -1}}", "drives: elbow: kp: -1; expected 0 to 1e"),
         ("urdf: ARM\ndrives: {elbow: {kp: 1e308}}", "drives: elbow: kp: 1e.308; expected 0 to 1e"),

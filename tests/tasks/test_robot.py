@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from ee_dist.robots.describe import load_robot
+from ee_dist.robots.serial import robot_to_dict
 from ee_dist.tasks.robot import sweep
 
 ARM = Path(__file__).parents[2] / "docs" / "examples" / "arm.urdf"
@@ -56,3 +57,46 @@ def test_an_mjcf_brings_its_own_drives_and_the_robot_is_usable_at_once(cli, tmp_
         "task.excitations=['multisine:seconds=1']", "+hidden=[]",
     )  # fmt: skip
     assert trial.status == 0, trial.err
+
+
+def test_what_a_description_assumed_goes_with_its_recordings_and_is_found(cli, tmp_path):
+    """By the commands alone: described, tried on a robot that has other servos, compared, explained."""
+    described = cli("task=robot", f"urdf={ARM}")
+    (run,) = described.runs()
+    hidden = (("position_gain", "factor: 0.15"), ("coulomb_friction", "torque_nm: 0.2"))
+    softer = ",".join(f"{{effect: {name}, target: all_joints, {value}}}" for name, value in hidden)
+    trial = cli(
+        "task=trial", "robot=urdf", f"robot.drives={run / 'robot.yaml'}", "engine=mujoco", "evaluator=serial",
+        "task.excitations=['multisine:seconds=2','multisine:seconds=2,seed=2']", f"+hidden=[{softer}]",
+        f"hydra.run.dir={tmp_path / 'trial'}",
+    )  # fmt: skip
+    assert trial.status == 0, trial.err
+    log = [f"measured={tmp_path / 'trial' / 'trial.mcap'}", "engine=mujoco", "evaluator=serial"]
+    compared = cli("task=compare", *log)
+    assert "The description only assumed kp, kd, rotor_inertia of 3 drives" in " ".join(compared.out.split())
+    only = "task.only=[position_gain,speed_gain,coulomb_friction,part_mass]"
+    explained = cli("task=explain", *log, only)
+    assert explained.status == 0, explained.err
+    said = " ".join(explained.out.split())
+    assert "The description only guessed at what these drives do" in said
+    found = explained.summary()["candidates"][0]
+    assert found["name"] == "assumed drives"
+    gain = next(t for t in found["terms"] if t["effect"] == "position_gain")
+    assert gain["target"] == "all_joints"
+    assert gain["values"]["factor"] == pytest.approx(0.15, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("marks", "said"),
+    [([["nowhere", "kp"]], "drives: nowhere: assumed: no drive of that name"),
+     ([["elbow", "colour"]], "drives: elbow: assumed: unknown key 'colour'")],
+)  # fmt: skip
+def test_marks_that_cannot_be_are_one_line_wherever_a_robot_comes_from(cli, tmp_path, marks, said):
+    whole = robot_to_dict(load_robot({"urdf": str(ARM), "drives": {"elbow": {"kp": 10, "kd": 0.2}}})[0])
+    whole["robot"]["assumed"] = marks
+    file = tmp_path / "model.yaml"
+    file.write_text(yaml.safe_dump({"robot": whole, "effects": []}))
+    outcome = cli("task=export", f"model={file}", "to=yaml")
+    assert outcome.status == 2
+    assert said in outcome.err
+    assert len(outcome.err.strip().splitlines()) == 1

@@ -86,6 +86,10 @@ class Candidate:
             out.append(values[p.name] * abs(math.log(end / p.neutral)) if p.by_ratio else abs(end - p.neutral))
         return np.array(out)
 
+    def members(self, robot: Robot) -> tuple[str, ...]:
+        """The joints, parts or sensors of the group that it acts on; none where it acts at a single place."""
+        return members_of(robot, self.target, self.effect.targets(robot))
+
     def term(self, u: Sequence[float] | Array) -> Term:
         return Term(self.effect.name, self.target, tuple(self.values(u).items()))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -89,8 +90,9 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
     """What speaks for it, the files, and last the finding with how sure it is and the command to type next."""
     for line in account.lines:
         console.print(line, highlight=False, markup=False)
+    begun = _begun(out)
     for file in sorted(p for p in out.iterdir() if p.is_file() and not p.name.startswith(".")):
-        stale = "  (of an earlier run)" if _older(file, out / SETTINGS) else ""
+        stale = "  (of an earlier run)" if file.stat().st_mtime < begun else ""
         console.print(f"  {os.path.relpath(file)}{stale}", highlight=False, markup=False, soft_wrap=True)
     console.print(account.headline, highlight=False, markup=False, style="bold")
     for line in account.first:
@@ -100,10 +102,9 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
         console.print(f"Next: {command(following)}", highlight=False, markup=False, soft_wrap=True)
 
 
-def _older(file: Path, settings: Path) -> bool:
-    """Whether a file was there before this run put its settings beside it: with overwrite=true what it does not write stays."""
-    begun = [p.stat().st_mtime for p in settings.glob("*.yaml")]
-    return bool(begun) and file.stat().st_mtime < min(begun)
+def _begun(out: Path) -> float:
+    """When this run put its settings into the folder: with overwrite=true what it does not write stays from before."""
+    return min((p.stat().st_mtime for p in (out / SETTINGS).glob("*.yaml")), default=-math.inf)
 
 
 def typed(terms: Hypothesis) -> str:
