@@ -21,7 +21,7 @@ def nearest(name: str, allowed: Iterable[str], cutoff: float = CUTOFF) -> list[s
 
 def listed(names: Iterable[str], otherwise: str = "none") -> str:
     """The names with commas, as many as a message bears."""
-    every = [str(n) for n in names]
+    every = [_plain(str(n)) for n in names]
     text = ", ".join(every)
     if len(text) <= LISTED:
         return text or otherwise
@@ -40,4 +40,9 @@ def did_you_mean(name: str, allowed: Iterable[str], otherwise: str = "", cutoff:
 
 def listed_or(names: list[str]) -> str:
     """A few names with "or"."""
-    return " or ".join(n if len(n) <= LONGEST else f"{n[:LONGEST]}..." for n in names)
+    return " or ".join(_plain(n) if len(n) <= LONGEST else f"{_plain(n[:LONGEST])}..." for n in names)
+
+
+def _plain(name: str) -> str:
+    """As it is, but for signs that end a line or cannot be seen, which a file's names may have."""
+    return name if name.isprintable() else repr(name)[1:-1]

@@ -43,3 +43,8 @@ def test_a_list_of_names_says_how_many_more_there_are():
     assert listed([]) == "none"
     assert len(did_you_mean("elbow", names)) < LISTED + 40
     assert len(did_you_mean("j" * 10**6, ["j" * 10**6])) < LISTED + 40
+
+
+def test_a_name_with_a_line_break_does_not_break_the_message():
+    assert did_you_mean("wing", ["w\ning", "tail"]) == "did you mean w\\ning?"
+    assert "\n" not in did_you_mean("zzz", ["w\ning", "tail"]) + listed(["w\ning"])
