@@ -23,7 +23,7 @@ from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was,
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import told_only, without_useless
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal, values_of
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_all, fit_one, sticky
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.scan import scan
@@ -88,7 +88,7 @@ def improve(
         exchanges, looked, spread, anew = 0, -1, 0, 0
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
-            others = _offered(pool, current, ladder)
+            others = on_top_of(problem.robot, current.hypothesis, _offered(pool, current, ladder))
             last = _examined(search, current, others, effort)
             if own and len(current.parts) == own:
                 kept = as_it_was(search, last, before, as_it_is, others, effort)

@@ -6,7 +6,9 @@ import math
 import re
 
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
+from ee_dist.effects.described import ROUNDING
 from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import drive_of
 
 DIGITS, MOST_DIGITS = 3, 8
 """Of the ends of an interval."""
@@ -45,8 +47,17 @@ def much(term: Term, robot: Robot | None = None) -> str:
 
 def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
     if value < 0 and CATALOGUE[term.effect].parameter(key).on_top:
-        return f"{-value:.3g}{_unit(term, key, robot)} less than described"
+        return f"{-value:.3g}{_unit(term, key, robot)} less{_than(term, key, value, robot)}"
     return f"{value:.3g}{_unit(term, key, robot)}"
+
+
+def _than(term: Term, key: str, value: float, robot: Robot | None) -> str:
+    """More than a description has can only be taken off what several joints share in the model."""
+    field = CATALOGUE[term.effect].parameter(key).on_top
+    if robot is None or term.target not in robot.motor_names:
+        return " than described"
+    has = getattr(drive_of(robot, term.target), field)
+    return " than joints share" if -value > has * (1 + ROUNDING) else " than described"
 
 
 def is_less(terms: Hypothesis) -> bool:
@@ -60,7 +71,7 @@ def span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> 
     unit, (a, b) = _unit(term, key, robot), apart(low, high)
     if CATALOGUE[term.effect].parameter(key).on_top and low < 0:
         more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
-        return f"{a.removeprefix('-')}{unit} less to {more} than described"
+        return f"{a.removeprefix('-')}{unit} less to {more}{_than(term, key, low, robot)}"
     return f"{a} to {b}{unit}"
 
 

@@ -165,6 +165,20 @@ def candidates(
     return found
 
 
+def on_top_of(robot: Robot, terms: Hypothesis, pool: Iterable[Candidate]) -> list[Candidate]:
+    """The pool, of which a single joint may have less of what several share in a model of these ``terms``, down to none."""
+    of: dict[str, Hypothesis] = {}
+    for t in terms:
+        entry = find(t.effect)
+        if any(p.on_top for p in entry.parameters) and members_of(robot, t.target, entry.targets(robot)):
+            of[t.effect] = (*of.get(t.effect, ()), t)
+    around = {name: apply(robot, some) for name, some in of.items()}
+    return [
+        candidate(around[c.effect.name], c.effect, c.target) if c.effect.name in around and not c.members(robot) else c
+        for c in pool
+    ]
+
+
 def shared(pool: Iterable[Candidate], robot: Robot) -> list[Candidate]:
     """Those that no single joint or sensor can be blamed for: the surroundings, the supply, the body, what all joints have
     in common. They are what a model is calibrated with on an untouched robot."""

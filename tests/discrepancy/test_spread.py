@@ -1,0 +1,60 @@
+"""One set of values that joints share, and a spread: a joint may have less of it than the others."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+from way_samples import measure, problem_by, samples
+
+from ee_dist.discrepancy.examine import Current, Effort, examine
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import candidate, candidates, on_top_of, parse
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.words import told
+from ee_dist.effects.catalogue import term
+
+QUICK = Effort(first=6, second=4, final=3, starts=1)
+FRICTION = {"shoulder": 0.3, "elbow": 0.1}
+SHARED = term("coulomb_friction", "all_joints", torque_nm=0.3)
+
+
+@cache
+def the_problem() -> Problem:
+    hidden = tuple(term("coulomb_friction", j, torque_nm=c) for j, c in FRICTION.items())
+    sample = samples()["arm"]
+    return problem_by("open_loop", measure(sample, hidden), sample.robot)
+
+
+def test_a_joint_may_have_less_than_joints_share_down_to_none_and_no_less_where_nothing_is_shared() -> None:
+    robot = the_problem().robot
+    pool = candidates(robot, only=["coulomb_friction", "viscous_friction", "zero_offset"])
+    before = {c.name: c.bounds for c in pool}
+    after = {c.name: c.bounds for c in on_top_of(robot, (SHARED, term("zero_offset", "shoulder", offset_rad=0.1)), pool)}
+    changed = {name for name in before if before[name] != after[name]}
+    assert list(before) == list(after)
+    assert changed == {"coulomb_friction@shoulder", "coulomb_friction@elbow"}
+    assert {after[name][0][0] for name in changed} == {-0.3}
+    assert {before[name][0][0] for name in changed} == {0.0}
+
+
+def test_the_joint_with_less_is_found_beside_what_all_share() -> None:
+    problem = the_problem()
+    pool = [parse(problem.robot, f"{e}@elbow") for e in ("coulomb_friction", "viscous_friction")]
+    found = improve(problem, pool, (SHARED,), effort=QUICK)
+    values = {t.target: dict(t.values)["torque_nm"] for t in found.terms if t.effect == "coulomb_friction"}
+    assert values["all_joints"] == pytest.approx(FRICTION["shoulder"], abs=0.03)
+    assert values["elbow"] == pytest.approx(FRICTION["elbow"] - FRICTION["shoulder"], abs=0.04)
+    (less,) = (t for t in found.terms if t.target == "elbow")
+    assert told(less, problem.robot).endswith("N.m less than joints share)")
+
+
+def test_what_all_share_and_each_joint_by_itself_compete_when_the_first_is_in_the_model() -> None:
+    problem = the_problem()
+    shared = parse(problem.robot, "coulomb_friction@all_joints")
+    current = Current((shared,), shared.shares({"torque_nm": 0.2}))
+    pool = on_top_of(problem.robot, current.hypothesis, candidates(problem.robot, only=["coulomb_friction"]))
+    found = examine(Search(problem), current, [c for c in pool if c.name != shared.name], QUICK)
+    assert "coulomb_friction@each of 2 joints" in [j.name for j in found.judged]
+    assert candidate(problem.robot, "coulomb_friction", "elbow").lower[0] == 0.0
