@@ -7,6 +7,7 @@ import re
 
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.effects.described import ROUNDING
+from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of
 
@@ -119,9 +120,10 @@ def told_all(terms: Hypothesis, robot: Robot | None = None) -> str:
 
 
 def by_effect(terms: Hypothesis, robot: Robot | None = None) -> list[tuple[str, Hypothesis]]:
-    """Terms in phrases: what acts at one place or two, then in a phrase for each effect what is at many."""
-    own = {e: tuple(t for t in terms if t.effect == e) for e in dict.fromkeys(t.effect for t in terms)}
-    few = [(told(t, robot), (t,)) for t in terms if len(own[t.effect]) < MANY]
+    """Terms in phrases: what acts at one place or two or is shared, then in a phrase for each effect what is at many."""
+    places = [t for t in terms if robot is None or not members_of(robot, t.target, CATALOGUE[t.effect].targets(robot))]
+    own = {e: tuple(t for t in places if t.effect == e) for e in dict.fromkeys(t.effect for t in places)}
+    few = [(told(t, robot), (t,)) for t in terms if t not in places or len(own[t.effect]) < MANY]
     return few + [(_range_of(mine, robot), mine) for mine in own.values() if len(mine) >= MANY]
 
 
@@ -136,7 +138,8 @@ def _range_of(terms: Hypothesis, robot: Robot | None) -> str:
     where = "joints" if joints else "parts" if CATALOGUE[terms[0].effect].family == "body" else "places"
     shown = []
     for key, _ in terms[0].values:
-        low, high = (f(dict(t.values)[key] for t in terms) for f in (min, max))
-        shown.append(f"{quantity(terms[0], key, robot)} {span(terms[0], key, low, high, robot)}".strip())
+        ordered = sorted(terms, key=lambda t: dict(t.values)[key])
+        low, high = (dict(t.values)[key] for t in (ordered[0], ordered[-1]))
+        shown.append(f"{quantity(terms[0], key, robot)} {span(ordered[0], key, low, high, robot)}".strip())
     values = f" ({', '.join(shown)})" if shown else ""
     return f"{plain(terms[0].effect)} at {len(terms)} {where}{values}"

@@ -12,8 +12,9 @@ from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import candidate, candidates, on_top_of, parse
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.words import told
+from ee_dist.discrepancy.words import phrase, told
 from ee_dist.effects.catalogue import term
+from ee_dist.robots.quadruped import quadruped
 
 QUICK = Effort(first=6, second=4, final=3, starts=1)
 FRICTION = {"shoulder": 0.3, "elbow": 0.1}
@@ -31,7 +32,9 @@ def test_a_joint_may_have_less_than_joints_share_down_to_none_and_no_less_where_
     robot = the_problem().robot
     pool = candidates(robot, only=["coulomb_friction", "viscous_friction", "zero_offset"])
     before = {c.name: c.bounds for c in pool}
-    after = {c.name: c.bounds for c in on_top_of(robot, (SHARED, term("zero_offset", "shoulder", offset_rad=0.1)), pool)}
+    after = {
+        c.name: c.bounds for c in on_top_of(robot, (SHARED, term("zero_offset", "shoulder", offset_rad=0.1)), pool)
+    }
     changed = {name for name in before if before[name] != after[name]}
     assert list(before) == list(after)
     assert changed == {"coulomb_friction@shoulder", "coulomb_friction@elbow"}
@@ -58,3 +61,14 @@ def test_what_all_share_and_each_joint_by_itself_compete_when_the_first_is_in_th
     found = examine(Search(problem), current, [c for c in pool if c.name != shared.name], QUICK)
     assert "coulomb_friction@each of 2 joints" in [j.name for j in found.judged]
     assert candidate(problem.robot, "coulomb_friction", "elbow").lower[0] == 0.0
+
+
+def test_what_all_share_is_told_apart_from_the_spread() -> None:
+    robot = quadruped()
+    spread = [
+        term("coulomb_friction", j, torque_nm=v) for j, v in zip(robot.motor_names, (-0.1, 0.05, 0.02), strict=False)
+    ]
+    assert phrase((SHARED, *spread), robot) == (
+        "coulomb friction at all joints (torque 0.3 N.m); "
+        "coulomb friction at 3 joints (torque 0.1 N.m less to 0.05 N.m more than joints share)"
+    )
