@@ -15,6 +15,7 @@ import contextlib
 import json
 import multiprocessing
 import os
+import resource
 import signal
 import sys
 import tempfile
@@ -39,6 +40,8 @@ STUCK_S = 300.0
 """Without any progress, of real time."""
 MEGABYTES = 300.0
 """Of memory, above what the process had before it read the file."""
+GIGABYTES = 4
+"""Beyond which no memory is given, so that a file that takes all of it fails and nothing else on the machine does."""
 SETTLED = 20
 """Files before memory is looked at: libraries are loaded when they are first needed."""
 MOST = 20
@@ -84,6 +87,8 @@ class Labour:
             with contextlib.suppress(sample.allowed):
                 read(path)
         signal.signal(signal.SIGPROF, _late)
+        most = status_mb("VmSize") * 2**20 + GIGABYTES * 2**30
+        resource.setrlimit(resource.RLIMIT_AS, (int(most), int(most)))
         start, begun, first, base = time.process_time(), self.figures.cpu_s, self.figures.files, peak_mb()
         while self.figures.cpu_s < self.cpu_s and len(self.figures.failures) < MOST:
             rng = Random(f"{self.seed} {self.name} {self.figures.files}")
@@ -134,9 +139,13 @@ class Labour:
 
 def peak_mb() -> float:
     """The most that this process had since the last call, MB."""
-    status = Path("/proc/self/status").read_text()
+    most = status_mb("VmHWM")
     Path("/proc/self/clear_refs").write_text("5")
-    return float(status.split("VmHWM:")[1].split()[0]) / 1024
+    return most
+
+
+def status_mb(name: str) -> float:
+    return float(Path("/proc/self/status").read_text().split(f"{name}:")[1].split()[0]) / 1024
 
 
 def _late(*_: object) -> None:

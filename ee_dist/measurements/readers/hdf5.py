@@ -72,6 +72,13 @@ def _arrays(h5py: Any, source: Any, file: Path) -> tuple[dict[str, Any], tuple[s
             return
         if item.attrs.get("MATLAB_class", b"") in (b"char", b"cell"):
             return
+        # The library takes memory for whole pieces, whatever it then finds of them.
+        pieces = item.chunks or ()
+        if pieces and len(pieces) != item.ndim:
+            raise MeasurementError(
+                f"{file}: {path}: its pieces have {len(pieces)} dimensions and it has {item.ndim}: damaged"
+            )
+        bounded(file, float(np.prod(pieces, dtype=float)) * item.dtype.itemsize)
         total += float(np.prod(item.shape, dtype=float)) * item.dtype.itemsize
         bounded(file, total)
         if item.dtype.names is not None and item.ndim == 1:
