@@ -7,6 +7,7 @@ the model has already and judge them on data that the fits had not seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -115,7 +116,8 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
         if k < AT_LEAST or energy - f.energy >= WORTH_JUDGING * (energy - quick[0].energy)
     ]
     starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
-    starts += _families(screened, starts, least, current)
+    has = {t.effect for t in (*search.fixed, *current.hypothesis) if t.target == ALL_JOINTS}
+    starts += _families(screened, starts, least, has)
     guessed = assumed_drives(now.among(busy), pool, [c.name for c in current.parts])
     starts += [guessed] if guessed is not None else []
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
@@ -243,14 +245,14 @@ def _quick(
 
 
 def _families(
-    screened: Sequence[Screened], singles: Sequence[tuple[Proposal, Array]], least: float, current: Current
+    screened: Sequence[Screened], singles: Sequence[tuple[Proposal, Array]], least: float, has: AbstractSet[str]
 ) -> list[tuple[Proposal, Array]]:
     """Effects at all joints, each joint with a value of its own, where several joints promise something: one number for
-    all of them, which the model may have already, may be too few. And friction by load, linear and quadratic, which pay
+    all of them, which the model may have already (``has``), may be too few. And friction by load, linear and quadratic, which pay
     together."""
     out: list[tuple[float, Proposal, Array]] = []
     by_effect: dict[str, list[Screened]] = {}
-    whole = {c.effect.name for c in (*current.parts, *(s.candidate for s in screened)) if c.target == ALL_JOINTS}
+    whole = has | {s.candidate.effect.name for s in screened if s.candidate.target == ALL_JOINTS}
     for s in screened:
         if s.candidate.effect.name in whole and s.candidate.target in _joints(screened, s.candidate.effect.name):
             by_effect.setdefault(s.candidate.effect.name, []).append(s)

@@ -12,7 +12,7 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.problem import Problem, error
-from ee_dist.discrepancy.search.candidates import Candidate, known, values_of
+from ee_dist.discrepancy.search.candidates import Candidate, known, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
@@ -117,8 +117,9 @@ def explain(
     as_it_is = residual_as_it_is(problem, before)
     search, current = begin(problem, before, progress)
     names = {c.name for c in current.parts}
-    others = [c for c in pool if c.name not in names]
-    found, fixed, model = examine(search, current, others, effort), search.fixed, (*search.fixed, *current.hypothesis)
+    fixed, model = search.fixed, (*search.fixed, *current.hypothesis)
+    others = on_top_of(problem.robot, model, [c for c in pool if c.name not in names])
+    found = examine(search, current, others, effort)
     kept = as_it_was(search, found, before, as_it_is, others, effort)
     if kept is not None:
         found, fixed, model = kept, before, before

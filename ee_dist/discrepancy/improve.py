@@ -88,7 +88,8 @@ def improve(
         exchanges, looked, spread, anew = 0, -1, 0, 0
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
-            others = on_top_of(problem.robot, current.hypothesis, _offered(pool, current, ladder))
+            has = (*search.fixed, *current.hypothesis)
+            others = on_top_of(problem.robot, has, _offered(pool, current, ladder))
             last = _examined(search, current, others, effort)
             if own and len(current.parts) == own:
                 kept = as_it_was(search, last, before, as_it_is, others, effort)

@@ -7,7 +7,9 @@ from functools import cache
 import pytest
 from way_samples import measure, problem_by, samples
 
+from ee_dist.discrepancy.account import explain_account
 from ee_dist.discrepancy.examine import Current, Effort, examine
+from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import candidate, candidates, on_top_of, parse
@@ -51,6 +53,15 @@ def test_the_joint_with_less_is_found_beside_what_all_share() -> None:
     assert values["elbow"] == pytest.approx(FRICTION["elbow"] - FRICTION["shoulder"], abs=0.04)
     (less,) = (t for t in found.terms if t.target == "elbow")
     assert told(less, problem.robot).endswith("N.m less than joints share)")
+
+
+def test_explain_says_which_joint_has_less_than_its_model_has_everywhere() -> None:
+    problem = the_problem()
+    pool = candidates(problem.robot, only=["coulomb_friction@elbow", "viscous_friction@elbow", "command_delay@elbow"])
+    found = explain(problem, pool, (SHARED,), effort=QUICK)
+    assert found.best is not None and found.best.name == "coulomb_friction@elbow"
+    headline = explain_account(problem, found, None).headline
+    assert headline.startswith("Too much: coulomb friction at elbow") and "less than joints share" in headline
 
 
 def test_what_all_share_and_each_joint_by_itself_compete_when_the_first_is_in_the_model() -> None:
