@@ -6,10 +6,9 @@ import math
 import re
 
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
-from ee_dist.effects.described import ROUNDING
+from ee_dist.effects.described import takes_more_than_described
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
-from ee_dist.robots.ranges import drive_of
 
 DIGITS, MOST_DIGITS = 3, 8
 """Of the ends of an interval."""
@@ -53,12 +52,11 @@ def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
 
 
 def _than(term: Term, key: str, value: float, robot: Robot | None) -> str:
-    """More than a description has can only be taken off what several joints share in the model."""
-    field = CATALOGUE[term.effect].parameter(key).on_top
     if robot is None or term.target not in robot.motor_names:
         return " than described"
-    has = getattr(drive_of(robot, term.target), field)
-    return " than joints share" if -value > has * (1 + ROUNDING) else " than described"
+    parameter = CATALOGUE[term.effect].parameter(key)
+    beyond = takes_more_than_described(robot, term.target, parameter, value)
+    return " than joints share" if beyond else " than described"
 
 
 def is_less(terms: Hypothesis) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, find
+from ee_dist.effects.catalogue import EffectError, Hypothesis, Parameter, apply, find
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Drive, Robot, RobotError
 from ee_dist.robots.numbers import checked
@@ -48,9 +48,15 @@ def _not_too_much(robot: Robot, terms: Hypothesis) -> None:
             if not p.on_top or values[p.name] >= 0:
                 continue
             for joint in [j for j in joints if (t.effect, j) not in shared]:
-                has = getattr(drive_of(robot, joint), p.on_top)
-                if -values[p.name] > has * (1 + ROUNDING):
+                if takes_more_than_described(robot, joint, p, values[p.name]):
+                    has = getattr(drive_of(robot, joint), p.on_top)
                     raise EffectError(
                         f"{t}: {joint} is described with {has:g} {p.unit} of it; {-values[p.name]:g} cannot be taken off"
                     )
         shared |= {(t.effect, j) for j in joints if len(joints) > 1}
+
+
+def takes_more_than_described(robot: Robot, joint: str, parameter: Parameter, value: float) -> bool:
+    """Whether a value takes more off a joint than the robot is described with there: it can only be taken off what several
+    joints share in a model."""
+    return bool(-value > getattr(drive_of(robot, joint), parameter.on_top) * (1 + ROUNDING))
