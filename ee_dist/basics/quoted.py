@@ -16,5 +16,10 @@ _short.maxstring = _short.maxother = _short.maxlong = LONGEST
 def quoted(value: Any) -> str:
     """Like ``repr``, with the middle left out of what is long; takes no longer for a value of megabytes."""
     text = " ".join(_short.repr(value).split())
-    half = (LONGEST - 3) // 2
-    return text if len(text) <= LONGEST else f"{text[:half]}...{text[-half:]}"
+    return short(text, LONGEST)
+
+
+def short(text: str, longest: int = 300) -> str:
+    """A text with the middle left out of what is long."""
+    half = (longest - 3) // 2
+    return text if len(text) <= longest else f"{text[:half]}...{text[-half:]}"

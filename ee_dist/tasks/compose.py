@@ -14,6 +14,7 @@ from hydra.core.override_parser.types import ChoiceSweep, RangeSweep
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from ee_dist.basics.quoted import short
 from ee_dist.effects.catalogue import find, load_plugin
 from ee_dist.tasks.config import Config, ConfigError, Handling, check_keys, groups_of, one_of
 
@@ -62,7 +63,8 @@ _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench
 _SWEEP = ("-m", "--multirun")
 MOST_RUNS = 10_000
 _RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
-_NO_CHOICE = re.compile(r"^\+{0,2}(\w+)=(true|false|null|nan|[-+]?inf|[-+]?[0-9][0-9_.eE+-]*)$", re.IGNORECASE)
+_NO_CHOICE = re.compile(r"^\+{0,2}(\w+)=(true|false|null|nan|[-+]?inf|[-+]?[0-9][0-9_.eE+-]*|[\[{].*)$", re.IGNORECASE)
+_AT_HOME = re.compile(r"^\+{0,2}([\w.]{1,80})=~(.*)$")
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
 
 
@@ -88,20 +90,22 @@ def check_flags(arguments: list[str]) -> None:
     """Raises ConfigError for a flag that there is not: the parser itself would print eight lines."""
 
     def complain(message: str) -> NoReturn:
-        raise ConfigError(f"{message}; settings are written key=value, and --help lists them")
+        raise ConfigError(f"{short(message)}; settings are written key=value, and --help lists them")
 
     parser = get_args_parser()
     parser.error = complain  # type: ignore[method-assign]
     for setting in parser.parse_args(arguments).overrides:
         if not setting.lstrip("+~").partition("=")[0].strip():
-            raise ConfigError(f"{setting}: which setting? they are written key=value, and --help lists them")
+            raise ConfigError(f"{short(setting)}: which setting? they are written key=value, and --help lists them")
         _check_choice(setting)
+        at_home = _AT_HOME.match(setting)
+        if at_home:
+            key, rest = at_home.groups()
+            raise ConfigError(f"{key}=~: the shell puts in no home folder here; write {key}=$HOME{short(rest)}")
         key, _, value = setting.lstrip("+").partition("=")
-        if value.startswith("~"):
-            raise ConfigError(f"{setting}: the shell puts in no home folder here; write {key}=$HOME{value[1:]}")
         if key == "resume" and (not value or value[0] in "[{"):
             raise ConfigError(
-                f"resume={value}: which folder? name that of a run that was stopped, such as resume=logs/recover/..."
+                f"resume={short(value)}: which folder? name that of a run that was stopped, such as resume=logs/recover/..."
             )
     folders = [a.partition("=")[2] for a in arguments if re.match(r"\+{0,2}hydra\.(run|sweep)\.dir=", a)]
     if len({*folders}) > 1 and any(_RESUME.match(a) for a in arguments):
@@ -126,10 +130,9 @@ def check_sweep(arguments: list[str]) -> None:
 def _check_choice(setting: str) -> None:
     """Raises ConfigError for a number or the like where a group takes a name: Hydra itself fails on it."""
     match = _NO_CHOICE.match(setting)
-    folder = config_folder() / match.group(1) if match else None
-    if match and folder is not None and folder.is_dir():
-        names = ", ".join(sorted(p.stem for p in folder.glob("*.yaml")))
-        raise ConfigError(f"{match.group(1)}={match.group(2)}: no such choice; there are: {names}")
+    if match and match.group(1) in {p.name for p in config_folder().iterdir() if p.is_dir()}:
+        names = ", ".join(sorted(p.stem for p in (config_folder() / match.group(1)).glob("*.yaml")))
+        raise ConfigError(f"{match.group(1)}={short(match.group(2))}: no such choice; there are: {names}")
 
 
 def check_used(overrides: list[str], task: str) -> None:
@@ -141,14 +144,14 @@ def check_used(overrides: list[str], task: str) -> None:
             *most, last = (f"task={v}" for v in verbs)
             having = f"{', '.join(most)} and {last}" if most else last
             hint = f", {instead}" if instead else ""
-            raise ConfigError(f"{override}: task={task} has no use for it; it is for {having}{hint}")
+            raise ConfigError(f"{short(override)}: task={task} has no use for it; it is for {having}{hint}")
         other = next((o for o in overrides if re.match(r"\+{0,2}system=", o)), None)
         if name.partition(".")[0] == "robot" and other is not None:
-            raise ConfigError(f"{override}: of no use beside {other}, which takes the place of the robot")
+            raise ConfigError(f"{short(override)}: of no use beside {other}, which takes the place of the robot")
         opened = next((o for o in overrides if _OPENS.match(o)), None) if task == "workbench" else None
         if name.partition(".")[0] == "robot" and opened is not None:
             raise ConfigError(
-                f"{override}: of no use beside {opened}, which names the robot (with a model file, model= does); "
+                f"{short(override)}: of no use beside {opened}, which names the robot (with a model file, model= does); "
                 "robot= is for files that are dropped on the page"
             )
 

@@ -83,6 +83,7 @@ COMPOSITION: Rows = (
     ("+scenario=8 seed=1=2", "settings are written key=value, signs within quotes: key=\"'a=b'\""),
     ("+scenario=8 seed=", "expected a whole number"),
     ("+scenario=8 =3", "=3: which setting? they are written key=value, and --help lists"),
+    ("engine=[mujoco]", "engine=[mujoco]: no such choice; there are: kinetics, mujoco, pybullet"),
     ("8", "settings are written key=value, signs within quotes: key=\"'a=b'\""),
     ("+scenario=8 budget.populaton=8", "did you mean budget.population or budget.mutation or"),
     ("+scenario=8 resume=nowhere", "name the folder of a run that was stopped"),
