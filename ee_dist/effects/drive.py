@@ -112,24 +112,25 @@ def command_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robo
 
 
 def _delays(robot: Robot, target: str) -> dict[str, Range]:
-    return {"delay_s": (0.0, 20.0 * robot.time_step_s)}
+    return {"delay_s": (0.0 - scales.drive_of(robot, target).delay_s, 20.0 * robot.time_step_s)}
 
 
 @effect(
     "command_delay",
     family="drive",
     targets=powered,
-    parameters=(Parameter("delay_s", "s", 0.0, 2.0, 0.0, "time from command to reaction", 0.002),),
+    parameters=(
+        Parameter(
+            "delay_s", "s", -2.0, 2.0, 0.0, "time from command to reaction, on top of nominal", 0.002, on_top="delay_s"
+        ),
+    ),
     physics="A command takes effect late: bus, filter and firmware hold it back.",
     signature="The joint's motion is the prediction shifted in time: the residual is speed times delay, and zero at rest.",
     ranges=_delays,
     everywhere=True,
 )
 def command_delay(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    def later(drive: Drive) -> Drive:
-        return replace(drive, delay_s=drive.delay_s + values["delay_s"])
-
-    return robot.map_drive(target, later)
+    return with_more(robot, target, "delay_s", values["delay_s"])
 
 
 def _zeros(robot: Robot, target: str) -> dict[str, Range]:
@@ -189,7 +190,7 @@ def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     spare = felt - max(stiff * (scales.STEPS * dt) ** 2, 2.0 * damping * dt)
     rotor = drive.rotor_inertia
     less = max(LIGHTER_AT_LEAST * rotor, min(LIGHTER * rotor, spare))
-    return {"added_kg_m2": (-less, max(4.0 * rotor, felt))}
+    return {"added_kg_m2": (0.0 - less, max(4.0 * rotor, felt))}
 
 
 @effect(

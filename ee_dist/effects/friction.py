@@ -27,7 +27,7 @@ def _viscous(robot: Robot, target: str) -> float:
 
 
 def _viscous_range(robot: Robot, target: str) -> dict[str, Range]:
-    return {"damping_nm_s_rad": (-drive_of(robot, target).viscous, _viscous(robot, target))}
+    return {"damping_nm_s_rad": (0.0 - drive_of(robot, target).viscous, _viscous(robot, target))}
 
 
 @effect(
@@ -57,7 +57,7 @@ def viscous_friction(robot: Robot, target: str, values: Mapping[str, float]) -> 
 
 
 def _dry_range(robot: Robot, target: str) -> dict[str, Range]:
-    return {"torque_nm": (-drive_of(robot, target).coulomb, DRY_SHARE * scales.torque(robot, target))}
+    return {"torque_nm": (0.0 - drive_of(robot, target).coulomb, DRY_SHARE * scales.torque(robot, target))}
 
 
 @effect(

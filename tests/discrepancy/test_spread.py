@@ -55,6 +55,17 @@ def test_the_joint_with_less_is_found_beside_what_all_share() -> None:
     assert told(less, problem.robot).endswith("N.m less than joints share)")
 
 
+def test_commands_to_one_joint_may_be_less_late_than_to_all() -> None:
+    sample = samples()["arm"]
+    hidden = tuple(term("command_delay", j, delay_s=d) for j, d in {"shoulder": 0.03, "elbow": 0.01}.items())
+    problem = problem_by("open_loop", measure(sample, hidden), sample.robot)
+    pool = [parse(problem.robot, f"{e}@elbow") for e in ("command_delay", "command_gain")]
+    found = improve(problem, pool, (term("command_delay", "all_joints", delay_s=0.03),), effort=QUICK)
+    (less,) = (t for t in found.terms if t.target == "elbow")
+    assert less.effect == "command_delay"
+    assert dict(less.values)["delay_s"] == pytest.approx(-0.02, abs=0.003)
+
+
 def test_explain_says_which_joint_has_less_than_its_model_has_everywhere() -> None:
     problem = the_problem()
     pool = candidates(problem.robot, only=["coulomb_friction@elbow", "viscous_friction@elbow", "command_delay@elbow"])
