@@ -27,6 +27,7 @@ from benchmarks.arm6 import desk_arm_6
 from benchmarks.cases import tried, write_cases
 
 from ee_dist.discrepancy.draw import draw
+from ee_dist.discrepancy.importance import added, shares
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
@@ -103,7 +104,8 @@ def mess(robot: Robot, size: float, rng: np.random.Generator, beyond: bool) -> d
 
 @dataclass
 class Case:
-    """``ratio``: error over the noise floor on motions held out from everything, ``before`` the same without the search;
+    """``wrong``: names without a doubt, ``doubted``: wrong ones that are told with one. ``ratio``: error over the noise floor on
+    motions held out from everything, ``before`` the same without the search;
     ``held``: 1 for each interval that holds the truth, 0 for each that does not."""
 
     index: int
@@ -111,6 +113,7 @@ class Case:
     terms: list[str] = field(default_factory=list)
     within: bool = False
     wrong: list[str] = field(default_factory=list)
+    doubted: list[str] = field(default_factory=list)
     shared: bool = False
     verdict: str = ""
     before: float = float("nan")
@@ -173,16 +176,17 @@ class Bench:
         return ()
 
     def score(self, found: Case, result: Improvement, truth: Hypothesis, hidden: Hypothesis) -> None:
-        """A name is wrong where nothing of the kind is at any of its joints and no tie says that it may be another."""
+        """A name that the model has in the end is wrong where nothing of the kind is at any of its joints, and is told without a
+        doubt: neither tied with others, nor one that less depends on than is left unexplained."""
         steps = [r for r in result.ladder if r.added]
         named = {t.name for t in result.terms} | {name for r in steps for name in r.tied_with}
         found.within = all(self.covers(named, h) for h in hidden)
         at = {(t.effect, t.target) for t in truth}
-        for rung in steps:
-            for t in rung.added:
-                places = self.places(t)
-                if not any((t.effect, p) in at for p in places) and not rung.tied_with:
-                    found.wrong.append(t.name)
+        doubted = {t.name for s in shares(result, self.robot) if s.doubted for t in s.terms}
+        doubted |= {t.name for rung in steps if rung.tied_with for t in rung.added}
+        for t in added(result):
+            if not any((t.effect, p) in at for p in self.places(t)):
+                (found.doubted if t.name in doubted else found.wrong).append(t.name)
         found.shared = any(len(self.places(t)) > 1 for t in result.terms)
         for p in result.parameters:
             t = result.terms[p.term]
@@ -214,10 +218,11 @@ def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, object]
     def share(values: Sequence[bool | int]) -> float:
         return float(np.mean(values)) if values else float("nan")
 
-    found = {
+    found: dict[str, object] = {
         "cases": len(cases),
         "hidden_within_names": share([c.within for c in hidden]),
         "cases_with_a_wrong_name": share([bool(c.wrong) for c in cases]),
+        "cases_with_a_doubted_one": share([bool(c.doubted) for c in cases]),
         "error_over_floor_before": float(np.median([c.before for c in cases])),
         "error_over_floor_median": float(np.median(ratios)),
         "error_over_floor_90": float(np.quantile(ratios, 0.9)),
@@ -250,7 +255,8 @@ def main() -> int:
         mark = "found" if case.truth and case.within else "missed" if case.truth else "-"
         print(f"{case.index + 1:4d}/{args.cases}  {case.truth or 'nothing more':<64.64} {mark:<7}"
               f"{case.before:6.2f} -> {case.ratio:5.2f} x floor {case.seconds:5.0f} s  "
-              f"{'wrong: ' + ', '.join(case.wrong) if case.wrong else ''}", flush=True)  # fmt: skip
+              f"{'wrong: ' + ', '.join(case.wrong) if case.wrong else ''}"
+              f"{'  doubted: ' + ', '.join(case.doubted) if case.doubted else ''}", flush=True)  # fmt: skip
     found = report(cases, args)
     write_cases(args, found, cases)
     return 0

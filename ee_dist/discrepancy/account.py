@@ -14,13 +14,13 @@ from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
+from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
 from ee_dist.discrepancy.words import (
-    by_effect,
     is_less,
     much,
     named,
@@ -285,6 +285,7 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
         lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
     lines += [tie_text(placed(r.name), r.tied_with) for r in steps if r.tied_with]
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for r in steps for d in r.dropped]
+    lines += doubt_text([s for s in shares(found, robot) if s.doubted])
     vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
     if vague:
         lines.append(f"Left out in the end, since these data do not tell them from neutral: {'; '.join(vague)}.")
@@ -307,14 +308,13 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
         tried = found.last.tried if found.last else 0
         sure = f"How sure: {_count(tried, 'explanation')} {_were(tried)} tried, and none earns its place."
     else:
-        new = added(found)
-        phrases = by_effect(tuple(new), robot)
-        what = _listed([text for text, _ in phrases]) if new else "nothing; the model's own values were fitted anew"
+        parts = shares(found, robot)
+        what = _listed([s.text for s in parts]) if parts else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {last.held_out}"
         head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {last.held_out}{_rest(found.explained, settled)}"
-        sure += f"{_ranges(found, [t for _, mine in phrases[:NAMED] if len(mine) == 1 for t in mine], robot)}{_told_from(steps)}."
+        sure += f"{_ranges(found, [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1], robot)}{_told_from(steps)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     there = {t.name for t in found.terms}
     tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in there for r in steps)
@@ -337,10 +337,15 @@ def odd_text(odd: OddOne, robot: Robot) -> str:
     )
 
 
-def added(found: Improvement) -> list[Term]:
-    """What was added and is there at the end, with its final values."""
-    names = {t.name for r in found.ladder for t in r.added}
-    return [t for t in found.terms if t.name in names]
+def doubt_text(doubted: Sequence[Share]) -> list[str]:
+    """What less depends on than is left unexplained, if there is such."""
+    if not doubted:
+        return []
+    one = len(doubted) == 1
+    return [
+        f"Less depends on {'this' if one else 'each of these'} than is left unexplained, so that "
+        f"{'it' if one else 'any of them'} may stand in for something else: {'; '.join(s.text for s in doubted)}."
+    ]
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -18,6 +18,7 @@ from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travel
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, least_energy
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
+from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
 from ee_dist.discrepancy.ladder import Improvement, Rung
@@ -303,12 +304,12 @@ def _finish(
 ) -> Improvement:
     problem = search.problem
     floor, source = problem.noise_floor()
-    residual, terms, told = base, search.fixed, []
+    residual, terms, told, worth = base, search.fixed, [], None
     if current.parts:
         start = [(Model(current.parts), current.u)]
         fit: Fit = fit_all(search, start, None, (*WIDTHS[2:], 0.006))[0]
         residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
-        told = parameters(problem, fit)
+        told, worth = parameters(problem, fit), worth_of(problem, fit, base)
         if search.fixed:
             told = [ParameterReport(p.term + len(search.fixed), p.name, p.value, p.low, p.high, p.flag) for p in told]
     left = leftovers(problem, residual)
@@ -316,7 +317,9 @@ def _finish(
     above = before**2 - floor**2
     share = (before**2 - max(after, floor) ** 2) / above if above > 0 else 0.0
     verdict = _verdict(len(ladder) > 1 or bool(current.parts), left, after, floor)
-    return Improvement(verdict, share, ladder, terms, told, base, residual, floor, source, left, stopped, last)
+    found = Improvement(verdict, share, ladder, terms, told, base, residual, floor, source, left, stopped, last)
+    found.worth = worth
+    return found
 
 
 def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor: float) -> str:

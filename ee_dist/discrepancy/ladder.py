@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.evidence.worth import Worth
 from ee_dist.discrepancy.examine import Examined
 from ee_dist.discrepancy.search.candidates import Proposal
 from ee_dist.effects.catalogue import Hypothesis
@@ -36,8 +37,9 @@ class Rung:
 class Improvement:
     """``terms``: the final model, fitted on all data. ``verdict``: ``explained`` (nothing is left above the noise),
     ``better_not_explained``, ``unexplained`` (nothing could be added) or ``nothing_missing``; ``explained``: the share of the
-    squared error above the noise that the model takes off held-out data. ``last``: what was tried on top of it. ``odd``: of a
-    calibration, the joints whose values stand out from those of like joints (see calibrated_away.py)."""
+    squared error above the noise that the model takes off held-out data; ``worth``: what goes with each effect. ``last``: what
+    was tried on top of it. ``odd``: of a calibration, the joints whose values stand out from those of like joints (see
+    calibrated_away.py)."""
 
     verdict: str
     explained: float
@@ -52,6 +54,7 @@ class Improvement:
     stopped: str
     last: Examined | None = None
     odd: list[OddOne] = field(default_factory=list)
+    worth: Worth | None = None
 
     def ties(self, step: int) -> list[str]:
         """What the measurements do not tell from the effect that step ``step`` (from 1) of ``effect=auto`` added."""

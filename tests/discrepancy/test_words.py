@@ -158,7 +158,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     ):
         found = SimpleNamespace(
             ladder=[start, rung], left=[], verdict=verdict, explained=share, parameters=[], terms=rung.added, stopped="so",
-            noise_floor=1.0, floor_source="told", last=None, odd=[],
+            noise_floor=1.0, floor_source="told", last=None, odd=[], worth=None,
         )  # fmt: skip
         account = improve_account(problem, found)  # type: ignore[arg-type]
         assert account.headline.endswith(said) or said in account.headline

@@ -10,6 +10,7 @@ from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import Explanation
+from ee_dist.discrepancy.importance import shares
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
@@ -124,6 +125,10 @@ def of_improvement(problem: Problem, found: Improvement, account: Account, path:
         "parameters": [
             {**terms[p.term], "name": p.name, "value": p.value, "interval": [p.low, p.high], "flag": p.flag}
             for p in found.parameters
+        ],
+        "worth": [
+            {"words": s.text, "terms": hypothesis_list(s.terms), "share": s.worth, "doubted": s.doubted}
+            for s in shares(found, problem.robot)
         ],
         "stopped": found.stopped,
         "not_earned": [of_judged(problem, c) for c in (found.last.judged if found.last else []) if not c.earned],
