@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.readers.options import Options
 from ee_dist.measurements.readers.parquet import columns_of
@@ -65,7 +66,7 @@ def _info(file: Path) -> dict[str, Any]:
         raise MeasurementError(f"{file}: no 'features' in it; is it a LeRobot data set?")
     fps = info.get("fps")
     if isinstance(fps, bool) or not isinstance(fps, (int, float)) or not 0 < fps < 1e5:
-        raise MeasurementError(f"{file}: fps: expected a positive number, not {str(fps)[:40]}")
+        raise MeasurementError(f"{file}: fps: expected a positive number, not {quoted(fps)}")
     return info
 
 
