@@ -77,7 +77,7 @@ def compare(problem: Problem, residual: Array) -> Comparison:
         regimes(problem, residual),
         {name: _parted(problem, residual, k) for k, name in enumerate(names)},
         heat(problem, residual),
-        [error(residual[problem.trial_of == k]) for k in range(len(problem.trials))],
+        [problem.trial_error(residual, k) for k in range(len(problem.trials))],
     )
 
 

@@ -170,7 +170,8 @@ class _Look:
             return None
         fits = follow_valley(search, starts, search.everything, PRIOR)
         best = min(fits, key=lambda f: f.energy)
-        noise = max(float(search.problem.floor.mean()), best.energy / len(best.residual))
+        own = search.everything
+        noise = max(float(search.problem.floor[own].mean()), best.energy / int(own.sum()))
         ties = [f.model.parts[-1].name for f in fits if f is not best and f.energy - best.energy < TIE_ENERGY * noise]
         return self._worth(best, {best.model.parts[-1].name: ties})
 

@@ -6,6 +6,7 @@ two methods. Everything above it, from screening to the report, reads what is de
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -118,6 +119,14 @@ class Problem(ABC):
     def told(self, error: float) -> str:
         """An error as people read it, with its unit."""
         return f"{error:.3g}"
+
+    def weight_of(self, trial: int) -> float:
+        """By what squares of a trial's residual values are weighed beside those of the other trials."""
+        return 1.0
+
+    def trial_error(self, residual: Array, trial: int) -> float:
+        """The error of one trial by itself, of the residual (n,) of all."""
+        return error(residual[self.trial_of == trial]) / math.sqrt(self.weight_of(trial))
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         """The simulated motion of each trial with the poses of all parts; None where nothing is simulated."""

@@ -14,6 +14,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.discrepancy.search.valley import LARGE, follow_valley
+from ee_dist.trials.log import Array
 
 AGAIN = 0.03
 """Finite differences where the values are nearly right already."""
@@ -26,18 +27,18 @@ def pruned(search: Search, fit: Fit, own: int, tried: int, newest: int = 0) -> C
     that would cost least, by its value and what the others can make up for (Wald's test). The first ``own`` and the
     ``newest`` parts stay."""
     for _ in range(ROUNDS):
-        keep = _to_keep(search, fit, own, tried, newest)
+        keep, u = _to_keep(search, fit, own, tried, newest)
         if len(keep) == len(fit.model.parts):
             break
         places = fit.model.places
         model = Model(tuple(fit.model.parts[k] for k in keep))
-        start = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
+        start = np.concatenate([u[places[k]] for k in keep] or [np.zeros(0)])
         (fit,) = follow_valley(search, [(model, start)], fit.mask, PRIOR, widths=(AGAIN,))
     return Current(fit.model.parts, fit.u)
 
 
-def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> list[int]:
-    """Numbers of the parts to keep."""
+def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> tuple[list[int], Array]:
+    """Numbers of the parts to keep, and values (P,) of all to start from, into which went what the others make up for."""
     problem, places = search.problem, fit.model.places
     count = max(1, int(fit.mask.sum()))
     floor = float(problem.floor[fit.mask].sum())
@@ -45,10 +46,11 @@ def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> lis
     # Noise averages out from value to value, what is above it at best from piece to piece.
     luck = floor / count + max(0.0, fit.energy - floor) / pieces
     kept, units = list(range(len(fit.model.parts))), _units(fit.model, own, len(fit.model.parts) - newest)
+    values = fit.u.copy()
     while units:
         at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
         normal = fit.slopes[:, at].T @ fit.slopes[:, at] + PRIOR * np.eye(len(at))
-        inverse, u = np.linalg.inv(normal), fit.u[at]
+        inverse, u = np.linalg.inv(normal), values[at]
         where = [
             np.flatnonzero(np.isin(at, np.concatenate([np.arange(len(fit.u))[places[k]] for k in m]))) for m in units
         ]
@@ -62,10 +64,10 @@ def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> lis
             break
         # What the others make up for goes into them, as far as slopes tell.
         mine = where[cheapest]
-        fit.u[at] = u - inverse[:, mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine])
+        values[at] = u - inverse[:, mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine])
         gone = units.pop(cheapest)
         kept = [k for k in kept if k not in gone]
-    return kept
+    return kept, values
 
 
 def _units(model: Model, first: int, end: int) -> list[list[int]]:

@@ -40,7 +40,7 @@ def worse_trials(problem: Problem, found: Improvement) -> list[Worse]:
         more, size = (last - first)[mine], values[mine].sum()
         if not size or not np.isfinite(more).all():
             continue
-        before, after = (float(np.sqrt(e[mine].sum() / size)) for e in (first, last))
+        before, after = (float(np.sqrt(e[mine].sum() / size / problem.weight_of(k))) for e in (first, last))
         spread = float(np.std(more) * np.sqrt(len(more)))
         if after > CLEARLY * before and more.sum() > SURE * spread:
             worse.append(Worse(trial, before, after))

@@ -78,7 +78,7 @@ class Sight:
         return np.asarray(self.problem.residuals([terms], [trial])[0])
 
     def trial_error(self, residual: Array, trial: int) -> float:
-        return error(residual[self.problem.trial_of == trial])
+        return self.problem.trial_error(residual, trial)
 
     def series(self, terms: Hypothesis, place: Place) -> Series | None:
         """Measured and predicted of one channel of one trial, simulating that trial alone."""

@@ -64,9 +64,8 @@ def follow_cloud(
 
     Only trials with values in the mask are simulated, unless the search says which. ``prior`` as in slopes.py.
     """
-    whole, problem, progress = search, search.problem, search.progress
-    needed = np.unique(problem.trial_of[mask]).tolist()
-    search = search.among(needed if search.trials is None else [k for k in search.trials if k in set(needed)])
+    whole, progress = search, search.progress
+    search = search.within(mask)
     groups = [[_begin(m, np.asarray(u, float), s, i, sigma) for s in seeds] for i, (m, u) in enumerate(starts)]
     flat = [run for group in groups for run in group]
 

@@ -66,6 +66,16 @@ class Search:
     def among(self, trials: Sequence[int] | None) -> Search:
         return replace(self, trials=None if trials is None else tuple(trials))
 
+    def within(self, mask: Mask) -> Search:
+        """The same on the trials that some residual values (n,) are of; itself where these are all that it has."""
+        mine = range(len(self.problem.trials)) if self.trials is None else self.trials
+        of = set(np.unique(self.problem.trial_of[mask]).tolist())
+        few = [k for k in mine if k in of]
+        return self if len(few) == len(mine) else self.among(few)
+
     @property
     def everything(self) -> Mask:
-        return np.ones(len(self.problem.segment_of), dtype=bool)
+        """(n,): the values of the trials that are simulated. The zeros of the others would pass for evidence."""
+        if self.trials is None:
+            return np.ones(len(self.problem.segment_of), dtype=bool)
+        return np.isin(self.problem.trial_of, self.trials)

@@ -50,8 +50,7 @@ def follow_slopes(
     determine says nothing about others. ``leading`` (n, P0): slopes of the first P0 values, where they are known for all
     models alike. Only trials with values in the mask are simulated on the way.
     """
-    whole, needed = search, np.unique(search.problem.trial_of[mask]).tolist()
-    search = search.among(needed if search.trials is None else [k for k in search.trials if k in set(needed)])
+    whole, search = search, search.within(mask)
     known = None if leading is None else leading[mask]
     runs = [_Run(m, np.clip(np.asarray(u, float), m.lower, m.upper)) for m, u in starts]
 
@@ -72,7 +71,7 @@ def follow_slopes(
         _steps(moving, mask, evaluate, prior)
         search.progress("fitting", (step + 1) / len(widths))
     out = []
-    if len(needed) < len(search.problem.trials):
+    if search is not whole:
         for run, r in zip(runs, whole.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
             run.residual = r
     for run in runs:

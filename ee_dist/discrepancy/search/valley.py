@@ -55,9 +55,7 @@ def follow_valley(
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given, all in step: the best
     of a descent from each of ``widths``, of which the last steps follow ever narrower slopes, unless the start is ``settled``
     in a valley already. ``prior`` as in slopes.py; ``slopes`` of the results are those of the smooth residual, weighed."""
-    whole, problem = search, search.problem
-    needed = np.unique(problem.trial_of[mask]).tolist()
-    search = search.among(needed if search.trials is None else [k for k in search.trials if k in set(needed)])
+    whole, search = search, search.within(mask)
     points = [np.clip(np.asarray(u, float), m.lower, m.upper) for m, u in starts]
     rows = search.residuals([m.hypothesis(u) for (m, _), u in zip(starts, points, strict=True)])
     runs = [
@@ -76,7 +74,7 @@ def follow_valley(
         search.progress("fitting all together", (step + 1) / iterations)
     best = [min(runs[k : k + len(widths)], key=lambda r: r.energy) for k in range(0, len(runs), len(widths))]
     rows = np.array([run.residual for run in best])
-    if len(needed) < len(problem.trials):
+    if search is not whole:
         rows = whole.residuals([run.model.hypothesis(run.u) for run in best])
     empty = int(mask.sum())
     return [

@@ -21,7 +21,7 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read
 from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.discrepancy.ways.force_balance.balance import Balance
 from ee_dist.discrepancy.ways.force_balance.motion import Processing
-from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
+from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, roughness_of_noise, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
@@ -64,8 +64,12 @@ class ForceBalance(Problem):
         forces = [decimated(m.torque, self.processing.keep_every) for m in self.motions]
         self.let_through = ready.noise.first
         """(M,): variance of the force that noise of the positions makes, with the base model."""
-        # One share for all drives, so that the sum of squares is the relative error of all of them.
-        self.noise_share = max(self._noise(forces), LEAST_NOISE)
+        shares = np.maximum(self._noise(forces), LEAST_NOISE**2)
+        # One share for all drives, so that the sum of squares is the relative error of all of them; a drive's own floor tells
+        # how much less or more than that its noise is.
+        self.noise_share = float(np.sqrt(np.mean(shares)))
+        self.own_noise = np.sqrt(shares) / self.noise_share
+        """(M,): standard deviation of a drive's noise in units of that share."""
         self.scale = self.size * self.noise_share
         self._lay_out(forces)
         p, smooth = self.processing, self.processing.filter_for(float(np.median(np.diff(trials[0].log.times_s))))
@@ -75,19 +79,20 @@ class ForceBalance(Problem):
             f"forces decimated by {p.keep_every}"
         )
 
-    def _noise(self, forces: Sequence[Array]) -> float:
-        """Noise of the force left over, as a share of the force: from second differences. What a model accounts for is no
-        noise, so the least of what the model as it is leaves over, and of what the measured force shows and noise of the
-        positions adds to it."""
+    def _noise(self, forces: Sequence[Array]) -> Array:
+        """(M,) variance of the noise of the force left over, as a share of the mean square of the force: from second differences.
+        What a model accounts for is no noise, so the least of what the model as it is leaves over, and of what the measured
+        force shows and noise of the positions adds to it."""
         both = [balance(model) for model, balance in zip(self.models, self.balances, strict=True)]
         left = [None if b is None else b[1] for b in both]
+        rough = roughness_of_noise(self.processing.keep_every)
         found = []
         for series, more in ((forces, self.let_through), (left, 0.0)):
             whole = [s for s in series if s is not None]
             if len(whole) == len(series):
-                parts = [np.median(roughness(s / self.size), axis=0) / 0.455 for s in whole]
-                found.append(float(np.sqrt(np.mean(parts) + np.mean(more / self.size**2))))
-        return min(found)
+                parts = [np.median(roughness(s / self.size), axis=0) / 0.455 / rough for s in whole]
+                found.append(np.mean(parts, axis=0) + more / self.size**2)
+        return np.asarray(np.min(found, axis=0))
 
     def natural(self, error: float) -> float:
         """Root mean square of the force left over, as a share of that of the measured force."""
@@ -127,7 +132,7 @@ class ForceBalance(Problem):
             channel_of=np.tile(np.arange(motors), at // motors),
             time_s=np.concatenate(time),
             reading=np.ones(at, dtype=bool),
-            floor=np.ones(at),
+            floor=np.tile(self.own_noise**2, at // motors),
             known=np.zeros(at),
             channels=self.robot.motor_names,
             units=tuple("N" if kinds[m] == "slide" else "N.m" for m in self.robot.motor_names),
@@ -145,7 +150,8 @@ class ForceBalance(Problem):
                 if kept is None:
                     out[row, self.slices[k]] = np.inf
                     continue
-                left = resting(kept[0] / self.scale, kept[1] / self.scale, self.balances[k].rest)
+                own = self.scale * self.own_noise
+                left = resting(kept[0] / own, kept[1] / own, self.balances[k].rest) * self.own_noise
                 less = (self.let_through - self.motion_noise.variance(model)) / self.scale**2
                 out[row, self.slices[k]] = with_energy(left, less).ravel()
         return out

@@ -126,7 +126,7 @@ class FreeRun(Problem):
             channel_of=np.tile(np.arange(width), sum(rows)),
             time_s=np.concatenate(time),
             reading=np.ones(size, dtype=bool),
-            floor=np.ones(size),
+            floor=self.weight.copy(),
             known=np.zeros(size),
             channels=tuple(s.name for s in sensors),
             units=tuple(s.unit for s in sensors),
@@ -160,6 +160,9 @@ class FreeRun(Problem):
     def smooth(self, residual: Array) -> Array:
         """The error itself, in units of the noise, instead of its root."""
         return np.asarray(residual * np.abs(residual))
+
+    def weight_of(self, trial: int) -> float:
+        return float(self.weight[self.trial_of == trial].max(initial=0.0)) or 1.0
 
     def natural(self, value: float) -> float:
         """Mean absolute position error, rad or m."""

@@ -1,0 +1,95 @@
+"""What a perfect model would leave: by every drive with noise of its own, and in trials of unequal length."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from way_samples import Sample, evaluator_for, measure, sines, two_joint_arm
+
+from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.ways.force_balance.noise import roughness_of_noise
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.ways.open_loop.prediction import roughness
+from ee_dist.measurements.sampling import decimated
+from ee_dist.robots.inverse_dynamics import parameters, regressor
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.trials.log import SensorLog
+from ee_dist.trials.noise import with_noise
+
+
+def balanced_arm(noise_nm: tuple[float, float]) -> ForceBalance:
+    """Two motions of an arm whose torques are those of its model, but for white noise."""
+    robot = two_joint_arm()
+    t = np.arange(0.0, 12.0, robot.time_step_s)
+    trials = []
+    for k, pace in enumerate((1.0, 1.27)):
+        q = np.stack(
+            [
+                0.6 * np.sin(2.1 * pace * t) + 0.2 * np.sin(5.3 * pace * t),
+                0.5 * np.sin(3.1 * pace * t) + 0.3 * np.sin(1.3 * pace * t),
+            ],
+            axis=1,
+        )
+        v = np.gradient(q, robot.time_step_s, axis=0)
+        a = np.gradient(v, robot.time_step_s, axis=0)
+        torque = regressor(robot, q, v, a) @ parameters(robot) + a * [d.rotor_inertia for d in robot.drives]
+        torque += np.random.default_rng([3, k]).normal(size=torque.shape) * noise_nm
+        of = {"position": q, "velocity": v}
+        place = {name: j for j, name in enumerate(robot.motor_names)}
+        sensors = np.stack([of[s.kind][:, place[s.target]] for s in robot.sensors], axis=1)
+        units = tuple(s.unit for s in robot.sensors)
+        log = SensorLog(t, sensors, q, robot.sensor_names, units, robot.motor_names, joints=q, torques=torque)
+        trials.append(MeasuredTrial(f"motion {k}", log, None))
+    return ForceBalance(trials, robot)
+
+
+@pytest.mark.parametrize("noise_nm", [(0.05, 0.05), (0.15, 0.027)])
+def test_forces_that_differ_by_noise_alone_are_noise_whichever_drive_has_more_of_it(
+    noise_nm: tuple[float, float],
+) -> None:
+    problem = balanced_arm(noise_nm)
+    residual = problem.residuals([()])[0]
+    assert leftovers(problem, residual) == []
+    assert error(residual) == pytest.approx(1.0, abs=0.15)
+    for k in range(2):
+        mine = problem.channel_of == k
+        assert (residual[mine] ** 2).mean() == pytest.approx(problem.floor[mine].mean(), rel=0.35)
+
+
+@pytest.mark.parametrize("every", [1, 2, 5, 10])
+def test_the_roughness_of_noise_of_which_some_rows_are_kept(every: int) -> None:
+    kept = decimated(np.random.default_rng(0).normal(size=(100_000, 1)), every)[50:-50]
+    found = roughness(kept)[1:-1].mean() / kept.var()
+    assert roughness_of_noise(every) == pytest.approx(found, rel=0.05)
+
+
+def unequal() -> FreeRun:
+    robot = with_noise(servo_pendulum(), 5e-5)
+    sample = Sample(robot, (sines(robot, 1.0, 8.0)[0], sines(robot, 1.0, 2.0)[1]), (), ("free_run",))
+    return FreeRun(measure(sample, ()), robot, evaluator_for(robot))
+
+
+@pytest.mark.parametrize(("times", "left"), [(1.0, set()), (1.5, {"motion 0"})])
+def test_in_trials_of_unequal_length_what_is_more_than_noise_is_left_and_noise_is_not(
+    times: float, left: set[str]
+) -> None:
+    problem = unequal()
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        gap = rng.normal(size=len(problem.weight)) / np.sqrt(2 / np.pi)
+        gap[problem.trial_of == 0] *= times
+        residual = np.sign(gap) * np.sqrt(np.abs(gap) * problem.weight)
+        assert {g.trial for g in leftovers(problem, residual)} == left
+
+
+def test_the_error_of_a_trial_is_its_own_however_long_the_others_are() -> None:
+    problem = unequal()
+    residual = problem.residuals([()])[0]
+    found = compare(problem, residual).trial_errors
+    raw = np.abs(problem.raw(residual))
+    for k, value in enumerate(found):
+        assert problem.natural(value) == pytest.approx(raw[problem.trial_of == k].mean(), rel=1e-6)
