@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +11,12 @@ from ee_dist.discrepancy.assumed import GUESSED, LABEL, assumed_text
 from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
-from ee_dist.discrepancy.evidence.judge import Judged
+from ee_dist.discrepancy.evidence.judge import LUCK, Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.importance import Share, added, shares
-from ee_dist.discrepancy.improve import EXPLAINED
-from ee_dist.discrepancy.ladder import Improvement, Rung
+from ee_dist.discrepancy.improve import EXPLAINED, SETTLED
+from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
@@ -46,6 +46,11 @@ MOSTLY = 0.97
 CLOSE = 1.1
 """Times the noise floor up to which a model is nearly right."""
 GRANTED = "What is above the floor is no more than chance, and what contacts and reversals leave that come a row early or late."
+SPREAD = (
+    "What is left stands out nowhere; all together it is more than noise, and below the resolution at which channels are "
+    "compared."
+)
+NOTHING_STANDS_OUT = "Nothing else stands out."
 NOTHING_ELSE = "Nothing else is left above the noise."
 CONTENT = (
     "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
@@ -136,7 +141,9 @@ def _beside(error: float, floor: float, left: bool) -> list[str]:
         return ["The error is below the floor: the noise was estimated too high, and the floor is an upper bound."]
     if error < floor:
         return ["The error is at the floor, within chance."]
-    return [GRANTED] if error > 1.03 * floor and not left else []
+    if error <= 1.03 * floor or left:
+        return []
+    return [GRANTED if error <= SETTLED * floor else SPREAD]
 
 
 def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None, planner: str = "") -> Account:
@@ -146,7 +153,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     lines = [f"Noise floor: {found.floor_source}. {_count(found.tried, 'explanation')} {_were(found.tried)} tried."]
     error = f"{_error(problem)}: model {problem.told(found.baseline_error)}"
     error += f", noise floor {problem.told(found.noise_floor)}."
-    last, advice = found.baseline_error, ""
+    last, advice, settled = found.baseline_error, "", False
     if found.refitted_error != found.baseline_error:
         lines.append(f"Its own values fitted anew leave {problem.told(found.refitted_error)}.")
         last = found.refitted_error
@@ -155,19 +162,26 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
             "Its own values stay as they were: with the effect on top that explains more than fitting them anew."
         )
     if found.verdict == NOTHING_MISSING:
-        head = "Nothing is missing: no candidate takes more off the residual than luck, and no channel stands out."
-        sure = (
-            f"How sure: {_count(found.tried, 'explanation')} {_were(found.tried)} tried, and none gains more than luck."
-        )
+        by_luck = all(c.why_not == LUCK for c in found.candidates)
+        worth = "takes more off the residual than luck" if by_luck else "earns its place"
+        head = f"Nothing is missing: no candidate {worth}, and no channel stands out."
+        gains = "gains more than luck" if by_luck else "earns its place"
+        sure = f"How sure: {_count(found.tried, 'explanation')} {_were(found.tried)} tried, and none {gains}."
         advice = CONTENT
     elif found.verdict == EFFECT and best is not None:
         entry, last = CATALOGUE[best.terms[0].effect], best.error_heldout
+        # Those that were judged are the most promising: where all of them are tied there may be more.
+        more = "at least " if len(best.tied_with) + 1 == len(found.candidates) < found.tried else ""
+        close = last <= SETTLED * found.noise_floor
         less = is_less(best.terms)
-        head = f"{'Too much' if less else 'Missing'}{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best)}."
-        head += f" {NOTHING_ELSE}" if not found.left else " More than noise is left with it."
+        head = f"{'Too much' if less else 'Missing'}{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best, more)}."
+        settled = not found.left
+        head += (
+            " More than noise is left with it." if found.left else f" {NOTHING_ELSE if close else NOTHING_STANDS_OUT}"
+        )
         error = _errors(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
         sure = f"How sure: it takes off {confidence(best)}{_rest(best.explained, not found.left)}"
-        sure += f"; {_rivals(found.tried, best.tied_with)}."
+        sure += f"; {_rivals(found.tried, best.tied_with, more)}."
         guessed = best.proposal.label == LABEL
         lines.append(GUESSED if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""
@@ -197,7 +211,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
             f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
             f"(predicted distance {ahead.separation:.0f} standard deviations)."
         )
-    good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
+    good = found.verdict == NOTHING_MISSING or settled
     tied = found.verdict == EFFECT and best is not None and best.tied_with
     alike = ahead is not None and ahead.separation < ENOUGH
     return Account(
@@ -234,11 +248,11 @@ def _rest(explained: float, settled: bool) -> str:
     return "; what it leaves of that stands out nowhere" if settled and explained < MOSTLY else ""
 
 
-def _rivals(tried: int, tied: Sequence[str]) -> str:
+def _rivals(tried: int, tied: Sequence[str], more: str) -> str:
     if not tied:
         return f"of {_count(tried, 'explanation')} no other does as well"
     told_of = f" ({_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
-    return f"of {_count(tried, 'explanation')} {len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+    return f"of {_count(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
 
 
 def _few(names: Sequence[str]) -> str:
@@ -251,13 +265,13 @@ def _doubt(found: Explanation) -> str:
     return "" if not found.left else ", as one of several things"
 
 
-def _twins(best: Judged) -> str:
+def _twins(best: Judged, more: str) -> str:
     """What it may be instead: by name, where there are few."""
     others = best.tied_with
     if not others:
         return ""
     if len(others) > TWINS:
-        return f", or one of {len(others)} others that look the same here"
+        return f", or one of {more}{len(others)} others that look the same here"
     return f", or {' or '.join(map(placed, others))}, which look{'s' if len(others) == 1 else ''} the same here"
 
 
@@ -283,8 +297,11 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     lines = []
     if len(steps) > 1:
         lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
-    lines += [tie_text(placed(r.name), r.tied_with) for r in steps if r.tied_with]
-    lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for r in steps for d in r.dropped]
+    names = {t.name for t in found.terms}
+    ties = {r.name: [n for n in r.tied_with if n not in names] for r in steps if names & {t.name for t in r.added}}
+    lines += [tie_text(placed(name), others) for name, others in ties.items() if others]
+    gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in names)
+    lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]
     lines += doubt_text([s for s in shares(found, robot) if s.doubted])
     vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
     if vague:
@@ -314,10 +331,9 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
         where = "" if found.left or settled else f" on {last.held_out}"
         head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {last.held_out}{_rest(found.explained, settled)}"
-        sure += f"{_ranges(found, [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1], robot)}{_told_from(steps)}."
+        sure += f"{_ranges(found, [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1], robot)}{_told_from(ties)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
-    there = {t.name for t in found.terms}
-    tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in there for r in steps)
+    tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
     good = settled and not warnings
     more = (*lines, *problem.notes)
@@ -370,9 +386,9 @@ def _ranges(found: Improvement, named_: Sequence[Term], robot: Robot) -> str:
     return f"; 95 % intervals: {'; '.join(out)}" if out else ""
 
 
-def _told_from(steps: Sequence[Rung]) -> str:
+def _told_from(ties: Mapping[str, Sequence[str]]) -> str:
     """Whether others would have done as well."""
-    others = sorted({t for r in steps for t in r.tied_with})
+    others = sorted({t for names in ties.values() for t in names})
     if not others:
         return ""
     several = f"{len(others)} others ({_few(others)})"

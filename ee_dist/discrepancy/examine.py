@@ -118,7 +118,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
     has = {t.effect for t in (*search.fixed, *current.hypothesis) if t.target == ALL_JOINTS}
     starts += _families(screened, starts, least, has)
-    guessed = assumed_drives(now.among(busy), pool, [c.name for c in current.parts])
+    guessed = assumed_drives(now.among(busy), pool, [t.name for t in (*search.fixed, *current.hypothesis)])
     starts += [guessed] if guessed is not None else []
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
     far = nearest > FAR**2

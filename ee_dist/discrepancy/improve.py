@@ -43,7 +43,7 @@ EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
 RETURNS = 2
 """How often an effect may have been dropped and yet be looked at again: what came later may be dropped in turn."""
-CLOSE = 1.3
+SETTLED = 1.3
 """Error over the noise floor up to which no more than noise is left where no curve stands out."""
 MOST = 24
 """Effects that are added at most unless told otherwise."""
@@ -330,4 +330,4 @@ def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor:
 
 def _settled(left: Sequence[Leftover], error_after: float, floor: float) -> bool:
     """Whether no more than noise is left: no curve stands out, nor all of them together."""
-    return not left and error_after <= CLOSE * floor
+    return not left and error_after <= SETTLED * floor

@@ -84,13 +84,17 @@ def next_trials(
     library: Sequence[Excitation] = LIBRARY,
     every_s: float = 0.0,
 ) -> list[PlannedTrial]:
-    """Excitations by how well they separate the hypotheses for their length, the best first."""
+    """Excitations that tell apart what any of them can, the best for their length first: twins that no motion separates decide
+    nothing, and a short trial that does not separate the others is no better than a longer one that does."""
     if len(tied) < 2:
         return []
     # A network in the loop reads its sensors in every row, and cannot be followed from fewer readings.
     some = [e for e in library if not every_s or e.weights(robot) is None]
     found = predicted(robot, [Contender(h) for h in tied], some, evaluator, every_s=every_s)
-    return sorted(found, key=lambda p: -p.separation / np.sqrt(p.excitation.seconds))
+    return sorted(
+        ranked(len(tied), found).trials,
+        key=lambda p: (p.separation < ENOUGH, -p.separation / np.sqrt(p.excitation.seconds)),
+    )
 
 
 def predicted(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.plan import ENOUGH, Contender, parting, predicted, ranked
+from ee_dist.discrepancy import plan
+from ee_dist.discrepancy.plan import ENOUGH, Contender, PlannedTrial, next_trials, parting, predicted, ranked
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.catalogue import term
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
@@ -83,6 +85,18 @@ def test_twins_that_no_motion_separates_decide_nothing(evaluator) -> None:
     assert found.best.excitation == LARGE and found.best.separation > ENOUGH
     only = ranked(2, predicted(ROBOT, twins[:2], (SMALL, LARGE), evaluator))
     assert only.best.separation == 0.0 and not only.enough and only.alike == ((0, 1),)
+
+
+def test_a_next_trial_tells_apart_what_any_does_though_others_are_twins_and_shorter_trials_do_not(
+    evaluator, monkeypatch
+) -> None:
+    short, long = Excitation("sway", 1.8, 0.1, 1), Excitation("sway", 9.6, 0.1, 1)
+    # Of three explanations the first two are twins; the short trial separates the others less than is enough, and more a second.
+    told = [PlannedTrial(short, 0.0, (0.0, 3.6, 3.6)), PlannedTrial(long, 0.0, (0.0, 7.5, 7.5))]
+    monkeypatch.setattr(plan, "predicted", Mock(return_value=told))
+    found = next_trials(ROBOT, [HEAVY, HEAVY, LAZY], evaluator)
+    assert [t.excitation for t in found] == [long, short]
+    assert found[0].separation == 7.5 > ENOUGH
 
 
 @pytest.mark.parametrize("robot", [servo_pendulum(), linear_stage(), quadruped_lab()], ids=lambda r: r.name)

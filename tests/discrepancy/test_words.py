@@ -26,6 +26,7 @@ def account(tied: list[str], explained: float = 1.0) -> Account:
         explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""),
     )  # fmt: skip
     found = SimpleNamespace(
+        candidates=[],
         best=best,
         verdict=EFFECT,
         left=[],
@@ -171,6 +172,14 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     end = SimpleNamespace(**{**vars(start), "dropped": ("rotor_inertia@servo",)})
     found.ladder = [start, rung, end]
     lines = improve_account(problem, found).lines  # type: ignore[arg-type]
+    assert account.sure.count("not told from") == 0
+    rung.tied_with = ["coulomb_friction@servo", "motor_weak@servo"]
+    swapped = improve_account(problem, found)  # type: ignore[arg-type]
+    told_apart = "These measurements cannot tell x at y from: motor weak at servo."
+    assert told_apart in swapped.lines and "not told from motor weak at servo" in swapped.sure
+    rung.added = (term("viscous_friction", "servo", damping_nm_s_rad=0.1),)
+    gone = improve_account(problem, found)  # type: ignore[arg-type]
+    assert not any("cannot tell" in line for line in gone.lines) and "not told from" not in gone.sure
     assert "Dropped again: offset torque at servo, which a later effect made useless." in lines
     assert "Left out in the end, since these data do not tell them from neutral: rotor inertia at servo." in lines
 

@@ -77,17 +77,19 @@ class HeldOut:
 
 def windows(problem: Problem) -> Cut:
     """Windows of a trial alternate in two turns; where a trial is a single segment, the trials do."""
-    trial = problem.trial_of_segment
-    fold = np.zeros(len(trial), dtype=np.int64)
+    trial = np.asarray(problem.trial_of_segment)
+    fold, group = np.zeros(len(trial), dtype=np.int64), trial.copy()
     single = 0
     for k in np.unique(trial):
         members = np.flatnonzero(trial == k)
         if len(members) == 1:
             fold[members] = single
             single = 1 - single
+            # Within itself a single window does not vary: such trials are one group.
+            group[members] = -1
         else:
             fold[members] = (np.arange(len(members)) + k) % 2
-    return Cut(WINDOWS, fold, np.arange(len(trial)), trial)
+    return Cut(WINDOWS, fold, np.arange(len(trial)), group)
 
 
 def travelling(problem: Problem) -> list[Cut]:

@@ -52,8 +52,8 @@ def with_energy(left: Array, more: Array) -> Array:
 
 @lru_cache
 def roughness_of_noise(every: int) -> float:
-    """Mean square of the second differences of white noise of which ``every``-th row is kept, over 6 times its variance: 1 where all
-    are kept. The filter before it leaves neighbours alike, and less rough than white noise is."""
+    """Mean square of the second differences of white noise of which every n-th row is kept, over 6 times its variance: 1 where
+    all are kept. The filter before it leaves neighbours alike, and less rough than white noise is."""
     around = 200 * every
     found = np.zeros(3)
     for phase in range(every):

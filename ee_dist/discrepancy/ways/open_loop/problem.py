@@ -91,7 +91,11 @@ class OpenLoop(Problem):
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
         spacing = reading_s(trials)
         self.block = block if not spacing else min(block, max(1, round(BLOCK_S / spacing)))
-        self.window = window // self.block * self.block
+        fewest = sum(len(t.log.readings) for t in trials)
+        if fewest < 2 * window:
+            # Of a single window nothing could be held out.
+            window = fewest // 2
+        self.window = max(1, window // self.block) * self.block
         block, window = self.block, self.window
         self._members = members
         self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}

@@ -1,0 +1,44 @@
+"""Pruning, and what counts as evidence where only some trials are searched."""
+
+from __future__ import annotations
+
+import numpy as np
+from linear_problem import ROBOT, Linear
+
+from ee_dist.discrepancy.evidence.intervals import half_widths
+from ee_dist.discrepancy.pruning import pruned
+from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.effects.catalogue import term
+
+JOINTS = ROBOT.motor_names
+MODEL = Model(tuple(candidate(ROBOT, "coulomb_friction", j) for j in JOINTS))
+
+
+def fitted(search: Search) -> Fit:
+    (fit,) = follow_valley(search, [(MODEL, np.zeros(len(JOINTS)))], search.everything, 1.0)
+    return fit
+
+
+def test_a_fit_stays_as_it_was_when_a_model_is_pruned_from_it() -> None:
+    search = Search(Linear((term("coulomb_friction", JOINTS[0], torque_nm=0.3),), motions=4))
+    fit = fitted(search)
+    before = fit.u.copy()
+    kept = pruned(search, fit, 0, 50)
+    assert 0 < len(kept.parts) < len(JOINTS)
+    assert np.array_equal(fit.u, before)
+
+
+def test_trials_that_are_not_searched_are_no_evidence() -> None:
+    problem = Linear((term("coulomb_friction", JOINTS[0], torque_nm=0.3),), motions=3)
+    first = Search(problem, trials=(0,))
+    assert first.everything.sum() == (problem.trial_of == 0).sum() < len(problem.trial_of)
+    fit = fitted(first)
+    (alone,) = follow_valley(Search(problem), [(MODEL, np.zeros(len(JOINTS)))], problem.trial_of == 0, 1.0)
+    assert np.allclose(fit.u, alone.u, atol=1e-6)
+    assert np.allclose(half_widths(problem, fit), half_widths(problem, alone), rtol=1e-6)
+    assert first.within(first.everything) is first
+    assert first.within(problem.trial_of == 0) is first
+    assert Search(problem).within(problem.trial_of == 0).trials == (0,)
