@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ _KINDS = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_S
 _FREE, _BALL, _PLANE = (
     int(k) for k in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtGeom.mjGEOM_PLANE)
 )
+_MESH = mujoco.mjtGeom.mjGEOM_MESH
 _SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
     int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
@@ -63,11 +65,11 @@ def compiled(path: str | Path) -> Any:
     except XmlError as error:
         raise MjcfError(str(error)) from None
     try:
-        return _bare(file, meshes=False).compile()
+        return _bare(file, every_mesh=False).compile()
     except (ValueError, RuntimeError, MemoryError) as first:
-        # Meshes are wanted where they alone say what a body weighs.
+        # A sensor may name a mesh that weighs nothing.
         try:
-            return _bare(file, meshes=True).compile()
+            return _bare(file, every_mesh=True).compile()
         except (ValueError, RuntimeError, MemoryError) as error:
             told = error if "mass" in str(first) or "inertia" in str(first) else first
             raise MjcfError(f"{file}: MuJoCo cannot build it: {' '.join(str(told).split())}") from None
@@ -108,36 +110,68 @@ def _count(element: ET.Element) -> int:
     return int(min(total, 1e9)) if total == total else 1
 
 
-def _bare(file: Path, meshes: bool) -> Any:
-    """The file's specification without what costs memory and says nothing of a motion."""
+def _bare(file: Path, every_mesh: bool) -> Any:
+    """The file's specification without what costs memory and says nothing of a motion. Of meshes, those stay that weigh; with
+    ``every_mesh`` all that do not only show."""
     spec = mujoco.MjSpec.from_file(str(file))
     spec.memory = spec.nstack = spec.njmax = spec.nconmax = -1
     spec.nuserdata = 0
+    lost = _lost_meshes(spec, file)
     unwanted = (mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_SDF)
     for geom in list(spec.geoms):
-        shown_only = not geom.contype and not geom.conaffinity and geom.parent.explicitinertial
-        mesh = geom.type == mujoco.mjtGeom.mjGEOM_MESH
-        if geom.type in unwanted or (mesh and (not meshes or shown_only)):
+        if geom.type in unwanted or (geom.type == _MESH and not _kept(spec, geom, lost, every_mesh)):
             spec.delete(geom)
         else:
             geom.material = ""
-    if not meshes:
-        for pair in list(spec.pairs):
-            spec.delete(pair)
-        for skin in list(spec.skins):
-            spec.delete(skin)
-    groups = [spec.hfields, spec.numerics, spec.materials, spec.textures]
-    for group in groups if meshes else [*groups, spec.meshes]:
+    if not every_mesh:
+        for item in (*spec.pairs, *spec.skins):
+            spec.delete(item)
+    for group in (spec.hfields, spec.numerics, spec.materials, spec.textures):
         for item in list(group):
             spec.delete(item)
+    named = {geom.meshname for geom in spec.geoms}
+    for mesh in list(spec.meshes):
+        if not every_mesh and mesh.name not in named:
+            spec.delete(mesh)
+        elif mesh.name in lost:
+            raise ValueError(f"no mesh {lost[mesh.name]}, and no <inertial> for the body that it is of")
     for item in (*spec.sites, *spec.tendons):
         item.material = ""
-    if meshes:
-        folder = file.parent / spec.meshdir
-        for mesh_asset in spec.meshes:
-            if mesh_asset.file and not (folder / mesh_asset.file).is_file():
-                raise ValueError(f"no mesh {folder / mesh_asset.file}, and no <inertial> for the body that it is of")
     return spec
+
+
+def _lost_meshes(spec: Any, file: Path) -> dict[str, Path]:
+    """Meshes by name whose file is none."""
+    folder = file.parent / spec.meshdir
+    files = {m.name: folder / (Path(m.file).name if spec.strippath else m.file) for m in spec.meshes if m.file}
+    return {name: path for name, path in files.items() if not path.is_file()}
+
+
+def _kept(spec: Any, geom: Any, lost: Mapping[str, Path], every_mesh: bool) -> bool:
+    """Whether a mesh is wanted: because it weighs, or because it touches and all that do are. What weighs on a bolted body moves
+    nothing, so that there a lost file is no loss."""
+    if _weighs(spec, geom):
+        return geom.meshname not in lost or _moves(geom.parent)
+    shown_only = not geom.contype and not geom.conaffinity and geom.parent.explicitinertial
+    return every_mesh and not shown_only
+
+
+def _weighs(spec: Any, geom: Any) -> bool:
+    """Whether a geom is part of what its body weighs."""
+    by_geoms = spec.compiler.inertiafromgeom
+    low, high = spec.compiler.inertiagrouprange
+    never, always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    if geom.parent.name == "world" or by_geoms == never or not low <= geom.group <= high:
+        return False
+    massless = geom.mass == 0 or (math.isnan(geom.mass) and geom.density == 0)
+    return not massless and (by_geoms == always or not geom.parent.explicitinertial)
+
+
+def _moves(body: Any) -> bool:
+    """Whether a joint carries the body."""
+    while body is not None and not list(body.joints):
+        body = body.parent
+    return body is not None
 
 
 @dataclass
