@@ -90,7 +90,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         f"{len(robot.parts)} parts, {sum(p.mass_kg for p in robot.parts):.4g} kg",
         f"{len(body.moving) + 6 * free} degrees of freedom: {len(body.moving)} joints"
         + (", base free" if free else ", base bolted down"),
-        f"{len(body.driven)} joints with a drive or passive forces in the file",
+        f"{sum(_acted_on(body.drives[name]) for name in body.driven)} joints with a drive or passive forces in the file",
         f"{sum(len(p.shapes) for p in robot.parts)} shapes that can touch the floor",
     )
     said = tuple(n for n in notes if n not in body.assumed)
@@ -138,6 +138,10 @@ def _drive(joint: Joint, body: Body, inertia: Mapping[str, float]) -> tuple[dict
         guessed.append("no torque limit in the file")
     order = ["command", "kp", "ki", "kd", "torque_limit"]
     return {k: known[k] for k in [*(o for o in order if o in known), *(k for k in known if k not in order)]}, guessed
+
+
+def _acted_on(known: Mapping[str, float | str]) -> bool:
+    return known.get("command") != "none" or not set(known) <= {"command", "torque_limit"}
 
 
 def _rounded(value: float) -> float:

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
+import numpy as np
+import pybullet as p
 import pytest
 
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
+from ee_dist.engines.mujoco.bodies import Group
+from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.mujoco.mjcf import read_mjcf
 from ee_dist.engines.mujoco.model import Model
+from ee_dist.engines.pybullet.engine import PyBulletEngine
+from ee_dist.engines.pybullet.world import World
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot, RobotError
+from ee_dist.robots.starter import starter
 
 CUBE = '<mesh name="cube" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1 .1 .1 0 .1 0 .1 0 .1 .1 .1 .1 .1"/>'
 """10 cm long, so 1 kg in water."""
@@ -58,7 +68,7 @@ def test_meshes_weigh_as_in_mujoco(tmp_path: Path, geoms: str, rest: str) -> Non
     file = written(tmp_path, f'<body name="arm"><joint axis="0 1 0"/>{geoms}</body>', f"<asset>{CUBE}</asset>{rest}")
     robot, _ = load_robot(file)
     theirs, _ = by_mujoco(file)
-    assert sum(p.mass_kg for p in robot.parts[1:]) == pytest.approx(theirs.body_mass.sum())
+    assert sum(part.mass_kg for part in robot.parts[1:]) == pytest.approx(theirs.body_mass.sum())
     assert built(robot).dof_M0 == pytest.approx(theirs.dof_M0)
 
 
@@ -69,3 +79,43 @@ def test_a_lost_mesh_is_an_error_where_its_mass_would_move(tmp_path: Path) -> No
     file = written(tmp_path, f'<body><joint/>{POLE}<body><geom type="mesh" mesh="m"/></body></body>', mesh)
     with pytest.raises(RobotError, match=r"no mesh .*nowhere.stl, and no <inertial>"):
         read_mjcf(file)
+
+
+CART = (
+    '<body name="cart"><joint name="x" type="slide" axis="1 0 0"/><geom type="box" size=".1 .1 .1" mass="1"/>'
+    f'<body name="pole"><joint name="pole" axis="0 1 0"/>{POLE}</body></body>'
+)
+TILTED = '<keyframe><key qpos="0.3 3"/></keyframe>'
+
+
+def test_joints_that_the_file_leaves_undriven_swing_from_where_they_start(tmp_path: Path) -> None:
+    file = written(tmp_path, CART, f'<actuator><motor joint="x"/></actuator>{TILTED}')
+    body = read_mjcf(file)
+    made = starter(body, "mjcf", file.name, str(file))
+    robot, _ = load_robot(file)
+    for found in (made.robot, robot):
+        assert [(d.joint, d.command, d.kp) for d in found.drives] == [("x", "torque", 0.0), ("pole", "none", 0.0)]
+    assert any(r.startswith("1 joints with a drive") for r in made.read)
+    m, d = by_mujoco(file)
+    expected = np.zeros((300, 2))
+    for row in expected:
+        row[:] = d.qpos
+        mujoco.mj_step(m, d)
+    job = [Rollout(robot, Commands(np.zeros((1, 2))), len(expected), pose=True)]
+    for engine in (MuJoCoEngine(threads=1), PyBulletEngine()):
+        (log,) = engine.rollout(job)
+        assert log.joints is not None
+        assert log.joints[0] == pytest.approx([0.3, 3.0])
+        assert np.abs(log.joints - expected).max() < 0.05 * np.ptp(expected[:, 1])
+
+
+def test_a_joint_without_any_drive_begins_at_its_start(tmp_path: Path) -> None:
+    file = written(tmp_path, CART, TILTED)
+    robot = replace(load_robot(file)[0], drives=(), sensors=())
+    group = Group(Model(robot), [Rollout(robot, Commands(np.zeros((1, 0))), 1)], 1)
+    assert group.positions[0] == pytest.approx([0.3, 3.0])
+    world = World(robot, 1)
+    world.prepare([robot], [None])
+    states = [p.getJointState(world.bodies[0], k, physicsClientId=world.client)[0] for _, k in world.joint_links]
+    world.close()
+    assert states == pytest.approx([0.3, 3.0])

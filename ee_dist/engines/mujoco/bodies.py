@@ -84,6 +84,8 @@ class Group:
         for i, r in enumerate(members):
             start = r.start
             self.pose[i] = (*r.model.start_position_m, *r.model.start_rotation)
+            for name, at in model.undriven:
+                self.positions[i, at] = r.model.joint(name).start
             if start is not None:
                 self.positions[i, model.qpos] = np.asarray(start.joints, dtype=float)[model.motors]
                 self.speeds[i, model.dof] = np.asarray(start.speeds, dtype=float)[model.motors]

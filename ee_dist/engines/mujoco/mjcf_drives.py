@@ -45,7 +45,8 @@ def drives_of(m: Any, joints: Mapping[int, str]) -> tuple[dict[str, Fields], tup
             skipped.append(label)
     if skipped:
         notes.append(f"actuators left out (not one of a joint, or of no known law): {', '.join(skipped)}")
-    driven = tuple(n for n, fields in found.items() if n in actuated or any(k != "torque_limit" for k in fields))
+    # Where the file drives some joints, it leaves the others to swing on purpose.
+    driven = tuple(n for n, fields in found.items() if m.nu or any(k != "torque_limit" for k in fields))
     for name in driven:
         found[name].setdefault("command", "none")
         found[name].setdefault("torque_limit", math.inf)

@@ -74,7 +74,7 @@ class Model:
     """A compiled structure and where its numbers are.
 
     ``motors`` lists the motors whose joint is present, ``qpos`` and ``dof`` their addresses in MuJoCo's positions and
-    speeds; ``touches`` the touch sensors whose part is present, in the order of ``sensordata``.
+    speeds; ``undriven`` present joints without a motor and their addresses; ``touches`` the touch sensors whose part is present, in the order of ``sensordata``.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -93,6 +93,8 @@ class Model:
         joints = [m.joint(robot.motor_names[k]).id for k in self.motors]
         self.qpos = [int(m.jnt_qposadr[j]) for j in joints]
         self.dof = [int(m.jnt_dofadr[j]) for j in joints]
+        free = sorted(moving - set(robot.motor_names))
+        self.undriven = [(name, int(m.joint(name).qposadr[0])) for name in free]
         targets = [s.target for s in robot.sensors if s.kind == "touch"]
         self.touches = [k for k, name in enumerate(targets) if name in parts]
         self.pair_body = m.geom_bodyid[m.pair_geom2] if m.npair else np.zeros(0, dtype=int)

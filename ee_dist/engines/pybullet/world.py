@@ -121,9 +121,12 @@ class World:
                 p.changeDynamics(
                     body, k, contactStiffness=stiffness, contactDamping=0.02 * stiffness, physicsClientId=c
                 )
-        # Bullet's own motors are off: torques are ours.
-        for _, k in self.joint_links:
+        driven = set(robot.motor_names)
+        for joint, k in self.joint_links:
+            # Bullet's own motors are off: torques are ours.
             p.setJointMotorControl2(body, k, p.VELOCITY_CONTROL, force=0, physicsClientId=c)
+            if joint.start and joint.name not in driven:
+                p.resetJointState(body, k, joint.start, physicsClientId=c)
         return body
 
     def _shape(self, part: Part) -> int:
