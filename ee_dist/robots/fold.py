@@ -41,7 +41,7 @@ def folded(
         bare = parts[root].mass_kg <= DUMMY_KG and not parts[root].shapes
         if not bare or len(below) != 1 or below[0].kind != "fixed":
             break
-        start = _split(compose(_pose(*start), _pose(below[0].position_m, below[0].rotation)))
+        start = posed(start, (below[0].position_m, below[0].rotation))
         del joints[below[0].child], parts[root]
         root = below[0].child
     for name in list(joints)[::-1]:
@@ -52,7 +52,7 @@ def folded(
         parts[joint.parent] = _joined(parts[joint.parent], part, at)
         for child, other in joints.items():
             if other.parent == name:
-                position, rotation = _split(compose(at, _pose(other.position_m, other.rotation)))
+                position, rotation = posed((joint.position_m, joint.rotation), (other.position_m, other.rotation))
                 joints[child] = replace(other, parent=joint.parent, position_m=position, rotation=rotation)
         del joints[name], parts[name]
     given, idle = [], []
@@ -107,6 +107,11 @@ def entries(matrix: NDArray[np.float64]) -> tuple[float, float, float, float, fl
 def moved_shape(at: Pose, shape: Shape) -> Shape:
     position, rotation = _split(compose(at, _pose(shape.position_m, shape.rotation)))
     return replace(shape, position_m=position, rotation=rotation)
+
+
+def posed(frame: tuple[Vec3, Quat], within: tuple[Vec3, Quat]) -> tuple[Vec3, Quat]:
+    """A place that is given within a frame, seen from where the frame's own place is."""
+    return _split(compose(_pose(*frame), _pose(*within)))
 
 
 def _pose(position: Vec3, rotation: Quat) -> Pose:

@@ -17,7 +17,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
-from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, folded
+from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, folded, posed
 from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
 from ee_dist.robots.pivots import PIVOT_HINT
@@ -99,9 +99,11 @@ class _Reader:
         if len(order) != len(links):
             lost = next(name for name in links if name not in order)
             raise self.fail(f"link {quoted(lost)}", f"is not connected to {quoted(roots[0])}: the joints form a loop")
-        free = self.unmoored(carried, order)
+        floats = self.unmoored(carried, order)
         parts = {name: self.part(name, links[name], carried.get(name)) for name in order}
         kept_parts, kept_joints, start, given, idle = folded(parts, {n: carried[n] for n in order[1:]}, order[0])
+        if floats is not None:
+            start = posed((floats.position_m, floats.rotation), start)
         for name in idle:
             if carried[name].kind != "fixed":
                 raise self.fail(f"link {quoted(name)}", self.without_mass(name, links[name], carried[name]))
@@ -123,7 +125,7 @@ class _Reader:
             joints=tuple(kept_joints),
             drives={name: self.known(elements[name], f"joint {quoted(name)}") for name in moving},
             root_without_mass=root_given,
-            free_base=True if free else None,
+            free_base=True if floats is not None else None,
             start_position_m=start[0],
             start_rotation=start[1],
             notes=(*self.notes, *assumed),
@@ -137,11 +139,11 @@ class _Reader:
             if parent is not None and parent.get("link") == WORLD and WORLD not in links:
                 links[WORLD] = ET.Element("link", name=WORLD)
 
-    def unmoored(self, carried: dict[str, Joint], order: list[str]) -> bool:
-        """Take away a world that the robot only floats in."""
+    def unmoored(self, carried: dict[str, Joint], order: list[str]) -> Joint | None:
+        """Take away a world that the robot only floats in, and the joint by which it does."""
         floating = [j for j in carried.values() if j.kind == "floating"]
         if not floating:
-            return False
+            return None
         first = floating[0]
         if len(floating) > 1 or first.parent != order[0] or sum(j.parent == order[0] for j in carried.values()) > 1:
             raise self.fail(
@@ -149,7 +151,7 @@ class _Reader:
             )
         del carried[first.child]
         order.remove(first.parent)
-        return True
+        return first
 
     def known(self, e: ET.Element, where: str) -> dict[str, float | str]:
         """What the file says of a joint's drive. An effort of 0 is how tools write that they do not know."""

@@ -19,6 +19,7 @@ from ee_dist.engines.mujoco.model import Model
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.engines.pybullet.world import World
 from ee_dist.robots.describe import load_robot
+from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.starter import starter
 
@@ -119,3 +120,27 @@ def test_a_joint_without_any_drive_begins_at_its_start(tmp_path: Path) -> None:
     states = [p.getJointState(world.bodies[0], k, physicsClientId=world.client)[0] for _, k in world.joint_links]
     world.close()
     assert states == pytest.approx([0.3, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("joint", "rest"),
+    [("", ""), ("<freejoint/>", ""), ("<freejoint/>", '<keyframe><key qpos="1 2 3 .6 0 .8 0 .4"/></keyframe>')],
+)
+def test_a_base_inside_a_massless_one_is_placed_by_both(tmp_path: Path, joint: str, rest: str) -> None:
+    world = (
+        f'<body pos="0 0 1" euler="0 90 0">{joint}<body name="base" pos=".2 0 .1" euler="0 0 30"><geom size=".1" mass="3"/>'
+        f'<body><joint axis="0 1 0"/>{POLE}</body></body></body>'
+    )
+    file = written(tmp_path, world, rest)
+    robot, _ = load_robot(file)
+    m, d = by_mujoco(file)
+    base = m.body("base").id
+    assert robot.root.name == "base"
+    assert robot.start_position_m == pytest.approx(d.xpos[base])
+    assert rotation_matrix(robot.start_rotation).ravel() == pytest.approx(d.xmat[base])
+    ours = built(robot)
+    data = mujoco.MjData(ours)
+    data.qpos[-1] = robot.joints[0].start
+    mujoco.mj_forward(ours, data)
+    # A force on the joint is the same in any frame of the base.
+    assert data.qfrc_bias[-1] == pytest.approx(d.qfrc_bias[-1])

@@ -323,6 +323,16 @@ def test_a_floating_joint_makes_the_base_free_and_a_mimic_is_held(tmp_path: Path
     assert any("mimics 'a'" in n for n in body.notes)
 
 
+def test_a_floating_robot_starts_where_its_joint_puts_it(tmp_path: Path) -> None:
+    turned = '1 0 2" rpy="0 0 1.5707963267948966'
+    body = read(
+        tmp_path, link("world", None), hinge("float", "world", "frame", "floating", xyz=turned), link("frame", None),
+        hinge("bond", "frame", "base", "fixed", xyz="0.5 0 0"), link("base"),
+    )  # fmt: skip
+    assert body.start_position_m == pytest.approx((1.0, 0.5, 2.0))
+    assert body.start_rotation == pytest.approx((0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
+
+
 def test_a_joint_without_limits_has_no_stops_and_a_finite_scale(tmp_path: Path) -> None:
     (tmp_path / "r.yaml").write_text("urdf: robot.urdf\ndrives: {a: {kp: 1, torque_limit: 2}}\n")
     body = read(

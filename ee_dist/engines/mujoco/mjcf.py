@@ -20,7 +20,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
 from ee_dist.engines.mujoco.warned import no_file_of_warnings
 from ee_dist.robots.body import Body
-from ee_dist.robots.fold import DUMMY_KG, entries, folded
+from ee_dist.robots.fold import DUMMY_KG, entries, folded, posed
 from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.kinematics import quat_multiply, quat_rotate
 from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
@@ -216,7 +216,7 @@ class _Reader:
             self.add(b, root)
         parts, joints, own, given, idle = folded(self.parts, self.carried, root)
         if own != (ZERO3, NO_TURN):
-            start = own
+            start = posed(start, own)
         if idle:
             raise MjcfError(f"{self.file}: body {quoted(idle[0])}: no mass, but a joint moves it")
         present = {j.name for j in joints}

@@ -74,7 +74,8 @@ class Model:
     """A compiled structure and where its numbers are.
 
     ``motors`` lists the motors whose joint is present, ``qpos`` and ``dof`` their addresses in MuJoCo's positions and
-    speeds; ``undriven`` present joints without a motor and their addresses; ``touches`` the touch sensors whose part is present, in the order of ``sensordata``.
+    speeds; ``undriven`` present joints without a motor and their addresses; ``touches`` the touch sensors whose part is
+    present, in the order of ``sensordata``.
     """
 
     def __init__(self, robot: Robot) -> None:
