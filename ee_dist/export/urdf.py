@@ -5,26 +5,55 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ee_dist.robots.inertia import rotation_matrix
-from ee_dist.robots.model import Joint, Part, Quat, Robot, Shape
+from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, Robot, Shape
 from ee_dist.robots.ranges import top_speed, top_torque
-from ee_dist.robots.urdf import CONTINUOUS_M, CONTINUOUS_RAD
+from ee_dist.robots.urdf import CONTINUOUS_M, CONTINUOUS_RAD, WORLD
 
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "fixed": "fixed"}
 
 
 def urdf_text(robot: Robot) -> str:
     """The parts that are present. Friction and damping are 0: the shim has them, and would count them twice."""
+    mounted = not robot.free_base and (robot.start_position_m, robot.start_rotation) != (ZERO3, NO_TURN)
+    if mounted and robot.root.name == WORLD:
+        robot = _with_root(robot, _unused("base", [part.name for part in robot.parts]))
     root = ET.Element("robot", name=robot.name)
     for part in robot.present_parts:
         _link(root, part)
+    if mounted:
+        _mount(root, robot)
     for joint in robot.present_joints:
         _joint(root, robot, joint)
     ET.indent(root)
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _mount(root: ET.Element, robot: Robot) -> None:
+    """A world that the robot is bolted to, for how it stands decides what gravity does to it."""
+    world = _unused(WORLD, [part.name for part in robot.present_parts])
+    ET.SubElement(root, "link", name=world)
+    name = _unused("mount", [joint.name for joint in robot.present_joints])
+    element = ET.SubElement(root, "joint", name=name, type="fixed")
+    ET.SubElement(element, "origin", xyz=_text(robot.start_position_m), rpy=_text(rpy_of(robot.start_rotation)))
+    ET.SubElement(element, "parent", link=world)
+    ET.SubElement(element, "child", link=robot.root.name)
+
+
+def _with_root(robot: Robot, name: str) -> Robot:
+    """The body with another name of its root: a simulator takes "world" for its own, which cannot stand elsewhere."""
+    joints = tuple(replace(j, parent=name) if j.parent == robot.root.name else j for j in robot.joints)
+    return replace(robot, parts=(replace(robot.root, name=name), *robot.parts[1:]), joints=joints)
+
+
+def _unused(name: str, taken: Sequence[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name
 
 
 def _link(root: ET.Element, part: Part) -> None:

@@ -200,6 +200,26 @@ def test_a_urdf_keeps_the_body(tmp_path: Path) -> None:
         assert mine.position_m == pytest.approx(theirs.position_m)
 
 
+@pytest.mark.parametrize("base", ["base", "world"])
+def test_a_urdf_says_how_the_base_is_mounted(tmp_path: Path, base: str) -> None:
+    arm = replace(BENCH, start_position_m=(0.1, 0.2, 0.7), start_rotation=turn_of_rpy((0.4, 1.2, -0.3)))
+    joints = tuple(replace(j, parent=base) if j.parent == arm.root.name else j for j in arm.joints)
+    arm = replace(arm, parts=(replace(arm.root, name=base), *arm.parts[1:]), joints=joints)
+    file = tmp_path / "robot.urdf"
+    file.write_text(urdf_text(arm))
+    body = read_urdf(file)
+    assert [p.name for p in body.parts] == ["base", *(p.name for p in arm.parts[1:])]
+    assert body.start_position_m == pytest.approx(arm.start_position_m)
+    assert body.start_rotation == pytest.approx(arm.start_rotation)
+    pulls = []
+    for m in (mujoco.MjModel.from_xml_path(str(file)), mujoco.MjModel.from_xml_string(mjcf_text(arm, True, [0.0] * 3))):
+        d = mujoco.MjData(m)
+        mujoco.mj_forward(m, d)
+        pulls.append([float(d.qfrc_bias[m.joint(n).dofadr[0]]) for n in arm.motor_names])
+    assert pulls[0] == pytest.approx(pulls[1], rel=1e-5)
+    assert "mount" not in urdf_text(replace(arm, free_base=True))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_roll_pitch_yaw_and_back(seed: int) -> None:
     turn = np.random.default_rng(seed).normal(size=4)
