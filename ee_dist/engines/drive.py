@@ -80,7 +80,7 @@ class DrivePath:
     # -- preparation -------------------------------------------------------------------------------------------------
 
     def _prepare_joints(self, robots: Sequence[Robot], shape: tuple[int, int]) -> None:
-        stops = np.array(per_robot(robots, lambda r: [r.joint(d.joint).stops for d in r.drives])).reshape(*shape, 2)
+        stops = np.array(per_robot(robots, lambda r: [r.joint(d.joint).ends for d in r.drives])).reshape(*shape, 2)
         self.lower, self.upper = np.ascontiguousarray(stops[:, :, 0]), np.ascontiguousarray(stops[:, :, 1])
         self.inertia = np.array(per_robot(robots, felt_inertia)).reshape(shape)
         self.give: Array | None = None

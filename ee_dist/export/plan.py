@@ -169,7 +169,7 @@ def parameters(robot: Robot) -> dict[str, Any]:
         "joints": list(robot.motor_names),
         "commands": [d.command for d in robot.drives],
         "drive": {n: [float(getattr(d, n)) for d in robot.drives] for n in DRIVE_NUMBERS},
-        "stops": [list(map(float, j.stops)) for j in joints],
+        "stops": [list(map(float, j.ends)) for j in joints],
         "jammed": [j.freedom != 1.0 for j in joints],
         "present": [d.joint in present for d in robot.drives],
         "felt_inertia": np.asarray(felt_inertia(robot)).tolist(),

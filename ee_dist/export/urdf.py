@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.robots.inertia import rotation_matrix
-from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, Robot, Shape
+from ee_dist.robots.model import CONTINUOUS_M, CONTINUOUS_RAD, NO_TURN, ZERO3, Joint, Part, Quat, Robot, Shape
 from ee_dist.robots.ranges import top_speed, top_torque
-from ee_dist.robots.urdf import CONTINUOUS_M, CONTINUOUS_RAD, WORLD
+from ee_dist.robots.urdf import WORLD
 
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "fixed": "fixed"}
 

@@ -11,6 +11,7 @@ which return a new robot.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -23,6 +24,9 @@ Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
 """Unit quaternion, scalar last (x, y, z, w)."""
 
+CONTINUOUS_RAD = 200 * math.pi
+"""Limits of a joint that has none, so that ranges stay numbers: a hundred turns either way."""
+CONTINUOUS_M = 100.0
 NO_TURN: Quat = (0.0, 0.0, 0.0, 1.0)
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
 
@@ -88,6 +92,13 @@ class Joint:
     def stops(self) -> tuple[float, float]:
         """The positions that the joint can reach."""
         return self.lower * self.freedom, self.upper * self.freedom
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The positions at which something stops the joint: infinite where its limits stand for none."""
+        far = CONTINUOUS_RAD if self.kind == "hinge" else CONTINUOUS_M
+        endless = self.lower <= -far and self.upper >= far and self.freedom == 1.0
+        return (-math.inf, math.inf) if endless else self.stops
 
 
 COMMANDS = ("position", "speed", "torque", "none")

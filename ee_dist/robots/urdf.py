@@ -19,14 +19,22 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, folded, posed
 from ee_dist.robots.inertia import rotation_matrix
-from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
+from ee_dist.robots.model import (
+    CONTINUOUS_M,
+    CONTINUOUS_RAD,
+    NO_TURN,
+    ZERO3,
+    Joint,
+    Part,
+    Quat,
+    RobotError,
+    Shape,
+    Vec3,
+)
 from ee_dist.robots.pivots import PIVOT_HINT
 from ee_dist.robots.xacro import PROGRAM, XacroError, expanded, is_xacro
 from ee_dist.robots.xml import XmlError, element_of, read_xml
 
-CONTINUOUS_RAD = 200 * math.pi
-"""Stops of a joint that has none: a hundred turns either way."""
-CONTINUOUS_M = 100.0
 KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "fixed": "fixed", "floating": "floating"}
 WORLD = "world"
 LARGEST = 1e9

@@ -24,7 +24,7 @@ from ee_dist.export.python import controller_text
 from ee_dist.export.shim import Shim
 from ee_dist.export.urdf import rpy_of, urdf_text
 from ee_dist.robots.describe import load_robot
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import CONTINUOUS_M, CONTINUOUS_RAD, Robot
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.robots.urdf import read_urdf, turn_of_rpy
 
@@ -244,6 +244,28 @@ def test_the_controller_file_runs_alone_on_numpy(tmp_path: Path) -> None:
     for step in range(20):
         q = 0.1 * np.sin(step + np.arange(8))
         assert np.array_equal(made.torque(0.01 * step, q, q, q), own.torque(0.01 * step, q, q, q))
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+def test_a_joint_without_limits_goes_on_for_ever(tmp_path: Path, kind: str) -> None:
+    far = CONTINUOUS_RAD if kind == "hinge" else CONTINUOUS_M
+    elbow = BENCH.joint("elbow")
+    wheel = BENCH.with_joint("elbow", kind=kind, lower=-far, upper=far)
+    wheel = wheel.with_drive("elbow", command="speed", kp=1.0, viscous=0.0, speed_limit=math.inf)
+    place = wheel.motor_names.index("elbow")
+    q, qd = np.zeros(3), np.zeros(3)
+    q[place], qd[place] = 2 * far, 20.0
+    file = tmp_path / "controller.py"
+    file.write_text(controller_text(wheel, "made by a test"))
+    shim = runpy.run_path(str(file), run_name="controller")["make"]()
+    for torque in (DrivePath([wheel], 0.002).step(0.0, qd[None], q[None], qd[None])[0], shim.torque(0.0, qd, q, qd)):
+        assert torque[place] == pytest.approx(0.0, abs=1e-12)
+    m = mujoco.MjModel.from_xml_string(mjcf_text(wheel, False, [0.0] * 3))
+    assert not m.joint("elbow").limited
+    assert m.joint("turn").limited
+    assert elbow.ends == elbow.stops
+    jammed = wheel.with_joint("elbow", freedom=0.5).joint("elbow")
+    assert jammed.ends == (-far / 2, far / 2)
 
 
 def test_the_page_says_what_becomes_of_each_effect() -> None:

@@ -23,8 +23,18 @@ from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, entries, folded, posed
 from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.kinematics import quat_multiply, quat_rotate
-from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, RobotError, Shape, Vec3
-from ee_dist.robots.urdf import CONTINUOUS_M, CONTINUOUS_RAD
+from ee_dist.robots.model import (
+    CONTINUOUS_M,
+    CONTINUOUS_RAD,
+    NO_TURN,
+    ZERO3,
+    Joint,
+    Part,
+    Quat,
+    RobotError,
+    Shape,
+    Vec3,
+)
 from ee_dist.robots.xml import XmlError, read_xml
 from ee_dist.trials.log import Array
 
