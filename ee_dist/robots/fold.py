@@ -78,8 +78,9 @@ def _given(part: Part, mass: float, inertia: float) -> Part:
 def _joined(carrier: Part, part: Part, at: Pose) -> Part:
     """The carrier with a part that is rigidly attached to it at a pose in its frame."""
     shapes = (*carrier.shapes, *(moved_shape(at, s) for s in part.shapes))
+    grip = max((p.grip for p in (carrier, part) if p.shapes), default=carrier.grip)
     if part.mass_kg <= DUMMY_KG:
-        return replace(carrier, shapes=shapes)
+        return replace(carrier, shapes=shapes, grip=grip)
     turn = rotation_matrix((at[3], at[4], at[5], at[6]))
     own = turn @ tensor(part) @ turn.T
     com = at[:3] + turn @ np.array(part.com_m)
@@ -89,6 +90,7 @@ def _joined(carrier: Part, part: Part, at: Pose) -> Part:
         com_m=(float(com[0]), float(com[1]), float(com[2])),
         inertia_kg_m2=entries(own),
         shapes=shapes,
+        grip=grip,
     )
 
 

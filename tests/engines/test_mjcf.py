@@ -12,7 +12,8 @@ import pytest
 from ee_dist.engines.contract import EngineError, Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
-from ee_dist.engines.mujoco.mjcf import compiled, read_mjcf
+from ee_dist.engines.mujoco.mjcf import read_mjcf
+from ee_dist.engines.mujoco.mjcf_bare import compiled
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.robots.describe import load_robot, robot_of
 from ee_dist.robots.model import Robot, RobotError

@@ -144,3 +144,52 @@ def test_a_base_inside_a_massless_one_is_placed_by_both(tmp_path: Path, joint: s
     mujoco.mj_forward(ours, data)
     # A force on the joint is the same in any frame of the base.
     assert data.qfrc_bias[-1] == pytest.approx(d.qfrc_bias[-1])
+
+
+def test_a_robot_stands_as_far_above_its_floor_as_in_mujoco(tmp_path: Path) -> None:
+    file = written(
+        tmp_path,
+        '<geom type="plane" size="2 2 .1" pos="0 0 -.75"/><geom type="plane" size="2 2 .1" pos="3 0 0" zaxis="-1 0 0"/>'
+        f'<body name="a" pos="0 0 .05"><joint name="j" axis="0 1 0"/>{POLE}</body>',
+    )
+    robot, notes = load_robot(file)
+    assert robot.world.has_floor
+    assert robot.start_position_m == (0.0, 0.0, 0.75)
+    assert "1 planes left out: there is one floor" in notes
+
+
+def test_a_tilted_floor_is_said_and_lies_where_the_robot_stands(tmp_path: Path) -> None:
+    plane = '<geom type="plane" size="1 1 1" euler="0 10 0"/>'
+    file = written(tmp_path, f'{plane}<body pos="1 0 1"><freejoint/>{POLE}</body>')
+    robot, notes = load_robot(file)
+    assert any("tilted by 10 degrees" in n for n in notes)
+    assert robot.start_position_m[2] == pytest.approx(1 + np.tan(np.radians(10)))
+
+
+@pytest.mark.parametrize(
+    ("floor", "foot"),
+    [
+        ('friction="1"', 'friction="0.3"'),
+        ('friction="0.4"', 'friction="0.7"'),
+        ('friction="1"', 'friction="0.3" priority="1"'),
+        ('friction="0.2" priority="2"', 'friction="0.9" priority="1"'),
+    ],
+)
+def test_a_foot_grips_as_mujoco_chooses_between_it_and_the_floor(tmp_path: Path, floor: str, foot: str) -> None:
+    world = f'<geom type="plane" size="1 1 1" {floor}/><body pos="0 0 .09"><freejoint/>'
+    file = written(tmp_path, f'{world}<geom size=".1" {foot}/></body>')
+    _, d = by_mujoco(file)
+    robot, _ = load_robot(file)
+    assert robot.root.grip == pytest.approx(d.contact[0].friction[0])
+
+
+def test_shapes_that_cannot_touch_here_are_said(tmp_path: Path) -> None:
+    feet = '<geom type="mesh" mesh="cube" pos="0 0 -.4"/><geom type="ellipsoid" size=".1 .1 .1" pos="0 0 -.4"/>'
+    file = written(
+        tmp_path,
+        '<geom type="plane" size="1 1 1"/><body name="trunk"><freejoint/><geom type="box" size=".1 .1 .1" mass="3"/>'
+        f'<body name="leg">{INERTIAL.format(0.3)}<joint axis="0 1 0"/>{feet}</body></body>',
+        f"<asset>{CUBE}</asset>",
+    )
+    (note,) = [n for n in load_robot(file)[1] if "shapes that touch" in n]
+    assert "2 of leg" in note

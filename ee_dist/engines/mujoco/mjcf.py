@@ -1,14 +1,12 @@
 """An MJCF as parts and joints, by MuJoCo's own reader and compiler, so that defaults, classes and units are what it says.
 
-What a robot here has no place for (tendons, equality constraints, meshes that touch, muscles) is left out and said. Geometry that
-only shows, textures and height fields are taken out before anything of them is read.
+What a robot here has no place for (tendons, equality constraints, meshes that touch, muscles) is left out and said.
 """
 
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +14,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
+from ee_dist.engines.mujoco.mjcf_bare import MjcfError, bare_model
 from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
-from ee_dist.engines.mujoco.warned import no_file_of_warnings
+from ee_dist.engines.mujoco.mjcf_floor import floor_of
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, entries, folded, posed
 from ee_dist.robots.inertia import rotation_matrix
@@ -31,24 +31,15 @@ from ee_dist.robots.model import (
     Joint,
     Part,
     Quat,
-    RobotError,
     Shape,
     Vec3,
 )
-from ee_dist.robots.xml import XmlError, read_xml
 from ee_dist.trials.log import Array
 
-MOST_COPIES = 10_000
-"""Elements that one of the elements that make copies may stand for, those around it multiplied."""
-COPIERS = ("replicate", "composite", "flexcomp")
-INCLUDES_DEEP = 20
 LINK_KG, LINK_KG_M2 = 1e-5, 1e-9
 """Of the link between two joints that MJCF puts on one body: less than shows, more than rounding."""
 _KINDS = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
-_FREE, _BALL, _PLANE = (
-    int(k) for k in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtGeom.mjGEOM_PLANE)
-)
-_MESH = mujoco.mjtGeom.mjGEOM_MESH
+_FREE, _BALL = (int(k) for k in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL))
 _SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
     int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
@@ -57,131 +48,10 @@ _SHAPES = {
 }
 
 
-class MjcfError(RobotError):
-    """An MJCF that cannot be used; one line: the file, what is wrong and what would be right."""
-
-
 def read_mjcf(path: str | Path) -> Body:
     """The body that an MJCF describes, with a drive for each actuator of a joint. Raises MjcfError."""
-    return _Reader(Path(path), compiled(path)).body()
-
-
-def compiled(path: str | Path) -> Any:
-    """MuJoCo's model of the file without what only shows. Raises MjcfError."""
-    file = Path(path)
-    no_file_of_warnings()
-    try:
-        _scan(file, file.parent, (), 1)
-    except XmlError as error:
-        raise MjcfError(str(error)) from None
-    try:
-        return _bare(file, every_mesh=False).compile()
-    except (ValueError, RuntimeError, MemoryError) as first:
-        # A sensor may name a mesh that weighs nothing.
-        try:
-            return _bare(file, every_mesh=True).compile()
-        except (ValueError, RuntimeError, MemoryError) as error:
-            told = error if "mass" in str(first) or "inertia" in str(first) else first
-            raise MjcfError(f"{file}: MuJoCo cannot build it: {' '.join(str(told).split())}") from None
-
-
-def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> None:
-    """Look through a file and all that it names before MuJoCo reads it. Raises XmlError."""
-    here = file.resolve()
-    if here in above or len(above) > INCLUDES_DEEP:
-        raise XmlError(f"{above[0] if above else file}: {file.name} includes itself")
-    root, _ = read_xml(file, "an MJCF")
-    if not above and root.tag != "mujoco":
-        raise XmlError(f"{file}: the outermost element is <{root.tag}>; an MJCF begins with <mujoco>")
-    waiting = [(root, copies)]
-    while waiting:
-        element, many = waiting.pop()
-        if element.tag in COPIERS:
-            many *= _count(element)
-            if many > MOST_COPIES:
-                raise XmlError(f"{file}: <{element.tag}> stands for more than {MOST_COPIES} elements")
-        name = element.get("file")
-        if element.tag in ("include", "model") and name:
-            if not (folder / name).resolve().is_relative_to(folder.resolve()):
-                raise XmlError(
-                    f"{file}: <{element.tag} file={quoted(name)}> lies outside of its folder; put it beside the file"
-                )
-            _scan(folder / name, folder, (*above, here), many)
-        waiting += [(child, many) for child in element]
-
-
-def _count(element: ET.Element) -> int:
-    total = 1.0
-    for text in (element.get("count") or "1").split():
-        try:
-            total *= max(1.0, float(text))
-        except ValueError:
-            return 1  # MuJoCo says what is wrong
-    return int(min(total, 1e9)) if total == total else 1
-
-
-def _bare(file: Path, every_mesh: bool) -> Any:
-    """The file's specification without what costs memory and says nothing of a motion. Of meshes, those stay that weigh; with
-    ``every_mesh`` all that do not only show."""
-    spec = mujoco.MjSpec.from_file(str(file))
-    spec.memory = spec.nstack = spec.njmax = spec.nconmax = -1
-    spec.nuserdata = 0
-    lost = _lost_meshes(spec, file)
-    unwanted = (mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_SDF)
-    for geom in list(spec.geoms):
-        if geom.type in unwanted or (geom.type == _MESH and not _kept(spec, geom, lost, every_mesh)):
-            spec.delete(geom)
-        else:
-            geom.material = ""
-    if not every_mesh:
-        for item in (*spec.pairs, *spec.skins):
-            spec.delete(item)
-    for group in (spec.hfields, spec.numerics, spec.materials, spec.textures):
-        for item in list(group):
-            spec.delete(item)
-    named = {geom.meshname for geom in spec.geoms}
-    for mesh in list(spec.meshes):
-        if not every_mesh and mesh.name not in named:
-            spec.delete(mesh)
-        elif mesh.name in lost:
-            raise ValueError(f"no mesh {lost[mesh.name]}, and no <inertial> for the body that it is of")
-    for item in (*spec.sites, *spec.tendons):
-        item.material = ""
-    return spec
-
-
-def _lost_meshes(spec: Any, file: Path) -> dict[str, Path]:
-    """Meshes by name whose file is none."""
-    folder = file.parent / spec.meshdir
-    files = {m.name: folder / (Path(m.file).name if spec.strippath else m.file) for m in spec.meshes if m.file}
-    return {name: path for name, path in files.items() if not path.is_file()}
-
-
-def _kept(spec: Any, geom: Any, lost: Mapping[str, Path], every_mesh: bool) -> bool:
-    """Whether a mesh is wanted: because it weighs, or because it touches and all that do are. What weighs on a bolted body moves
-    nothing, so that there a lost file is no loss."""
-    if _weighs(spec, geom):
-        return geom.meshname not in lost or _moves(geom.parent)
-    shown_only = not geom.contype and not geom.conaffinity and geom.parent.explicitinertial
-    return every_mesh and not shown_only
-
-
-def _weighs(spec: Any, geom: Any) -> bool:
-    """Whether a geom is part of what its body weighs."""
-    by_geoms = spec.compiler.inertiafromgeom
-    low, high = spec.compiler.inertiagrouprange
-    never, always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE, mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    if geom.parent.name == "world" or by_geoms == never or not low <= geom.group <= high:
-        return False
-    massless = geom.mass == 0 or (math.isnan(geom.mass) and geom.density == 0)
-    return not massless and (by_geoms == always or not geom.parent.explicitinertial)
-
-
-def _moves(body: Any) -> bool:
-    """Whether a joint carries the body."""
-    while body is not None and not list(body.joints):
-        body = body.parent
-    return body is not None
+    m, untouching = bare_model(path)
+    return _Reader(Path(path), m, untouching).body()
 
 
 @dataclass
@@ -190,6 +60,8 @@ class _Reader:
 
     file: Path
     m: Any
+    untouching: Counter[int] = field(default_factory=Counter)
+    """By body how many shapes would touch the floor, but have none of the forms that do."""
     notes: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
     parts: dict[str, Part] = field(default_factory=dict)
@@ -222,20 +94,26 @@ class _Reader:
             root = "world"
             self.parts[root] = Part(root, 0.0, ZERO3, (0.0,) * 6)
             self.at[0] = np.zeros(3)
+        self.floor, said = floor_of(m)
         for b in range(1, m.nbody):
             self.add(b, root)
         parts, joints, own, given, idle = folded(self.parts, self.carried, root)
         if own != (ZERO3, NO_TURN):
             start = posed(start, own)
+        if self.floor is not None:
+            (x, y, z), turn = start
+            start = (x, y, z - self.floor.height_at((x, y, z))), turn
         if idle:
             raise MjcfError(f"{self.file}: body {quoted(idle[0])}: no mass, but a joint moves it")
         present = {j.name for j in joints}
         names = {j: n for j, n in self.joints.items() if n in present}
+        self.notes += said
         drives, driven, said = drives_of(m, names)
         self.notes += said
         sensors, said = sensors_of(m, names, {p.name for p in parts}, lambda b: self.name(b, "body"))
         self.notes += said
-        self.say_what_is_left_out()
+        has_floor = bool(free) or self.floor is not None
+        self.say_what_is_left_out(has_floor)
         gravity = np.array(m.opt.gravity)
         if gravity[:2].any():
             self.notes.append("gravity is not straight down: only its vertical share is taken")
@@ -248,7 +126,7 @@ class _Reader:
             sensors=sensors,
             root_without_mass=parts[0].name in given,
             free_base=bool(free),
-            has_floor=bool(free) or bool((m.geom_type == _PLANE).any()),
+            has_floor=has_floor,
             gravity_m_s2=float(-gravity[2]),
             time_step_s=float(m.opt.timestep),
             start_position_m=start[0],
@@ -323,18 +201,21 @@ class _Reader:
                 continue
             kind = _SHAPES.get(int(m.geom_type[g]))
             if kind is None:
+                self.untouching[b] += 1
                 continue
             size = tuple(float(v) for v in m.geom_size[g])
             size = size if kind == "box" else size[:1] if kind == "sphere" else (size[0], 2 * size[1])
             shapes.append(Shape(kind, size, _vec(m.geom_pos[g] - origin), _turn(m.geom_quat[g])))
-            grip = max(grip, float(m.geom_friction[g, 0]))
+            own = float(m.geom_friction[g, 0])
+            grip = max(grip, own if self.floor is None else self.floor.grip(own, int(m.geom_priority[g])))
         mass = float(m.body_mass[b])
         if mass <= DUMMY_KG:
-            return Part(name, 0.0, ZERO3, (0.0,) * 6, tuple(shapes))
-        part = Part(name, mass, _vec(m.body_ipos[b] - origin), inertia, tuple(shapes))
+            part = Part(name, 0.0, ZERO3, (0.0,) * 6, tuple(shapes))
+        else:
+            part = Part(name, mass, _vec(m.body_ipos[b] - origin), inertia, tuple(shapes))
         return replace(part, grip=grip) if shapes else part
 
-    def say_what_is_left_out(self) -> None:
+    def say_what_is_left_out(self, has_floor: bool) -> None:
         m = self.m
         for count, what in (
             (int(m.neq), "equality constraints"),
@@ -348,6 +229,10 @@ class _Reader:
         if not touching:
             self.notes.append(
                 "nothing touches the floor: meshes are left out, only boxes, spheres, cylinders and capsules count"
+            )
+        elif has_floor and (without := [f"{n} of {self.name(b, 'body')}" for b, n in self.untouching.items() if b > 0]):
+            self.notes.append(
+                f"shapes that touch are left out ({listed(without)}): only boxes, spheres, cylinders and capsules count"
             )
 
 
