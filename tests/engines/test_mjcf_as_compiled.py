@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -193,3 +194,68 @@ def test_shapes_that_cannot_touch_here_are_said(tmp_path: Path) -> None:
     )
     (note,) = [n for n in load_robot(file)[1] if "shapes that touch" in n]
     assert "2 of leg" in note
+
+
+def hinged(folder: Path, actuators: str, joint: str = "", rest: str = "") -> Path:
+    """A pole on a hinge ``j`` from -1 to 1 rad."""
+    body = f'<body><joint name="j" axis="0 1 0" range="-1 1" {joint}/>{POLE}</body>'
+    return written(folder, body, f'<compiler angle="radian"/><actuator>{actuators}</actuator>{rest}')
+
+
+@pytest.mark.parametrize("geared", ["<position {}/>", "<motor {}/>", '<muscle {} lengthrange="0 1"/>'])
+def test_armature_and_damping_of_an_actuator_come_through_its_gear(tmp_path: Path, geared: str) -> None:
+    fields = 'joint="j" gear="3" armature=".1" damping=".2"'
+    robot, _ = load_robot(hinged(tmp_path, geared.format(fields), 'armature=".05" damping=".3"'))
+    m, d = by_mujoco(tmp_path / "robot.xml")
+    assert built(robot).dof_M0 == pytest.approx(m.dof_M0)
+    still, d.qvel[0] = float(d.qfrc_passive[0]), 1.0
+    mujoco.mj_forward(m, d)
+    assert robot.drives[0].viscous == pytest.approx(still - d.qfrc_passive[0])
+
+
+def test_the_delay_of_an_actuator_is_that_of_its_commands(tmp_path: Path) -> None:
+    robot, notes = load_robot(hinged(tmp_path, '<position joint="j" kp="5" kv=".1" delay=".02" nsample="20"/>'))
+    assert robot.drives[0].delay_s == 0.02
+    assert not notes
+
+
+def test_gravity_that_is_switched_off_is_off(tmp_path: Path) -> None:
+    flags = '<option><flag gravity="disable" damper="disable" limit="disable"/></option>'
+    robot, notes = load_robot(hinged(tmp_path, '<motor joint="j"/>', rest=flags))
+    assert robot.world.gravity_m_s2 == 0.0
+    assert notes == ("switched off in the file, but not here: limit, damper",)
+
+
+LIMITED = '<{} name="a" joint="j" {}/>'
+
+
+@pytest.mark.parametrize(
+    ("actuators", "joint", "rest", "said"),
+    [
+        (LIMITED.format("position", 'kp="5" forcerange="-1 5"'), "", "", "a: its torque is not limited alike both ways"),
+        (LIMITED.format("motor", 'ctrlrange="0 3"'), "", "", "a: its torque is not limited alike both ways"),
+        (LIMITED.format("motor", ""), 'actuatorfrcrange="-1 4"', "", "a: its torque is not limited alike both ways"),
+        (LIMITED.format("general", 'biastype="affine" biasprm="2 0 0" forcerange="-3 3"'), "", "", "a: its constant torque"),
+        (LIMITED.format("position", 'kp="5" ctrlrange="-.5 1"'), "", "", "leave its ctrlrange, -0.5 to 1 at the joint"),
+        (LIMITED.format("velocity", 'kv="5" ctrlrange="-2 2"'), "", "", "leave its ctrlrange, -2 to 2 at the joint"),
+        (LIMITED.format("position", 'kp="5" ctrlrange="-1 1" forcerange="-5 5"'), "", "", None),
+        (LIMITED.format("position", 'kp="5" inheritrange="1"'), "", "", None),
+        ('<velocity joint="j" kv="3"/><position name="p" joint="j" kp="10"/>', "", "", "only one drive of a joint is read.*: p"),
+        ("", 'stiffness="4 2"', "", "not linear are taken as if they were: j"),
+        ("", 'damping=".3 .5"', "", "not linear are taken as if they were: j"),
+        (LIMITED.format("motor", 'damping=".3 .5"'), "", "", "not linear are taken as if they were: j"),
+        ("", "", '<option density="1000" viscosity=".001"/>', "the fluid .* its density and viscosity"),
+    ],
+)  # fmt: skip
+def test_what_a_drive_has_no_place_for_is_said_in_one_line(
+    tmp_path: Path, actuators: str, joint: str, rest: str, said: str | None
+) -> None:
+    notes = [n for n in load_robot(hinged(tmp_path, actuators, joint, rest))[1] if "swing freely" not in n]
+    assert len(notes) == (said is not None)
+    assert said is None or re.search(said, notes[0])
+
+
+def test_what_holds_a_free_joint_is_said(tmp_path: Path) -> None:
+    freely = '<body><joint type="free" damping="2" armature=".5"/>'
+    file = written(tmp_path, f'{freely}<geom size=".1"/></body>')
+    assert "the free joint's damping and armature left out" in read_mjcf(file).notes

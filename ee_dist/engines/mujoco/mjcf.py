@@ -19,6 +19,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.engines.mujoco.mjcf_bare import MjcfError, bare_model
 from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
 from ee_dist.engines.mujoco.mjcf_floor import floor_of
+from ee_dist.engines.mujoco.mjcf_left_out import left_out
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, entries, folded, posed
 from ee_dist.robots.inertia import rotation_matrix
@@ -114,7 +115,8 @@ class _Reader:
         self.notes += said
         has_floor = bool(free) or self.floor is not None
         self.say_what_is_left_out(has_floor)
-        gravity = np.array(m.opt.gravity)
+        weightless = int(m.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        gravity = np.zeros(3) if weightless else np.array(m.opt.gravity)
         if gravity[:2].any():
             self.notes.append("gravity is not straight down: only its vertical share is taken")
         return Body(
@@ -127,7 +129,7 @@ class _Reader:
             root_without_mass=parts[0].name in given,
             free_base=bool(free),
             has_floor=has_floor,
-            gravity_m_s2=float(-gravity[2]),
+            gravity_m_s2=float(-gravity[2]) + 0.0,
             time_step_s=float(m.opt.timestep),
             start_position_m=start[0],
             start_rotation=start[1],
@@ -216,15 +218,7 @@ class _Reader:
         return replace(part, grip=grip) if shapes else part
 
     def say_what_is_left_out(self, has_floor: bool) -> None:
-        m = self.m
-        for count, what in (
-            (int(m.neq), "equality constraints"),
-            (int(m.ntendon), "tendons"),
-            (int(m.nflex), "flexible bodies"),
-            (int((m.jnt_actgravcomp != 0).sum() + (m.body_gravcomp != 0).sum()), "gravity compensations"),
-        ):
-            if count:
-                self.notes.append(f"{count} {what} left out")
+        self.notes += left_out(self.m)
         touching = sum(bool(p.shapes) for p in self.parts.values())
         if not touching:
             self.notes.append(

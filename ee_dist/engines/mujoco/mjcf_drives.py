@@ -7,13 +7,15 @@ position controller with kp = -b1 g^2, kd = -b2 g^2; with b2 = -G alone a speed 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
 
 from ee_dist.robots.model import Sensor
 
+NEAR = 1e-3
+"""rad (m) by which a range of commands may be narrower than that of the joint: people round."""
 Fields = dict[str, float | str]
 _JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _S = mujoco.mjtSensor
@@ -28,6 +30,7 @@ def drives_of(m: Any, joints: Mapping[int, str]) -> tuple[dict[str, Fields], tup
     found: dict[str, Fields] = {name: _passive(m, j) for j, name in joints.items()}
     notes: list[str] = []
     skipped: list[str] = []
+    further: list[str] = []
     actuated: dict[str, str] = {}
     for a in range(m.nu):
         label = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, a) or f"actuator_{a}"
@@ -42,7 +45,9 @@ def drives_of(m: Any, joints: Mapping[int, str]) -> tuple[dict[str, Fields], tup
             found[name]["kd"] = float(found[name]["kd"]) + float(law["kp"])
             notes.append(f"actuator {label} is taken as damping of {actuated[name]}: its own command as 0")
         else:
-            skipped.append(label)
+            further.append(label)
+    if further:
+        notes.append(f"actuators left out (only one drive of a joint is read, the first): {', '.join(further)}")
     if skipped:
         notes.append(f"actuators left out (not one of a joint, or of no known law): {', '.join(skipped)}")
     # Where the file drives some joints, it leaves the others to swing on purpose.
@@ -54,12 +59,14 @@ def drives_of(m: Any, joints: Mapping[int, str]) -> tuple[dict[str, Fields], tup
 
 
 def _passive(m: Any, j: int) -> Fields:
-    """What acts on the joint without an actuator; only what is not zero."""
+    """What acts on the joint whatever is commanded; only what is not zero. An actuator's own armature and damping come through
+    its gear."""
     dof, at = int(m.jnt_dofadr[j]), int(m.jnt_qposadr[j])
+    on = [a for a in range(m.nu) if int(m.actuator_trntype[a]) in _JOINT and int(m.actuator_trnid[a, 0]) == j]
     values = {
-        "viscous": float(m.dof_damping[dof]),
+        "viscous": float(m.dof_damping[dof]) + _geared(m, on, m.actuator_damping),
         "coulomb": float(m.dof_frictionloss[dof]),
-        "rotor_inertia": float(m.dof_armature[dof]),
+        "rotor_inertia": float(m.dof_armature[dof]) + _geared(m, on, m.actuator_armature),
         "spring": float(m.jnt_stiffness[j]),
     }
     found: Fields = {k: v for k, v in values.items() if v}
@@ -70,6 +77,10 @@ def _passive(m: Any, j: int) -> Fields:
     if m.jnt_actfrclimited[j]:
         found["torque_limit"] = max(abs(float(v)) for v in m.jnt_actfrcrange[j])
     return found
+
+
+def _geared(m: Any, actuators: Sequence[int], values: Any) -> float:
+    return sum(float(m.actuator_gear[a, 0] ** 2 * values[a]) for a in actuators)
 
 
 def _law(m: Any, a: int) -> Fields | None:
@@ -115,7 +126,27 @@ def _combined(passive: Fields, law: Fields, m: Any, a: int, label: str, notes: l
         limits.append(abs(unit) * max(abs(float(v)) for v in m.actuator_ctrlrange[a]))
     if limits:
         found["torque_limit"] = min(limits)
+    if m.actuator_delay[a] > 0:
+        found["delay_s"] = float(m.actuator_delay[a])
+    notes += [f"actuator {label}: {what}" for what in _not_kept(found, unit, m, a)]
     return found
+
+
+def _not_kept(found: Fields, unit: float, m: Any, a: int) -> Iterator[str]:
+    """What of an actuator's limits a drive has no place for."""
+    command, j = found["command"], int(m.actuator_trnid[a, 0])
+    torques = [m.actuator_forcerange[a]] if m.actuator_forcelimited[a] else []
+    torques += [m.actuator_ctrlrange[a]] if m.actuator_ctrllimited[a] and command == "torque" else []
+    torques += [m.jnt_actfrcrange[j]] if m.jnt_actfrclimited[j] else []
+    if any(low != -high for low, high in torques):
+        yield "its torque is not limited alike both ways: the larger limit is taken for both"
+    if "offset_torque" in found and "torque_limit" in found:
+        yield "its constant torque is not part of what its limit holds down"
+    if m.actuator_ctrllimited[a] and command in ("position", "speed"):
+        low, high = sorted(unit * float(v) for v in m.actuator_ctrlrange[a])
+        least, most = (float(v) for v in m.jnt_range[j]) if m.jnt_limited[j] else (-math.inf, math.inf)
+        if command == "speed" or low > least + NEAR or high < most - NEAR:
+            yield f"commands here may leave its ctrlrange, {low:.4g} to {high:.4g} at the joint"
 
 
 def sensors_of(
