@@ -10,6 +10,10 @@ from ee_dist.trials.log import Array
 
 LONGEST_LAG_S = 0.5
 MOST_ROWS = 20_000
+AS_GOOD = 0.02
+"""Correlations this close to the best fit as well as it does."""
+AGAINST = -0.5
+"""Correlation below which a joint runs against its command."""
 
 
 @dataclass(frozen=True)
@@ -22,13 +26,14 @@ class Relation:
 
 @dataclass(frozen=True)
 class Lead:
-    """By how long (s) the first runs ahead of the second where they fit best, the correlation there and at no shift, and
-    the slope of the first over the second."""
+    """By how long (s) the first runs ahead of the second where they fit best, the correlation there (its size the mean of the
+    joints' sizes, its sign that of most), the slope of the first over the second, and whether another shift fits as well:
+    a motion that repeats itself tells neither the lead nor the sign for certain."""
 
     lead_s: float
     correlation: float
-    at_zero: float
     slope: float
+    repeats: bool = False
 
 
 def moves(values: Array) -> bool:
@@ -78,27 +83,39 @@ def derivative(position: Array, speed: Array, step_s: float) -> Relation:
 
 
 def lead(a: Array, b: Array, step_s: float) -> Lead:
-    """By how much ``a`` (T, J) runs ahead of ``b`` (T, J), over shifts of half a second either way."""
+    """By how much ``a`` (T, J) runs ahead of ``b`` (T, J), over shifts of half a second either way. Of shifts that fit alike the
+    one that turns the fewest signs is taken, then the shortest."""
     most = min(round(LONGEST_LAG_S / step_s), len(a) // 3)
     columns = [k for k in range(a.shape[1]) if moves(a[:, k]) and moves(b[:, k])]
     if not columns or most < 1:
-        return Lead(0.0, 0.0, 0.0, 0.0)
+        return Lead(0.0, 0.0, 0.0)
     x, y = a[:, columns], b[:, columns]
     stride = max(1, most // 100)
     shifts = sorted({*range(-most, most + 1, stride), 0})
-    scores = [_shifted(x, y, k) for k in shifts]
-    best = int(np.argmax(np.abs(scores)))
+    fits = np.stack([_shifted(x, y, k) for k in shifts])
+    peaks = _peaks(np.abs(fits).mean(axis=1))
+    best = min(peaks, key=lambda i: (int((fits[i] < AGAINST).sum()), abs(shifts[i])))
     k = shifts[best]
     p, q = (x[: len(x) - k], y[k:]) if k >= 0 else (x[-k:], y[:k])
-    return Lead(k * step_s, scores[best], _shifted(x, y, 0), relation(p, q).slope)
+    # A joint mounted the other way round must not take away from what the others say.
+    size, against = float(np.abs(fits[best]).mean()), int((fits[best] < 0).sum())
+    sign = -1.0 if 2 * against > len(columns) else 1.0
+    return Lead(k * step_s, sign * size, relation(p, q).slope, len(peaks) > 1)
 
 
-def _shifted(x: Array, y: Array, k: int) -> float:
-    """Mean correlation over columns with ``y`` read ``k`` rows later."""
+def _peaks(scores: Array) -> list[int]:
+    """Places of the highest score and of others nearly as high, with a valley between each two."""
+    high = np.flatnonzero(scores >= scores.max() - AS_GOOD)
+    runs = np.split(high, np.flatnonzero(np.diff(high) > 1) + 1)
+    return [int(run[np.argmax(scores[run])]) for run in runs]
+
+
+def _shifted(x: Array, y: Array, k: int) -> Array:
+    """Correlation of each column (J,) with ``y`` read ``k`` rows later."""
     p, q = (x[: len(x) - k], y[k:]) if k >= 0 else (x[-k:], y[:k])
     p, q = p - p.mean(axis=0), q - q.mean(axis=0)
     size = np.sqrt((p * p).sum(axis=0) * (q * q).sum(axis=0))
-    return float(np.mean((p * q).sum(axis=0) / np.where(size > 0, size, np.inf)))
+    return np.asarray((p * q).sum(axis=0) / np.where(size > 0, size, np.inf))
 
 
 def beside(a: Array, b: Array, rest: Array) -> Relation:

@@ -16,6 +16,9 @@ from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE
 from ee_dist.measurements.robot_channels import command_kind
 
+CLOSE = 0.9
+"""Correlation below which commands are likely at best, whatever they are called."""
+
 
 def add_commands(v: View) -> None:
     """The commands, or a question; none at all where torques were found, which a balance of forces does without."""
@@ -54,8 +57,30 @@ def add_commands(v: View) -> None:
         v.out.ask(
             f"commands ({chosen.block.name}): {units.why}; write the unit into the mapping, or take these commands out of it"
         )
-    level = SURE if chosen.block.reading.command else LIKELY
+    certain = chosen.block.reading.command and (kind == "torque" or _goes_with_the_motion(v, chosen.block, kind))
+    level = SURE if certain else LIKELY
     v.add("commands", names, chosen.block, units, chosen.why, level)
+
+
+def _lead(v: View, b: Block, kind: str) -> signals.Lead:
+    """How commands run ahead of what they ask for: positions, or the change of these."""
+    if kind == "position":
+        return v.lead(b, v.position.block)
+    values, step = v.on(v.position.block, b), v.step(v.position.block)
+    if values is None:
+        return signals.Lead(0.0, 0.0, 0.0)
+    return signals.lead(values, signals.change(v.position.block.values, step), step)
+
+
+def _goes_with_the_motion(v: View, b: Block, kind: str) -> bool:
+    """Whether the motion confirms commands: it follows them closely, at one lag alone."""
+    ahead = _lead(v, b, kind)
+    return abs(ahead.correlation) >= CLOSE and not ahead.repeats
+
+
+def _why(ahead: signals.Lead, what: str) -> str:
+    again = "; the motion repeats itself, so that another lag fits as well" if ahead.repeats else ""
+    return f"{what} {1e3 * abs(ahead.lead_s):.0f} ms (correlation {ahead.correlation:.3f}){again}"
 
 
 def _as_position_command(v: View, b: Block) -> Scored | None:
@@ -64,14 +89,14 @@ def _as_position_command(v: View, b: Block) -> Scored | None:
         return None
     if np.array_equal(b.values, v.position.block.values):
         return None
-    ahead = v.lead(b, v.position.block)
+    ahead = _lead(v, b, "position")
     step, fit = v.step(v.position.block), abs(ahead.correlation)
     score = (3.0 if r.command else 0.0) + (r.kind == POSITION and not r.weak) - r.second
     score += 2 if fit > 0.9 else 1 if fit > 0.7 else -3 if fit < 0.5 else 0
     late = ahead.lead_s < -1.5 * step and fit > 0.7
     score += 1 if ahead.lead_s > 0 else 0
     if ahead.lead_s >= 0:
-        why = f"the positions follow it by {1e3 * ahead.lead_s:.0f} ms (correlation {ahead.correlation:.3f})"
+        why = _why(ahead, "the positions follow it by")
     else:
         why = f"it follows the positions by {-1e3 * ahead.lead_s:.0f} ms, as no command should"
     if late and r.command:
@@ -86,6 +111,7 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
     values = v.on(v.position.block, b)
     ahead = v.lead(b, v.position.block)
     entries, why, sure = [], "in the unit of the positions", v.units.sure
+    turned: list[str] = []
     shift = round(ahead.lead_s / v.step(v.position.block))
     for k, base in enumerate(v.units.entries):
         entry = dict(base)
@@ -111,10 +137,15 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
                     entry, why = {"unit": seen}, f"{seen} by its ratio to the positions"
                 if r.correlation < 0:
                     entry["sign"] = -1
-                    why += "; sign turned: the positions run against it"
+                    turned.append(v.joints[k].name)
         elif stated:
             entry = {"unit": stated}
         entries.append(entry)
+    if turned:
+        why += f"; sign of {', '.join(turned)} turned: the positions run against the commands"
+    if 0 < len(turned) < len(entries):
+        # One encoder may be mounted the other way round, or one command be wrong: a person should look.
+        sure = LIKELY
     return UnitChoice(tuple(entries), sure, why)
 
 
@@ -122,18 +153,14 @@ def _as_speed_command(v: View, b: Block) -> Scored | None:
     r = b.reading
     if r.command is False or not (r.kind in (SPEED, None) or r.weak) or not v.moves(b):
         return None
-    values = v.on(v.position.block, b)
-    if values is None:
+    if v.on(v.position.block, b) is None:
         return None
-    step = v.step(v.position.block)
-    ahead = signals.lead(values, signals.change(v.position.block.values, step), step)
+    ahead = _lead(v, b, "speed")
     fit = abs(ahead.correlation)
     score = (
         (3.0 if r.command else 0.0) + (r.kind == SPEED and not r.weak) + (2 if fit > 0.9 else 1 if fit > 0.7 else -2)
     )
-    return Scored(
-        b, score, [f"the speeds follow it by {1e3 * ahead.lead_s:.0f} ms (correlation {ahead.correlation:.3f})"]
-    )
+    return Scored(b, score, [_why(ahead, "the speeds follow it by")])
 
 
 def _as_torque_command(v: View, b: Block) -> Scored | None:

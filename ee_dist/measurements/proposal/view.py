@@ -86,7 +86,7 @@ class View:
     def lead(self, command: Block, measured: Block) -> signals.Lead:
         values = self.on(measured, command)
         if values is None:
-            return signals.Lead(0.0, 0.0, 0.0, 0.0)
+            return signals.Lead(0.0, 0.0, 0.0)
         return signals.lead(values, measured.values, self.step(measured))
 
     def pick(self, found: list[Scored], least: float = 2.0) -> Scored | None:

@@ -1,0 +1,58 @@
+"""Small logs of a chain of joints, and what comes of them without a mapping."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import measurement_files as samples
+import numpy as np
+import pandas as pd
+
+from ee_dist.measurements.importer import import_files
+from ee_dist.measurements.mapping_file import read_mapping
+from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.model import Hints, Proposal
+from ee_dist.measurements.proposal.write import as_yaml
+from ee_dist.measurements.report import Report
+from ee_dist.robots.describe import load_robot
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import SensorLog
+
+
+def frame_of(
+    t: np.ndarray, positions: np.ndarray, goals: np.ndarray, names: str = "{joint}_{what}_rad",
+    joints: tuple[str, ...] = samples.JOINTS, what: tuple[str, str] = ("pos", "goal"),
+) -> pd.DataFrame:  # fmt: skip
+    """A table with a time, and a column for each joint's position and command (T, J)."""
+    found = {"time": t}
+    for word, values in zip(what, (positions, goals), strict=True):
+        found |= {names.format(joint=j, what=word): values[:, k] for k, j in enumerate(joints)}
+    return pd.DataFrame(found)
+
+
+def written(folder: Path, frame: pd.DataFrame) -> Path:
+    frame.to_csv(folder / "log.csv", index=False)
+    return folder / "log.csv"
+
+
+def proposed(
+    folder: Path, file: Path, joints: tuple[str, ...] = samples.JOINTS, change: Any = None
+) -> tuple[Robot, Proposal]:
+    """A chain of joints (its description is put through ``change``), and what is proposed for a file beside it."""
+    described = samples.robot_file(folder, joints)
+    if change is not None:
+        (folder / "chain.urdf").write_text(change((folder / "chain.urdf").read_text()))
+    robot, _ = load_robot(described)
+    return robot, proposal_for([file], robot, Hints())
+
+
+def imported(
+    folder: Path, file: Path, joints: tuple[str, ...] = samples.JOINTS, change: Any = None
+) -> tuple[SensorLog, Report]:
+    """The log of a file by the mapping that is proposed for it, which must ask nothing."""
+    robot, proposal = proposed(folder, file, joints, change)
+    assert not proposal.questions, proposal.questions
+    (folder / "mapping.yaml").write_text(as_yaml(proposal, str(folder / "chain.yaml"), file.name))
+    ((record, report),) = import_files([file], read_mapping(folder / "mapping.yaml"), robot)
+    return record.log, report

@@ -1,0 +1,59 @@
+"""By how much commands lead, and with which sign, where the motion repeats itself or one joint runs the other way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import measurement_files as samples
+import numpy as np
+import pytest
+import small_logs as logs
+
+from ee_dist.measurements.proposal.model import LIKELY, SURE
+from ee_dist.measurements.signals import lead
+
+T = np.arange(1500) / 100
+
+
+@pytest.mark.parametrize("hz", [1.2, 1.4, 2.6])
+@pytest.mark.parametrize("late_s", [0.02, 0.05])
+def test_one_frequency_turns_no_sign(hz: float, late_s: float) -> None:
+    goal, seen = (np.sin(2 * np.pi * hz * (T - late))[:, None] for late in (0.0, late_s))
+    found = lead(goal, seen, 0.01)
+    assert found.lead_s == pytest.approx(late_s, abs=0.011)
+    assert found.correlation > 0.99
+    assert found.repeats, "half a period later the other sign fits as well"
+
+
+def test_a_motion_that_does_not_repeat_itself_has_one_lead() -> None:
+    wave = lambda t: (np.sin(1.7 * t) + 0.4 * np.sin(4.1 * t))[:, None]  # noqa: E731
+    found = lead(-wave(T), wave(T - 0.05), 0.01)
+    assert (round(found.lead_s, 2), found.correlation < -0.99, found.repeats) == (0.05, True, False)
+
+
+def test_commands_of_a_single_sine_are_likely_and_as_they_stand(tmp_path: Path) -> None:
+    sine = lambda t: np.sin(8.8 * t)[:, None] * [0.4, 0.3]  # noqa: E731
+    file = logs.written(tmp_path, logs.frame_of(T, sine(T - 0.035), sine(T)))
+    _, proposal = logs.proposed(tmp_path, file)
+    commands = [c for c in proposal.choices if c.group == "commands"]
+    assert all(c.sure == LIKELY and "sign" not in (c.entry or {}) for c in commands)
+    assert "the motion repeats itself" in commands[0].why
+
+
+@pytest.mark.parametrize(("turned", "sure"), [([1, 1], SURE), ([1, -1], LIKELY)])
+def test_an_encoder_mounted_the_other_way_turns_its_own_sign(tmp_path: Path, turned: list[int], sure: str) -> None:
+    m = samples.motion()
+    file = logs.written(tmp_path, logs.frame_of(m["t"], m["q"] * turned, m["g"]))
+    _, proposal = logs.proposed(tmp_path, file)
+    assert not proposal.questions
+    commands = [c for c in proposal.choices if c.group == "commands"]
+    assert [(c.entry or {}).get("sign", 1) for c in commands] == turned
+    assert {c.sure for c in commands} == {sure}
+
+
+def test_commands_that_the_motion_hardly_follows_are_not_sure(tmp_path: Path) -> None:
+    m = samples.motion()
+    astray = m["q"] + 0.22 * np.sin(3.1 * m["t"])[:, None]
+    file = logs.written(tmp_path, logs.frame_of(m["t"], m["q"], astray))
+    _, proposal = logs.proposed(tmp_path, file)
+    assert LIKELY in {c.sure for c in proposal.choices if c.group == "commands"}
