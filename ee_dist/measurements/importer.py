@@ -130,7 +130,9 @@ class _Import:
         times_s, timing = self.main.times_s, self.main.timing
         length = float(times_s[-1] - times_s[0])
         self.step_s = step
-        self.as_is = timing.even and abs(timing.median_s / step - 1) < SAME_RATE
+        # The median alone misses a clock whose steps are mostly right and now and then longer.
+        steps_s = (timing.median_s, length / (len(times_s) - 1))
+        self.as_is = timing.even and all(abs(s / step - 1) < SAME_RATE for s in steps_s)
         self.at_s = np.arange(len(times_s)) * step if self.as_is else grid(times_s, step)
         report.rows_read, report.rows, report.seconds = len(times_s), len(self.at_s), length
         report.rate_read_hz, report.rate_hz = 1 / timing.median_s, 1 / step
@@ -154,12 +156,21 @@ class _Import:
         tables = {c.table for c in self.mapping.sensors.values() if isinstance(c, Column)}
         slowest = max((self.clocks[t] for t in sorted(tables)), key=lambda c: c.timing.median_s, default=self.main)
         # The grid begins where the main table does.
-        found = filled(self.at_s, slowest.times_s - self.main.times_s[0])
+        read_s = slowest.times_s - self.main.times_s[0]
+        if self.as_is:
+            rows_s = self._rows_s()
+            read_s = np.interp(read_s[(read_s >= 0) & (read_s <= rows_s[-1])], rows_s, self.at_s)
+        found = filled(self.at_s, read_s)
         if found is not None:
             self.report.done.append(
                 f"{int((~found).sum())} of {len(found)} rows are readings of the sensors: only these are compared"
             )
         return found
+
+    def _rows_s(self) -> Array:
+        """When the rows of the log were, (T,) s since the main table began. Rows that are taken sample by sample count as evenly
+        apart, but a step that is off by SAME_RATE adds up over a long record: other tables are read at the true times."""
+        return self.main.times_s - self.main.times_s[0] if self.as_is else self.at_s
 
     # -- columns -----------------------------------------------------------------------------------------------------
 
@@ -190,7 +201,7 @@ class _Import:
             values = np.unwrap(values)
         if not self._same_rows(own):
             # The grid begins where the main table does.
-            at_s = self.at_s + (self.main.times_s[0] - own.times_s[0])
+            at_s = self._rows_s() + (self.main.times_s[0] - own.times_s[0])
             if step_like:
                 values = held(at_s, own.times_s, values, column.lead_s)
             else:

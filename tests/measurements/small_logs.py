@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import measurement_files as samples
 import numpy as np
 import pandas as pd
+from mcap.writer import Writer
 
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import read_mapping
@@ -56,3 +58,34 @@ def imported(
     (folder / "mapping.yaml").write_text(as_yaml(proposal, str(folder / "chain.yaml"), file.name))
     ((record, report),) = import_files([file], read_mapping(folder / "mapping.yaml"), robot)
     return record.log, report
+
+
+def stamp(ns: int) -> dict[str, Any]:
+    """The header of a message."""
+    return {"header": {"stamp": {"sec": ns // 10**9, "nanosec": ns % 10**9}}}
+
+
+def states(
+    t: np.ndarray, positions: np.ndarray, joints: tuple[str, ...] = samples.JOINTS, ahead_s: float | None = 0.0
+) -> list[tuple[int, Any]]:
+    """(log time in ns, message) of joint states; the stamps are ``ahead_s`` ahead of the time of logging, or there are none."""
+    found = []
+    for s, row in zip(t, positions, strict=True):
+        ns = samples.START_NS + round(1e9 * s)
+        head = {} if ahead_s is None else stamp(ns + round(1e9 * ahead_s))
+        found.append((ns, head | {"name": list(joints), "position": row.tolist()}))
+    return found
+
+
+def bag(folder: Path, topics: dict[str, list[tuple[int, Any]]]) -> Path:
+    """An MCAP file of messages as JSON."""
+    with (folder / "log.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("JointState", "jsonschema", b"{}")
+        for topic, messages in topics.items():
+            channel = writer.register_channel(topic, "json", schema)
+            for ns, message in messages:
+                writer.add_message(channel, ns, json.dumps(message).encode(), ns)
+        writer.finish()
+    return folder / "log.mcap"

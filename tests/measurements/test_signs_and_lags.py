@@ -57,3 +57,21 @@ def test_commands_that_the_motion_hardly_follows_are_not_sure(tmp_path: Path) ->
     file = logs.written(tmp_path, logs.frame_of(m["t"], m["q"], astray))
     _, proposal = logs.proposed(tmp_path, file)
     assert LIKELY in {c.sure for c in proposal.choices if c.group == "commands"}
+
+
+def test_commands_do_not_drift_against_states_whose_rate_is_a_little_off(tmp_path: Path) -> None:
+    """Rows of 10.008 ms are taken as 10 ms ones: commands of another topic are still those of the same moment."""
+    wave = lambda s: np.stack([0.5 * np.sin(1.7 * s), 0.4 * np.cos(2.3 * s)], axis=1)  # noqa: E731
+    seen, sent = np.arange(6000) * 0.010008, np.arange(0.003, 60, 0.02)
+    topics = {"/joint_states": logs.states(seen, wave(seen - 0.05)), "/joint_command": logs.states(sent, wave(sent))}
+    log, report = logs.imported(tmp_path, logs.bag(tmp_path, topics))
+    assert not report.resampled
+    asked = wave(0.003 + seen[: len(log)])
+    assert np.abs(log.commands - asked)[-500:].max() < 0.03, "held for 20 ms, and no 48 ms late"
+
+
+def test_a_clock_that_loses_time_in_few_steps_is_resampled(tmp_path: Path) -> None:
+    m = samples.motion()
+    late = m["t"] + 0.00018 * np.cumsum(np.arange(samples.ROWS) % 3 == 1)
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, logs.frame_of(late, m["q"], m["g"])))
+    assert report.resampled, "the median step is right, their mean is not"
