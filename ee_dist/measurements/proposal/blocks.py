@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -96,16 +96,18 @@ def blocks_of(
     for table in recorded.tables:
         series = {a: v for a, v in series_of(table, filled=True).items() if a != times.get(table.name)}
         words = joint_words(joints)
-        families: dict[str, list[tuple[str, Reading, str | None]]] = {}
+        named = {} if order is not None and _own_numbers(joints) else _named_in_full(list(series), joints)
+        families: dict[tuple[str, bool], list[tuple[str, Reading, str | None]]] = {}
         for address in series:
-            joint = _joint_in(address, words)
-            stem = _stem(address)
+            joint, stem = _joint_in(address, words), _stem(address)
             reading = read_name(
                 stem if joint is None or _joint_in(stem, words) else address, words[joint] if joint else frozenset()
             )
+            if address in named:
+                joint, reading = named[address]
             if reading.kind == TIME:
                 continue
-            families.setdefault(reading.family, []).append((address, reading, joint))
+            families.setdefault((reading.family, address in named), []).append((address, reading, joint))
         mute: list[str] = []
         for members in families.values():
             block = _block(table, members, series, joints, order)
@@ -125,11 +127,50 @@ def _stem(address: str) -> str:
 def _joint_in(address: str, words: dict[str, frozenset[str]]) -> str | None:
     """The joint whose words all stand in a name, if it is one alone; the longest of several wins."""
     have = set(tokens(address))
-    hits = [j for j, w in words.items() if w and w <= have and any(not x.isdigit() for x in w)]
-    if len(hits) > 1:
-        longest = max(len(words[j]) for j in hits)
-        hits = [j for j in hits if len(words[j]) == longest]
+    return _longest([j for j, w in words.items() if w and w <= have and any(not x.isdigit() for x in w)], words)
+
+
+def _named_in_full(addresses: Sequence[str], joints: Sequence[str]) -> dict[str, tuple[str, Reading]]:
+    """(joint, reading) of the columns in whose names a joint's name stands as it is, where all joints have such a column of one
+    quantity: joints that differ by a number alone are told by it only then, as others may count from 0."""
+    spelled = {j: tokens(j) for j in joints}
+    shared = set.intersection(*(set(w) for w in spelled.values()))
+    # q1 and q2 say that they are positions, too.
+    telling = {w for w in shared if (said := read_name(w)).kind is not None or said.command is not None}
+    families: dict[tuple[str, bool], list[tuple[str, str, Reading]]] = {}
+    for address in addresses:
+        joint = _longest([j for j, name in spelled.items() if _stands_in(name, tokens(address))], spelled)
+        if joint is not None:
+            stem = _stem(address)
+            inside = stem if not _stands_in(spelled[joint], tokens(stem)) else address
+            reading = read_name(inside, frozenset(spelled[joint]) - telling)
+            # Between brackets a name often stands alone: finger_joint1 beside joint1 is another.
+            alone = address.endswith(f"[{joint}]")
+            families.setdefault((reading.family, alone), []).append((address, joint, reading))
+    whole = [f for f in families.values() if len(f) == len(joints) == len({j for _, j, _ in f})]
+    return {address: (joint, reading) for f in whole for address, joint, reading in f}
+
+
+def _stands_in(name: Sequence[str], words: Sequence[str]) -> bool:
+    """Whether the words of a name stand one behind the other among others."""
+    return bool(name) and any(list(words[k : k + len(name)]) == list(name) for k in range(len(words)))
+
+
+def _longest(hits: list[str], words: Mapping[str, Collection[str]]) -> str | None:
+    """The one of most words, if it is one alone."""
+    most = max((len(words[j]) for j in hits), default=0)
+    hits = [j for j in hits if len(words[j]) == most]
     return hits[0] if len(hits) == 1 else None
+
+
+def _own_numbers(joints: Sequence[str]) -> dict[str, int]:
+    """The number of each joint, where joints differ by their last number alone; else none."""
+    found = {j: [w for w in tokens(j) if w.isdigit()] for j in joints}
+    texts = {tuple(w for w in tokens(j) if not w.isdigit()) for j in joints}
+    if len(texts) > 1 or not all(found.values()):
+        return {}
+    numbers = {j: int(f[-1]) for j, f in found.items()}
+    return numbers if len(set(numbers.values())) == len(numbers) else {}
 
 
 def _block(
@@ -146,6 +187,13 @@ def _block(
         numbers = [_number(a, r) for a, r, _ in members]
         if any(n is None for n in numbers) or len(set(numbers)) < len(numbers):
             return None
+        # A place in a list is no name.
+        listed = any(re.search(r"\[\d+\]$", m[0]) for m in members)
+        own = {} if order is not None or listed else _own_numbers(joints)
+        if own and set(own.values()) == set(numbers):
+            by_number = dict(zip(numbers, (m[0] for m in members), strict=True))
+            columns, how = tuple(by_number[own[j]] for j in joints), BY_NAME
+            return _made(table, columns, {m[0]: m[1] for m in members}[columns[0]], how, series)
         ranked = [a for _, a in sorted(zip(numbers, (m[0] for m in members), strict=True))]
         placed = dict(zip(order or joints, ranked, strict=True))
         if any(j not in placed for j in joints):
@@ -157,8 +205,8 @@ def _block(
 
 
 def _number(address: str, reading: Reading) -> int | None:
-    inside = re.search(r"\[(\d+)\]$", address)
-    return int(inside[1]) if inside else reading.number
+    inside = re.search(r"\[([^\[\]]*\d[^\[\]]*)\]$", address)
+    return int(re.findall(r"\d+", inside[1])[-1]) if inside else reading.number
 
 
 def _made(table: Table, columns: tuple[str, ...], reading: Reading, how: str, series: dict[str, Array]) -> Block:
