@@ -25,6 +25,8 @@ _NO_SERIES = re.compile(
 _LEFT_OUT = re.compile(r"covariance|(^|\.)(layout|header\.seq)")
 STAMP_APART_S = 10.0
 """A stamp this far from when the message was logged counts from something else (since boot, say): the log time is taken."""
+CLOCKS_APART_S = 0.02
+"""Topics whose times are this much further apart than their logging were stamped by clocks that differ."""
 
 
 LATEST_NS = 2**62
@@ -38,9 +40,10 @@ def is_series(kind: str) -> bool:
 
 @dataclass
 class _Rows:
-    """One topic while it is read: (stamp or None, log time) in ns, and the fields, of messages with the same fields."""
+    """One topic while it is read: (stamp or None, log time, how long after that) in ns, and the fields, of messages with the same
+    fields."""
 
-    at_ns: list[tuple[int | None, int]] = field(default_factory=list)
+    at_ns: list[tuple[int | None, int, int]] = field(default_factory=list)
     fields: dict[str, list[Any]] = field(default_factory=dict)
     parts: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
@@ -58,7 +61,7 @@ class Gatherer:
         a time that no clock has."""
         if not 0 <= log_ns < LATEST_NS:
             raise MeasurementError(f"{self.file}: {topic}: a message logged at {log_ns} ns; the file is damaged")
-        for stamp_ns, flat, parts in _rows(message, log_ns):
+        for stamp_ns, after_ns, flat, parts in _rows(message):
             if not flat:
                 continue
             key = tuple((k, len(v) if isinstance(v, np.ndarray) else 0, parts.get(k)) for k, v in flat.items())
@@ -68,7 +71,7 @@ class Gatherer:
                 raise MeasurementError(
                     f"{self.file}: {topic}: its messages differ in their fields; nothing to compare in it"
                 )
-            rows.at_ns.append((stamp_ns, log_ns))
+            rows.at_ns.append((stamp_ns, log_ns, after_ns))
             for name, v in flat.items():
                 rows.fields.setdefault(name, []).append(v)
                 self.numbers += len(v) if isinstance(v, np.ndarray) else 1
@@ -76,10 +79,11 @@ class Gatherer:
 
     def trial(self) -> Recorded:
         """All topics as tables on one clock, which starts at 0. Raises MeasurementError where there are none."""
+        stamped = self._by_stamps()
         made: list[tuple[str, _Rows, Any]] = []
         for topic, kinds in self.topics.items():
             for k, rows in enumerate(sorted(kinds.values(), key=lambda r: -len(r.at_ns))):
-                made.append((topic if not k else f"{topic} #{k + 1}", rows, self._clock(topic, rows)))
+                made.append((topic if not k else f"{topic} #{k + 1}", rows, _clock(rows, stamped.get(topic, False))))
         if not made:
             raise MeasurementError(
                 f"{self.file}: no messages with numbers in it (JointState, Imu, Wrench, trajectories, ...)"
@@ -98,20 +102,47 @@ class Gatherer:
             tables[0].notes = tuple(self.notes)
         return Recorded("", tuple(tables))
 
-    def _clock(self, topic: str, rows: _Rows) -> Any:
-        logged = np.array([log for _, log in rows.at_ns], dtype=np.int64)
-        if any(stamp is None for stamp, _ in rows.at_ns):
-            return logged
-        stamped = np.array([stamp for stamp, _ in rows.at_ns], dtype=np.int64)
-        apart = float(np.median((stamped - logged) / 1e9))
-        if abs(apart) > STAMP_APART_S:
-            self.notes.append(f"{topic}: its stamps are {apart:.4g} s off the time of logging, which is taken instead")
-            return logged
-        return stamped
+    def _by_stamps(self) -> dict[str, bool]:
+        """Whether the stamps of each topic are its times, else the times of logging. All topics are on one clock: where stamps
+        of some are off those of others, or off the logging of topics without any, none are taken."""
+        apart = {topic: _stamps_apart_s(list(kinds.values())) for topic, kinds in self.topics.items()}
+        for topic, off in apart.items():
+            if off is not None and abs(off) > STAMP_APART_S:
+                self.notes.append(
+                    f"{topic}: its stamps are {off:.4g} s off the time of logging, which is taken instead"
+                )
+                apart[topic] = None
+        stamped = {topic: off is not None for topic, off in apart.items()}
+        seen = {topic: off or 0.0 for topic, off in apart.items() if not self._is_plan(topic)}
+        if not any(stamped.values()) or not seen or max(seen.values()) - min(seen.values()) <= CLOCKS_APART_S:
+            return stamped
+        first, last = min(seen, key=lambda t: seen[t]), max(seen, key=lambda t: seen[t])
+        self.notes.append(
+            f"stamps of {last} and {first} are {seen[last] - seen[first]:.4g} s further apart than their logging, so that their "
+            "clocks differ: the times of logging are taken for all topics"
+        )
+        return dict.fromkeys(stamped, False)
+
+    def _is_plan(self, topic: str) -> bool:
+        """Whether a topic is stamped with when something is to begin, which tells nothing about a clock."""
+        return any(after and stamp is not None for r in self.topics[topic].values() for stamp, _, after in r.at_ns)
 
 
-def _rows(message: Any, log_ns: int) -> Iterator[tuple[int | None, dict[str, Any], dict[str, tuple[str, ...]]]]:
-    """(stamp, fields, names of list fields) of a message; a trajectory gives one for each point."""
+def _stamps_apart_s(kinds: Sequence[_Rows]) -> float | None:
+    """By how much the stamps of a topic are ahead of its logging; None where a message has none."""
+    at = [(stamp, log) for rows in kinds for stamp, log, _ in rows.at_ns]
+    if any(stamp is None for stamp, _ in at):
+        return None
+    return float(np.median([((stamp or 0) - log) / 1e9 for stamp, log in at]))
+
+
+def _clock(rows: _Rows, stamped: bool) -> Any:
+    """The times (T,) of rows in ns."""
+    return np.array([(stamp if stamped and stamp else log) + after for stamp, log, after in rows.at_ns], dtype=np.int64)
+
+
+def _rows(message: Any) -> Iterator[tuple[int | None, int, dict[str, Any], dict[str, tuple[str, ...]]]]:
+    """(stamp, how long after it, fields, names of list fields) of a message; a trajectory gives one for each point."""
     stamp = _stamp(message)
     flat: dict[str, Any] = {}
     parts: dict[str, tuple[str, ...]] = {}
@@ -122,10 +153,10 @@ def _rows(message: Any, log_ns: int) -> Iterator[tuple[int | None, dict[str, Any
             _flatten(point, "", _joints(message), flat, parts, 0)
             after = _nanoseconds(_get(point, "time_from_start")) or 0
             flat = {k: v for k, v in flat.items() if not k.startswith("time_from_start")}
-            yield (stamp or log_ns) + after, flat, parts
+            yield stamp, after, flat, parts
         return
     _flatten(message, "", (), flat, parts, 0)
-    yield stamp, flat, parts
+    yield stamp, 0, flat, parts
 
 
 def _fields(value: Any) -> Mapping[str, Any] | None:

@@ -6,12 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.readers.options import Options, bounded
 from ee_dist.measurements.table import Recorded, Table
+
+FINE_NS = 1_000_000
+"""Rows closer than this (ns) are counted from the first: seconds since 1970 are numbers in steps of a quarter of 1 us."""
 
 
 def read_parquet(file: Path, options: Options) -> tuple[Recorded, ...]:
@@ -45,8 +49,12 @@ def _cells(column: Any, name: str, notes: list[str]) -> Any:
     if pa.types.is_timestamp(kind):
         stamps = column.cast(pa.timestamp("ns")).cast(pa.int64())
         if stamps.null_count == 0 and len(stamps):
-            notes.append(f"{name}: dates read as seconds from the first row")
             ns = stamps.to_numpy(zero_copy_only=False)
+            if len(ns) > 1 and np.median(np.diff(ns)) >= FINE_NS:
+                # Files of one trial keep the clock that they share.
+                notes.append(f"{name}: dates read as seconds since 1970")
+                return ns / 1e9
+            notes.append(f"{name}: dates read as seconds from the first row")
             return (ns - ns[0]) / 1e9
     even = pa.types.is_fixed_size_list(kind)
     lists = even or pa.types.is_list(kind) or pa.types.is_large_list(kind)
