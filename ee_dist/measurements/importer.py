@@ -20,7 +20,7 @@ from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.need import beside_need, torques_needed
 from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_units, torque_units
-from ee_dist.measurements.sampling import LowPass, filled, grid, held, linear, smoothed
+from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
     command_suspicion,
     speed_suspicion,
@@ -185,8 +185,9 @@ class _Import:
             good = np.flatnonzero(np.isfinite(raw))
             if len(good) < 2:
                 raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty")
-            self.report.done.append(f"{name}: {len(raw) - len(good)} empty cells filled by straight lines")
-            raw = np.interp(np.arange(len(raw)), good, raw[good])
+            how = "in which the last value holds" if step_like else "filled by straight lines"
+            self.report.done.append(f"{name}: {len(raw) - len(good)} empty cells {how}")
+            raw = carried(raw) if step_like else np.interp(np.arange(len(raw)), good, raw[good])
         if column.signed_bits:
             half, whole = 2.0 ** (column.signed_bits - 1), 2.0**column.signed_bits
             wrapped = int(np.sum(raw >= half))

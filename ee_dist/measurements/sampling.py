@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
@@ -80,17 +81,32 @@ def linear(at_s: Array, times_s: Array, values: Array) -> Array:
 
 def filled(at_s: Array, read_s: Array) -> Array | None:
     """(T,) bool: times of an even grid, from 0 on, at which nothing was read, so that only straight lines between the readings
-    of ``read_s`` (K,) are there; None where there are about as many readings as rows."""
+    of ``read_s`` (K,) are there; None where there are about as many readings as rows, and no gap among them."""
     if len(at_s) < 2 or len(read_s) < 2:
         return None
-    step = float(at_s[1] - at_s[0])
-    if float(np.median(np.diff(read_s))) < FILLED * step:
-        return None
+    step, apart = float(at_s[1] - at_s[0]), np.diff(read_s)
     # The first row that may know of a reading: what is held (commands, torques) is there from then on.
     rows = np.ceil(read_s / step - SLACK).astype(int)
+    if float(np.median(apart)) < FILLED * step:
+        return _lost(rows, apart > GAP * max(float(np.median(apart)), step), len(at_s))
     out = np.ones(len(at_s), dtype=bool)
     out[rows[(rows >= 0) & (rows < len(at_s))]] = False
     return out
+
+
+def _lost(rows: NDArray[np.int64], gap: NDArray[np.bool_], count: int) -> NDArray[np.bool_] | None:
+    """(count,) bool: rows within gaps between readings, each of which is in one of ``rows`` (K,); None without any gap."""
+    out = np.zeros(count, dtype=bool)
+    for k in np.flatnonzero(gap):
+        out[max(0, rows[k] + 1) : max(0, rows[k + 1])] = True
+    return out if out.any() else None
+
+
+def carried(values: Array) -> Array:
+    """A series (T,) with its empty cells (NaN): the last number before, for what is sent and stays until the next; before the
+    first number that."""
+    good = np.flatnonzero(np.isfinite(values))
+    return values[good[np.maximum(np.searchsorted(good, np.arange(len(values)), side="right") - 1, 0)]]
 
 
 def held(at_s: Array, times_s: Array, values: Array, lead_s: float = 0.0) -> Array:

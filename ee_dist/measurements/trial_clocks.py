@@ -111,7 +111,12 @@ class TrialClocks:
         return match(here.times_s, a, there.times_s, b, held_between)
 
     def cut(self) -> None:
-        """Cuts the main table to the time that the others cover; what is held needs no end."""
+        """Cuts the main table to the time that the others cover, and to where all commands are known; what is held needs no
+        end."""
+        self._cut_to_shared()
+        self._cut_to_commands()
+
+    def _cut_to_shared(self) -> None:
         start, end = self.main.times_s[0], self.main.times_s[-1]
         for name, found in self.clocks.items():
             if name == self.first:
@@ -130,6 +135,27 @@ class TrialClocks:
             )
         if len(inside) < len(times_s):
             self.done.append(f"{len(times_s) - len(inside)} rows left out that not all tables cover")
-            rows = slice(int(inside[0]), int(inside[-1]) + 1)
-            self.main = Clocked(self.main.table.part(rows), times_s[rows], self.main.timing)
-            self.clocks[self.first] = self.main
+            self._keep(slice(int(inside[0]), int(inside[-1]) + 1))
+
+    def _cut_to_commands(self) -> None:
+        """Cuts what was before the first command of any joint: cells that are empty there do not say what was asked for."""
+        start, latest = -np.inf, ""
+        for group, channel, c in self.mapping.columns():
+            if group == "commands" and c.gaps == "interpolate":
+                found = self.clocks[c.table]
+                known = np.flatnonzero(np.isfinite(found.table.numbers(c.column, gaps=True)))
+                if len(known) and found.times_s[known[0]] > start:
+                    start, latest = found.times_s[known[0]], channel
+        inside = np.flatnonzero(self.main.times_s >= start - 1e-9)
+        if len(inside) < 2:
+            raise MeasurementError(
+                f"{self.where}: commands: {latest}: its first command comes when {self.main.table} ends; nothing to compare"
+            )
+        if inside[0] > 0:
+            self.done.append(f"{int(inside[0])} rows left out that are before the first command of {latest}")
+            self._keep(slice(int(inside[0]), None))
+
+    def _keep(self, rows: slice) -> None:
+        """Keeps some rows of the main table."""
+        self.main = Clocked(self.main.table.part(rows), self.main.times_s[rows], self.main.timing)
+        self.clocks[self.first] = self.main

@@ -128,7 +128,8 @@ class View:
             more = units.entries[k] if units.entries else {"unit": "???"}
             still = "; does not move" if not signals.moves(block.values[:, k]) else ""
             empty = empty_cells(block.table, block.columns[k])
-            filled = f"; {empty} of {len(block.table)} cells are empty, filled by straight lines" if empty else ""
+            how = "the last value holds" if group == "commands" else "filled by straight lines"
+            filled = f"; {empty} of {len(block.table)} cells are empty, {how}" if empty else ""
             self.out.choices.append(Choice(group, name, self.entry(block, k, more), level, text + still + filled))
 
     def sensor_names(self, kind: str) -> list[str]:
