@@ -32,7 +32,7 @@ from ee_dist.measurements.suspicious import (
 from ee_dist.measurements.table import Recorded
 from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.trials import trials_of
-from ee_dist.measurements.units import factor
+from ee_dist.measurements.units import TURN, UNITS, factor
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
@@ -78,6 +78,7 @@ class _Import:
         positions = self._sensors()
         torques = self._motor_columns(self.mapping.torques, torque_units(self.robot), "torque")
         commands = self._commands(torques)
+        self._on_one_turn(commands)
         supply = None
         if self.mapping.supply is not None:
             supply = self._column(self.mapping.supply, "V", "supply", step_like=True)
@@ -179,7 +180,7 @@ class _Import:
         own = self.clocks[column.table]
         raw = own.table.numbers(column.column, gaps=column.gaps == "interpolate")
         if not quiet and not column.signed_bits:
-            self.report.suspicious += suspicions(f"{name} ({column.column})", raw[np.isfinite(raw)])
+            self.report.suspicious += suspicions(f"{name} ({column.column})", raw[np.isfinite(raw)], _turn(column))
         size = factor(column.unit, unit, f"{self.where}: {name}")
         if np.isnan(raw).any():
             good = np.flatnonzero(np.isfinite(raw))
@@ -259,6 +260,24 @@ class _Import:
             return torques.copy()
         self.report.done.append("no commands were recorded: only a balance of forces can compare this log")
         return np.full(torques.shape, math.nan)
+
+    def _on_one_turn(self, commands: Array) -> None:
+        """Brings unwrapped commands to the turn of their positions: at 178 and -178 degrees the two may begin next to one
+        another, and go on a whole turn apart."""
+        position_of = {s.target: s.name for s in self.robot.sensors if s.kind == "position"}
+        for k, drive in enumerate(self.robot.drives):
+            asked, name = self.mapping.commands.get(drive.joint), position_of.get(drive.joint, "")
+            seen = self.mapping.sensors.get(name)
+            if command_kind(drive) != "position" or self.robot.joint(drive.joint).kind != "hinge":
+                continue
+            if asked is None or not isinstance(seen, Column) or not (asked.unwrap or seen.unwrap):
+                continue
+            turns = round(float(np.median(commands[:, k] - self.channels[name])) / TURN)
+            if turns:
+                commands[:, k] -= turns * TURN
+                low, high = float(commands[:, k].min()), float(commands[:, k].max())
+                self.report.ranges[f"command of {drive.joint}"] = (low, high, "rad")
+                self.report.done.append(f"command of {drive.joint}: brought {-turns:+d} turns nearer to the positions")
 
     def _motor_columns(self, columns: Any, units: dict[str, str], what: str) -> Array | None:
         if not columns:
@@ -358,3 +377,11 @@ class _Import:
                 "expected a number"
             )
         return float(entry) * value.scale
+
+
+def _turn(column: Column) -> float:
+    """A whole turn in the numbers of a column: 360 of one in degrees; endless where it holds no angle, or was unwrapped."""
+    kind, size = UNITS.get(column.unit, ("", 1.0))
+    if kind != "angle" or column.unwrap or column.scale == 0:
+        return math.inf
+    return TURN / size / abs(column.scale)

@@ -19,8 +19,8 @@ class Column:
 
     ``table`` is the table it stands in, where a trial has several. ``signed_bits``: an unsigned counter of that width that
     holds a signed number. ``unwrap``: an angle that jumps by whole turns. ``gaps: interpolate`` fills empty cells from
-    their neighbours, or with the last command. ``lead_s``: how long before its time stamp a command took effect. ``smooth_s``: centred mean over
-    that time. ``sure``: the unit is right although the numbers look as if it were not.
+    their neighbours, or with the last command. ``lead_s``: how long before its time stamp a command took effect.
+    ``smooth_s``: centred mean over that time. ``sure``: the unit is right although the numbers look as if it were not.
     """
 
     column: str

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.measurements import signals
-from ee_dist.measurements.units import UNITS
+from ee_dist.measurements.units import TURN, TURNS_ON, UNITS
 from ee_dist.trials.log import Array
 
 CLIPPED_SHARE = 0.02
@@ -27,8 +27,8 @@ OTHER_UNIT, OTHER_SIZE = 4.0, 20.0
 """A soft drive goes only part of the way to its command, and a model may be off by a lot: beyond these it is another unit."""
 
 
-def suspicions(name: str, values: Array) -> list[str]:
-    """Sentences about one series (T,): stuck, clipped, a wrapped counter."""
+def suspicions(name: str, values: Array, turn: float = TURN) -> list[str]:
+    """Sentences about one series (T,): stuck, clipped, a wrapped counter or angle; ``turn`` is a whole turn in its numbers."""
     found: list[str] = []
     spread = float(np.ptp(values))
     if spread == 0:
@@ -50,7 +50,6 @@ def suspicions(name: str, values: Array) -> list[str]:
                 f"{name}: jumps by {jump:.0f}, nearly 2^{bits}: a wrapped counter? set 'signed_bits: {bits}' if it is signed"
             )
             break
-    turn = 2 * np.pi
     if not any("counter" in f for f in found) and 0.9 * turn < jump < 1.1 * turn and spread < 1.2 * turn:
         found.append(f"{name}: jumps by a whole turn: an angle that wraps; set 'unwrap: true'")
     return found
@@ -94,7 +93,9 @@ def unit_suspicion(
             f"{name}: reaches {seen:.4g} {unit}, the joint only {reach:.4g}; not in {declared or unit!r}?{cure}",
             True,
         )
-    if declared and declared != unit and float(np.ptp(values)) < STILL * reach:
+    # A joint without an end reaches far on paper, and yet moves by a turn or two.
+    room = min(reach, TURNS_ON) if kind == "angle" else reach
+    if declared and declared != unit and float(np.ptp(values)) < STILL * room:
         likely = [u for u, s in fits.items() if LIVELY * reach <= s <= 1.2 * reach]
         if likely:
             return (

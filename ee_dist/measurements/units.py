@@ -8,6 +8,8 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError, nearest
 
 TURN = 2 * math.pi
+TURNS_ON = 2 * TURN
+"""rad: what a joint that turns on and on moves by, if nothing else is known."""
 UNITS: dict[str, tuple[str, float]] = {
     "1": ("number", 1.0),
     "%": ("number", 0.01),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SHARE, SURE, UNKNOWN, Hints
-from ee_dist.measurements.units import UNITS
+from ee_dist.measurements.units import TURNS_ON, UNITS
 from ee_dist.robots.model import Joint
 
 ANGLES, LENGTHS = ("rad", "deg", "turn"), ("m", "mm", "cm")
@@ -23,8 +23,8 @@ NEAR = 0.35
 """Ratios within this share of one between two units are that."""
 LOOSE = 4.0
 """A soft drive goes only part of the way to its command: so far from one its ratio may be, and is no other unit yet."""
-TURNS_ON = 4 * math.pi
-"""rad: what a joint that turns on and on moves by, if nothing else is known."""
+COUNTS = 360.0
+"""Whole numbers beyond this may be the counts of an encoder where a joint has no end."""
 GRIPPERS = ("gripper", "jaw", "finger", "claw")
 
 
@@ -70,10 +70,11 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
     room = np.minimum(reach, [TURNS_ON if j.kind == "hinge" else math.pi for j in joints])
     lively = [u for u in fits if (span * UNITS[u][1] > STILL * room).any()]
     if not lively:
-        return UnitChoice(
-            (), UNKNOWN, f"numbers to {seen.max():.4g} fit no unit of {allowed[0]} within the joints' limits"
-        )
+        why = f"numbers to {seen.max():.4g} fit no unit of {allowed[0]} within the joints' limits{_counts(block)}"
+        return UnitChoice((), UNKNOWN, why)
     best, turning = lively[0], reach > TURNS_ON
+    if turning.any() and seen[turning].max() > COUNTS and _counts(block):
+        return UnitChoice((), UNKNOWN, f"numbers to {seen.max():.4g}{_counts(block)}")
     if best == "rad" and "deg" in lively and turning.any() and seen[turning].max() > TURNS_ON:
         return UnitChoice((), UNKNOWN, f"numbers to {seen[turning].max():.4g}: degrees, or many turns in rad")
     excluded = [u for u in allowed[:2] if u not in lively]
@@ -88,6 +89,16 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
         LIKELY,
         f"within the joints' limits in {best}, and the usual unit; {lively[1]} would be a small motion",
     )
+
+
+def _counts(block: Block) -> str:
+    """What whole numbers may be: the counts of an encoder."""
+    # As the file holds them: those of the block may stand between rows.
+    seen = np.concatenate([block.table.numbers(c, gaps=True) for c in block.columns])
+    seen = seen[np.isfinite(seen)]
+    if not (seen == np.round(seen)).all() or not np.abs(seen).max() > COUNTS:
+        return ""
+    return ", all of them whole: counts? of 4096 a turn and 2048 at zero write 'unit: turn, scale: 0.000244140625, offset: -0.5'"
 
 
 def _part(block: Block, keep: list[int]) -> Block:
