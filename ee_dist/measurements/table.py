@@ -19,6 +19,7 @@ from ee_dist.trials.log import Array
 
 _PLACE = re.compile(r"^(?P<name>.+)\[(?P<part>[^\[\]]+)\]$")
 _COMMA = re.compile(r"^\s*[-+]?\d+,\d+\s*$")
+_SWITCH = {"true": 1.0, "false": 0.0, "": np.nan}
 _BETWEEN = re.compile(r"[,;\s]+")
 WIDEST = 256
 """Cells that hold more numbers than this are pictures or the like, not channels."""
@@ -178,6 +179,8 @@ class Table:
             return np.array(cells, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
             pass
+        if all(c is None or str(c).lower() in _SWITCH for c in cells):
+            return np.array([np.nan if c is None else _SWITCH[str(c).lower()] for c in cells])
         out = np.empty(len(cells))
         for i, value in enumerate(cells):
             try:

@@ -11,6 +11,12 @@ from ee_dist.measurements.proposal.words import tokens
 from ee_dist.measurements.units import UNITS
 
 ENABLED = frozenset(["enable", "enabled", "active", "released", "powered", "on"])
+OTHER_SWITCHES = frozenset([
+    "estop", "stop", "emergency", "error", "errors", "fault", "faults", "alarm", "warning", "protective", "collision", "brake",
+    "brakes", "vacuum", "suction", "pump", "valve", "gripper", "hand", "tool", "light", "lights", "led", "lamp", "laser", "fan",
+    "camera", "heater",
+])  # fmt: skip
+"""What else is switched on and off: 0 in such a column says nothing about whether drives obey."""
 SUPPLY = frozenset(["supply", "volt", "volts", "voltage", "vin", "vbat", "battery", "bus"])
 
 
@@ -43,7 +49,8 @@ def add_switches(v: View) -> None:
             if name in used or name == table.clock:
                 continue
             words = set(tokens(name))
-            if words & ENABLED and set(np.unique(values)) <= {0.0, 1.0} and not v.has("enabled"):
+            switch = bool(words & ENABLED) and not words & OTHER_SWITCHES
+            if switch and set(np.unique(values)) <= {0.0, 1.0} and not v.has("enabled"):
                 why = "0 and 1, and called so: commands count where it is 1"
                 v.out.choices.append(Choice("enabled", "", place | {"column": name}, LIKELY, why))
             elif wants_supply and words & SUPPLY and not words & {"motor"} and not v.has("supply"):

@@ -15,7 +15,7 @@ _QUANTITY = {
     TORQUE: "tau torque torques effort efforts trq moment drehmoment force kraft jtau frc",
     CURRENT: "cur curr current currents amps ampere strom iq amperage",
     OTHER: "acc accel acceleration qdd ddq volt voltage volts temp temperature pwm err error fric friction duty status flag "
-    "mode supply battery load enable counter seq id ticks cycle wrench imu",
+    "mode supply battery load enable enabled counter seq id ticks cycle wrench imu",
     TIME: "t time times timestamp timestamps stamp zeit clock sec secs seconds elapsed uptime tstamp",
 }
 _KIND = {w: k for k, words in _QUANTITY.items() for w in words.split()}
@@ -72,6 +72,11 @@ _MEASURED = frozenset(
         "msr",
         "sensed",
     ]
+)
+_PRESENT = frozenset(["current", "curr", "cur"])
+"""Before a position or a speed these say that it was measured, and name no motor's current."""
+_OF_NOW = frozenset(
+    ["pos", "position", "positions", "angle", "angles", "vel", "velocity", "velocities", "speed", "speeds"]
 )
 _SECOND = frozenset(
     [
@@ -131,6 +136,7 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     words = [w for w in tokens(bare) if w not in joint_words]
     numbers = [int(w) for w in words if w.isdigit()]
     texts = [w for w in words if not w.isdigit()]
+    texts = ["present" if w in _PRESENT and _OF_NOW & set(texts[k + 1 : k + 2]) else w for k, w in enumerate(texts)]
     kinds = [_KIND[w] for w in texts if w in _KIND]
     if unit is None and len(texts) > 1 and texts[-1] in _UNIT:
         unit = _UNIT[texts[-1]]
