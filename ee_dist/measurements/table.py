@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from ee_dist.trials.log import Array
 
 _PLACE = re.compile(r"^(?P<name>.+)\[(?P<part>[^\[\]]+)\]$")
 _COMMA = re.compile(r"^\s*[-+]?\d+,\d+\s*$")
+_DATE = re.compile(r"\s*\d{4}-?\d\d-?\d\d[T ]\d\d")
 _SWITCH = {"true": 1.0, "false": 0.0, "": np.nan}
 _BETWEEN = re.compile(r"[,;\s]+")
 WIDEST = 256
@@ -181,6 +183,9 @@ class Table:
             pass
         if all(c is None or str(c).lower() in _SWITCH for c in cells):
             return np.array([np.nan if c is None else _SWITCH[str(c).lower()] for c in cells])
+        dates = _dates(cells)
+        if dates is not None:
+            return dates
         out = np.empty(len(cells))
         for i, value in enumerate(cells):
             try:
@@ -191,6 +196,18 @@ class Table:
                     f"{self}: row {self.line(i)}, column {quoted(column)}: {quoted(str(value))} is not a number{comma}"
                 ) from None
         return out
+
+
+def _dates(cells: Any) -> Array | None:
+    """Dates with a time of day, as ISO 8601 writes them, as seconds since 1970; without a zone they are taken as UTC. None where
+    a cell is none."""
+    if not len(cells) or not _DATE.match(str(cells[0])):
+        return None
+    try:
+        found = [datetime.fromisoformat(str(c).strip()) for c in cells]
+    except ValueError:
+        return None
+    return np.array([(d if d.tzinfo else d.replace(tzinfo=UTC)).timestamp() for d in found])
 
 
 def _listed(cell: Any) -> Any:

@@ -119,6 +119,23 @@ def blocks_of(
     return [b for b in found if b.reading.kind != OTHER]
 
 
+def unreadable(table: Table, joints: Sequence[str]) -> list[str]:
+    """What is wrong with columns called as others of the same quantity are that can be read."""
+    words = joint_words(joints)
+    read, failed = set(), []
+    for address in table.addresses():
+        joint = _joint_in(address, words)
+        reading = read_name(address, words[joint] if joint else frozenset())
+        if reading.kind in (TIME, OTHER) or not (reading.kind or reading.command):
+            continue
+        try:
+            table.numbers(address, gaps=True)
+            read.add(reading.family)
+        except MeasurementError as error:
+            failed.append((reading.family, str(error)))
+    return [error for family, error in failed if family in read]
+
+
 def _stem(address: str) -> str:
     """``observation.state[2]`` is called observation.state."""
     return re.sub(r"\[[^\[\]]*\]$", "", address)

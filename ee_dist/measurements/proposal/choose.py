@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 from ee_dist.measurements.errors import MeasurementError, nearest
-from ee_dist.measurements.proposal.blocks import blocks_of
+from ee_dist.measurements.proposal.blocks import blocks_of, unreadable
 from ee_dist.measurements.proposal.commands import add_commands
 from ee_dist.measurements.proposal.model import FIT, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.positions import add_positions, ask_for_positions, ranked_positions
 from ee_dist.measurements.proposal.rest import add_rest, add_switches
 from ee_dist.measurements.proposal.speeds import add_speeds
-from ee_dist.measurements.proposal.time import time_of
+from ee_dist.measurements.proposal.time import time_flaw, time_of
 from ee_dist.measurements.proposal.torques import add_torques
 from ee_dist.measurements.proposal.units import position_units
 from ee_dist.measurements.proposal.view import View
@@ -24,16 +24,15 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     """A mapping for a trial and a robot. Raises MeasurementError for hints that are not the robot's."""
     _check_hints(robot, hints)
     v = View(recorded, robot, hints)
-    for table in v.recorded.tables:
-        found = time_of(table, v.hints)
-        if found is not None:
-            v.times[table.name] = found
+    flaws = _add_times(v)
     known = {n: t.column for n, t in v.times.items() if t.column is not None}
     known |= {t.name: t.clock for t in v.recorded.tables if t.clock is not None}
     timed = replace(v.recorded, tables=tuple(t for t in v.recorded.tables if t.name in v.times))
     if not timed.tables:
-        v.out.ask("no column rises like a time; say task.rate_hz=ROWS_A_SECOND")
+        cure = "mend that row or drop it, or say task.rate_hz=ROWS_A_SECOND"
+        v.out.ask(f"{flaws[0]}; {cure}" if flaws else "no column rises like a time; say task.rate_hz=ROWS_A_SECOND")
         return v.out
+    flaws += [error for t in timed.tables for error in unreadable(t, v.robot.motor_names)]
     order = v.hints.joints
     v.blocks = [v.even(b) for b in blocks_of(timed, v.robot.motor_names, order, known) if len(b.values) > 20]
     position = v.pick(ranked_positions(v))
@@ -43,6 +42,7 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
         v.out.choices += [
             Choice("commands", m, {"column": "???"}, UNKNOWN, "not looked for yet") for m in robot.motor_names
         ]
+        _tell_flaws(v, flaws)
         return v.out
     v.position = position
     v.position.block.used = True
@@ -55,7 +55,28 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     add_rest(v)
     add_switches(v)
     _ask_the_rest(v)
+    _tell_flaws(v, flaws)
     return v.out
+
+
+def _add_times(v: View) -> list[str]:
+    """Fills the times; what is wrong with those that could not be read."""
+    flaws = []
+    for table in v.recorded.tables:
+        found = time_of(table, v.hints)
+        if found is not None:
+            v.times[table.name] = found
+        elif flaw := time_flaw(table):
+            flaws.append(flaw)
+    return flaws
+
+
+def _tell_flaws(v: View, flaws: list[str]) -> None:
+    """What could not be read comes first where something is open, as it may be why; else it is a note."""
+    if v.out.questions:
+        v.out.questions[:0] = [f"{flaw}; mend that row or drop it" for flaw in flaws]
+    else:
+        v.out.notes += [f"not read: {flaw}" for flaw in flaws]
 
 
 def _ask_the_rest(v: View) -> None:

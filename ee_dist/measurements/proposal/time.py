@@ -7,14 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.measurements.clocks import FASTEST_S, SLOWEST_S
+from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.blocks import series_of
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Hints
 from ee_dist.measurements.proposal.words import TIME, Reading, read_name, unit_word
+from ee_dist.measurements.sampling import check_times
 from ee_dist.measurements.table import Table
 from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
 
 TIMES = tuple(u for u, (kind, _) in UNITS.items() if kind == "time" and u in ("s", "ms", "us", "ns"))
+
+MOSTLY = 0.95
+"""Share of its steps in which a time must rise to be one that has a flaw."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +44,27 @@ def time_of(table: Table, hints: Hints) -> TimeChoice | None:
     named = [a for a in rising if _reading(a).kind == TIME]
     counters = [a for a in rising if np.array_equal(np.diff(rising[a]), np.ones(len(table) - 1)) and a not in named]
     open_ = [a for a in rising if a not in counters]
-    candidates = named or ([a for a in open_ if _reading(a).kind is None] if len(open_) else [])
+    # A time with a flaw is to be mended, not to be replaced by whatever else rises.
+    candidates = named or ([] if time_flaw(table) else [a for a in open_ if _reading(a).kind is None])
     if not candidates:
         if table.rate_hz:
             return TimeChoice(None, "s", rows / table.rate_hz, LIKELY, "the file's own rate")
         return None
     return _chosen(table, candidates, rising, bool(named))
+
+
+def time_flaw(table: Table) -> str | None:
+    """What is wrong with the column that is called a time, where it is one but for some rows."""
+    for address in table.addresses():
+        if _reading(address).kind != TIME:
+            continue
+        try:
+            values = table.numbers(address)
+            if len(values) > 2 and (np.diff(values) > 0).mean() > MOSTLY:
+                check_times(values, table, address)
+        except MeasurementError as error:
+            return str(error)
+    return None
 
 
 def _chosen(table: Table, candidates: list[str], rising: dict[str, Array], named: bool) -> TimeChoice:

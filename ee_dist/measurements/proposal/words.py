@@ -16,7 +16,7 @@ _QUANTITY = {
     CURRENT: "cur curr current currents amps ampere strom iq amperage",
     OTHER: "acc accel acceleration qdd ddq volt voltage volts temp temperature pwm err error fric friction duty status flag "
     "mode supply battery load enable enabled counter seq id ticks cycle wrench imu",
-    TIME: "t time times timestamp timestamps stamp zeit clock sec secs seconds elapsed uptime tstamp",
+    TIME: "t time times timestamp timestamps stamp zeit clock sec secs seconds elapsed uptime tstamp date datetime",
 }
 _KIND = {w: k for k, words in _QUANTITY.items() for w in words.split()}
 _COMMAND = frozenset(

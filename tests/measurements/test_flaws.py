@@ -1,0 +1,54 @@
+"""A column with one flaw is named with its row, and does not vanish."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import small_logs as logs
+from measurement_files import motion
+
+
+def frame() -> pd.DataFrame:
+    m = motion()
+    return logs.frame_of(m["t"], m["q"], m["g"]).astype(object)
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "value", "message"),
+    [
+        ("time", 70, 0.69, "row 72, column 'time': time stands still"),
+        ("time", 70, "x", "row 72, column 'time': 'x' is not a number"),
+        ("elbow_pos_rad", 30, "-", "row 32, column 'elbow_pos_rad': '-' is not a number"),
+        ("elbow_goal_rad", 30, "-", "row 32, column 'elbow_goal_rad': '-' is not a number"),
+    ],
+)
+def test_the_row_is_asked_about_first(tmp_path: Path, column: str, row: int, value: object, message: str) -> None:
+    table = frame()
+    table.loc[row, column] = value
+    table["rising"] = np.linspace(0, 1, len(table)) ** 2
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, table))
+    assert message in proposal.questions[0]
+    assert "mend that row or drop it" in proposal.questions[0]
+
+
+def test_a_flaw_in_what_is_not_needed_is_a_note(tmp_path: Path) -> None:
+    table = frame()
+    table["shoulder_vel_rad_s"], table["elbow_vel_rad_s"] = motion()["w"].T
+    table = table.astype(object)
+    table.loc[30, "elbow_vel_rad_s"] = "-"
+    table["mode_name"] = "auto"
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, table))
+    assert not proposal.questions
+    assert len([n for n in proposal.notes if "'elbow_vel_rad_s': '-' is not a number" in n]) == 1
+
+
+@pytest.mark.parametrize("zone", ["Z", "+02:00", ""])
+def test_dates_are_times(tmp_path: Path, zone: str) -> None:
+    table, m = frame(), motion()
+    table["time"] = [f"2026-03-01T12:00:{s:09.6f}{zone}" for s in m["t"]]
+    log, report = logs.imported(tmp_path, logs.written(tmp_path, table))
+    assert np.allclose(log.commands, m["g"])
+    assert not report.resampled
