@@ -29,8 +29,10 @@ NATIVE_DRIVE: Mapping[str, frozenset[str]] = {
     "python": READING,
 }
 BODY = frozenset({"parts", "joints", "lost"})
+MOUNT = frozenset({"start_position_m", "start_rotation"})
+"""How a bolted base stands."""
 NATIVE_ROBOT: Mapping[str, frozenset[str]] = {
-    "mjcf": BODY | {"free_base", "start_position_m", "start_rotation"},
+    "mjcf": BODY | {"free_base"} | MOUNT,
     "urdf": BODY | {"free_base"},
     "yaml": frozenset(f.name for f in fields(Robot)),
     "python": frozenset(),
@@ -83,7 +85,7 @@ def _fate(before: Robot, after: Robot, to: str) -> tuple[str, str]:
             ways.append((NATIVE, "") if to == "yaml" else (NOT, "a law of its own code: call that in your loop"))
         elif f.name == "joints" and to != "yaml" and any(a.freedom != b.freedom for a, b in zip(old, new, strict=True)):
             ways.append((SHIM, "stops within the joint's range"))
-        elif f.name in NATIVE_ROBOT[to]:
+        elif f.name in NATIVE_ROBOT[to] or (to == "urdf" and f.name in MOUNT and not after.free_base):
             ways.append((NATIVE, ""))
         else:
             ways.append((NOT, f"{to} has no place for {f.name}"))

@@ -19,7 +19,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.mujoco.mjcf_out import mjcf_text
 from ee_dist.export import FORMATS
-from ee_dist.export.plan import NATIVE, NOT, SHIM, fates, native_damping, needs_shim, parameters
+from ee_dist.export.plan import NATIVE, NOT, SHIM, _fate, fates, native_damping, needs_shim, parameters
 from ee_dist.export.python import controller_text
 from ee_dist.export.shim import Shim
 from ee_dist.export.urdf import rpy_of, urdf_text
@@ -218,6 +218,8 @@ def test_a_urdf_says_how_the_base_is_mounted(tmp_path: Path, base: str) -> None:
         pulls.append([float(d.qfrc_bias[m.joint(n).dofadr[0]]) for n in arm.motor_names])
     assert pulls[0] == pytest.approx(pulls[1], rel=1e-5)
     assert "mount" not in urdf_text(replace(arm, free_base=True))
+    assert _fate(BENCH, replace(BENCH, start_rotation=arm.start_rotation), "urdf") == (NATIVE, "")
+    assert _fate(QUADRUPED, replace(QUADRUPED, start_position_m=(1.0, 0.0, 1.0)), "urdf")[0] == NOT
 
 
 @pytest.mark.parametrize("seed", range(20))
