@@ -12,8 +12,9 @@ from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, Sensor, Vec3
 class Body:
     """Parts, each after the one that carries it; joints; and by joint, field by field, what the file knows of its drive.
 
-    ``driven`` are joints that the file itself gives a drive, or leaves without one on purpose. ``free_base``, ``gravity_m_s2`` and ``time_step_s`` are None
-    where the file does not say. ``notes`` are for people; ``assumed`` are those of them that stand in for a missing number.
+    ``driven`` are joints that the file itself gives a drive, or leaves without one on purpose. ``free_base``,
+    ``gravity_m_s2`` and ``time_step_s`` are None where the file does not say. ``notes`` are for people; ``assumed`` are those
+    of them that stand in for a missing number.
     """
 
     name: str
