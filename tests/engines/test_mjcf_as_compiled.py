@@ -156,7 +156,7 @@ def test_a_robot_stands_as_far_above_its_floor_as_in_mujoco(tmp_path: Path) -> N
     robot, notes = load_robot(file)
     assert robot.world.has_floor
     assert robot.start_position_m == (0.0, 0.0, 0.75)
-    assert "1 planes left out: there is one floor" in notes
+    assert "planes left out, for there is one level floor: 1" in notes
 
 
 def test_a_tilted_floor_is_said_and_lies_where_the_robot_stands(tmp_path: Path) -> None:

@@ -59,8 +59,9 @@ def floor_of(m: Any) -> tuple[Floor | None, list[str]]:
         return touches, bool(normals[g][2] > 1 - LEVEL), float(d.geom_xpos[g][2])
 
     notes = []
-    if len(planes) > min(1, len(usable)):
-        notes.append(f"{len(planes) - min(1, len(usable))} planes left out: there is one floor")
+    further = len(planes) - min(1, len(usable))
+    if further:
+        notes.append(f"planes left out, for there is one level floor: {further}")
     if not usable:
         return None, notes
     g = max(usable, key=rank)
