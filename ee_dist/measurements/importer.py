@@ -204,7 +204,9 @@ class _Import:
         if not self._same_rows(own):
             # The grid begins where the main table does.
             at_s = self._rows_s() + (self.main.times_s[0] - own.times_s[0])
-            if step_like:
+            if step_like and own.table.planned:
+                values = linear(at_s + column.lead_s, own.times_s, values)
+            elif step_like:
                 values = held(at_s, own.times_s, values, column.lead_s)
             else:
                 values = linear(at_s, own.times_s, values)

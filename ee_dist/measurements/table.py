@@ -48,6 +48,8 @@ class Table:
     notes: tuple[str, ...] = ()
     rate_hz: float | None = None
     """Rows per second where the format states it."""
+    planned: bool = False
+    """Whether rows are points that were to be passed through, on straight lines between them."""
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), []))

@@ -16,6 +16,7 @@ import numpy as np
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.readers.options import bounded
+from ee_dist.measurements.readers.plans import carried_out
 from ee_dist.measurements.table import WIDEST, Recorded, Table
 
 TIME = "time"
@@ -41,11 +42,12 @@ def is_series(kind: str) -> bool:
 @dataclass
 class _Rows:
     """One topic while it is read: (stamp or None, log time, how long after that) in ns, and the fields, of messages with the same
-    fields."""
+    fields; ``plan``: they are points of trajectories."""
 
     at_ns: list[tuple[int | None, int, int]] = field(default_factory=list)
     fields: dict[str, list[Any]] = field(default_factory=dict)
     parts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    plan: bool = False
 
 
 class Gatherer:
@@ -71,7 +73,8 @@ class Gatherer:
                 raise MeasurementError(
                     f"{self.file}: {topic}: its messages differ in their fields; nothing to compare in it"
                 )
-            rows.at_ns.append((stamp_ns, log_ns, after_ns))
+            rows.at_ns.append((stamp_ns, log_ns, after_ns or 0))
+            rows.plan = after_ns is not None
             for name, v in flat.items():
                 rows.fields.setdefault(name, []).append(v)
                 self.numbers += len(v) if isinstance(v, np.ndarray) else 1
@@ -80,27 +83,37 @@ class Gatherer:
     def trial(self) -> Recorded:
         """All topics as tables on one clock, which starts at 0. Raises MeasurementError where there are none."""
         stamped = self._by_stamps()
-        made: list[tuple[str, _Rows, Any]] = []
+        made: list[tuple[str, _Rows, Any, dict[str, Any]]] = []
         for topic, kinds in self.topics.items():
             for k, rows in enumerate(sorted(kinds.values(), key=lambda r: -len(r.at_ns))):
-                made.append((topic if not k else f"{topic} #{k + 1}", rows, _clock(rows, stamped.get(topic, False))))
+                name = topic if not k else f"{topic} #{k + 1}"
+                made.append((name, rows, *self._series(name, rows, stamped.get(topic, False))))
         if not made:
             raise MeasurementError(
                 f"{self.file}: no messages with numbers in it (JointState, Imu, Wrench, trajectories, ...)"
             )
-        start = min(int(at.min()) for _, _, at in made)
+        start = min(int(at.min()) for _, _, at, _ in made)
         tables = []
-        for name, rows, at in made:
-            order = np.argsort(at, kind="stable")
-            columns: dict[str, Any] = {TIME: (at[order] - start) / 1e9}
-            for field_name, values in rows.fields.items():
-                columns[field_name] = np.array(values)[order]
-            tables.append(Table(self.file, columns, name=name, clock=TIME, parts=rows.parts))
+        for name, rows, at, fields in made:
+            columns: dict[str, Any] = {TIME: (at - start) / 1e9} | fields
+            tables.append(Table(self.file, columns, name=name, clock=TIME, parts=rows.parts, planned=rows.plan))
         # The topic that tells most about joints first.
         tables.sort(key=lambda t: (not any("position" in c and p for c, p in t.parts.items()), -len(t)))
         if self.notes:
             tables[0].notes = tuple(self.notes)
         return Recorded("", tuple(tables))
+
+    def _series(self, name: str, rows: _Rows, stamped: bool) -> tuple[Any, dict[str, Any]]:
+        """The times (T,) of rows in ns, rising, and their fields."""
+        begin, after = _clock(rows, stamped), np.array([after for *_, after in rows.at_ns], dtype=np.int64)
+        fields = {n: np.array(values) for n, values in rows.fields.items()}
+        if rows.plan:
+            at, fields, replaced = carried_out(begin, begin + after, fields)
+            if replaced:
+                self.notes.append(f"{name}: {replaced} points left out that a later trajectory replaced")
+            return at, fields
+        order = np.argsort(begin, kind="stable")
+        return begin[order], {n: v[order] for n, v in fields.items()}
 
     def _by_stamps(self) -> dict[str, bool]:
         """Whether the stamps of each topic are its times, else the times of logging. All topics are on one clock: where stamps
@@ -125,7 +138,7 @@ class Gatherer:
 
     def _is_plan(self, topic: str) -> bool:
         """Whether a topic is stamped with when something is to begin, which tells nothing about a clock."""
-        return any(after and stamp is not None for r in self.topics[topic].values() for stamp, _, after in r.at_ns)
+        return any(r.plan and any(stamp is not None for stamp, *_ in r.at_ns) for r in self.topics[topic].values())
 
 
 def _stamps_apart_s(kinds: Sequence[_Rows]) -> float | None:
@@ -137,12 +150,13 @@ def _stamps_apart_s(kinds: Sequence[_Rows]) -> float | None:
 
 
 def _clock(rows: _Rows, stamped: bool) -> Any:
-    """The times (T,) of rows in ns."""
-    return np.array([(stamp if stamped and stamp else log) + after for stamp, log, after in rows.at_ns], dtype=np.int64)
+    """The times (T,) of messages in ns, row by row."""
+    return np.array([stamp if stamped and stamp else log for stamp, log, _ in rows.at_ns], dtype=np.int64)
 
 
-def _rows(message: Any) -> Iterator[tuple[int | None, int, dict[str, Any], dict[str, tuple[str, ...]]]]:
-    """(stamp, how long after it, fields, names of list fields) of a message; a trajectory gives one for each point."""
+def _rows(message: Any) -> Iterator[tuple[int | None, int | None, dict[str, Any], dict[str, tuple[str, ...]]]]:
+    """(stamp, how long after it, fields, names of list fields) of a message; a trajectory gives one for each point, of others
+    nothing is after the stamp."""
     stamp = _stamp(message)
     flat: dict[str, Any] = {}
     parts: dict[str, tuple[str, ...]] = {}
@@ -156,7 +170,7 @@ def _rows(message: Any) -> Iterator[tuple[int | None, int, dict[str, Any], dict[
             yield stamp, after, flat, parts
         return
     _flatten(message, "", (), flat, parts, 0)
-    yield stamp, 0, flat, parts
+    yield stamp, None, flat, parts
 
 
 def _fields(value: Any) -> Mapping[str, Any] | None:
