@@ -153,7 +153,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     lines = [f"Noise floor: {found.floor_source}. {_count(found.tried, 'explanation')} {_were(found.tried)} tried."]
     error = f"{_error(problem)}: model {problem.told(found.baseline_error)}"
     error += f", noise floor {problem.told(found.noise_floor)}."
-    last, advice, settled = found.baseline_error, "", False
+    last, advice = found.baseline_error, ""
     if found.refitted_error != found.baseline_error:
         lines.append(f"Its own values fitted anew leave {problem.told(found.refitted_error)}.")
         last = found.refitted_error
@@ -172,13 +172,10 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         entry, last = CATALOGUE[best.terms[0].effect], best.error_heldout
         # Those that were judged are the most promising: where all of them are tied there may be more.
         more = "at least " if len(best.tied_with) + 1 == len(found.candidates) < found.tried else ""
-        close = last <= SETTLED * found.noise_floor
         less = is_less(best.terms)
         head = f"{'Too much' if less else 'Missing'}{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best, more)}."
-        settled = not found.left
-        head += (
-            " More than noise is left with it." if found.left else f" {NOTHING_ELSE if close else NOTHING_STANDS_OUT}"
-        )
+        nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
+        head += " More than noise is left with it." if found.left else f" {nothing}"
         error = _errors(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
         sure = f"How sure: it takes off {confidence(best)}{_rest(best.explained, not found.left)}"
         sure += f"; {_rivals(found.tried, best.tied_with, more)}."
@@ -211,7 +208,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
             f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
             f"(predicted distance {ahead.separation:.0f} standard deviations)."
         )
-    good = found.verdict == NOTHING_MISSING or settled
+    good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
     tied = found.verdict == EFFECT and best is not None and best.tied_with
     alike = ahead is not None and ahead.separation < ENOUGH
     return Account(
@@ -302,7 +299,8 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     lines += [tie_text(placed(name), others) for name, others in ties.items() if others]
     gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in names)
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]
-    lines += doubt_text([s for s in shares(found, robot) if s.doubted])
+    parts = shares(found, robot)
+    lines += doubt_text([s for s in parts if s.doubted])
     vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
     if vague:
         lines.append(f"Left out in the end, since these data do not tell them from neutral: {'; '.join(vague)}.")
@@ -325,7 +323,6 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
         tried = found.last.tried if found.last else 0
         sure = f"How sure: {_count(tried, 'explanation')} {_were(tried)} tried, and none earns its place."
     else:
-        parts = shares(found, robot)
         what = _listed([s.text for s in parts]) if parts else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {last.held_out}"

@@ -317,9 +317,9 @@ def _finish(
     above = before**2 - floor**2
     share = (before**2 - max(after, floor) ** 2) / above if above > 0 else 0.0
     verdict = _verdict(len(ladder) > 1 or bool(current.parts), left, after, floor)
-    found = Improvement(verdict, share, ladder, terms, told, base, residual, floor, source, left, stopped, last)
-    found.worth = worth
-    return found
+    return Improvement(
+        verdict, share, ladder, terms, told, base, residual, floor, source, left, stopped, last, worth=worth
+    )
 
 
 def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor: float) -> str:

@@ -207,9 +207,9 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
         best = ordered[0]
         same = [best, *(j for j in ordered[1:] if j.name in best.tied_with)]
         first = min(same, key=lambda j: (j.proposal.size, j.rank))
-        # What is tied with either may be it.
-        others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
         if first is not best:
+            # What is tied with either may be it.
+            others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
             first.tied_with = [name for name in others if name != first.name]
         ordered.remove(first)
         ordered.insert(0, first)

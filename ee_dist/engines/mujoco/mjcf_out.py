@@ -57,11 +57,12 @@ def _native(spec: Any, robot: Robot, joint: Any, d: Drive) -> None:
     joint.solimp_friction = STICKING
     joint.solref_friction = (2 * robot.time_step_s, 1.0)
     joint.stiffness, joint.springref = _linear(d.spring), d.spring_rest
-    ends = robot.joint(d.joint).ends
-    if math.isinf(ends[1]):
+    limits = robot.joint(d.joint)
+    if math.isinf(limits.ends[1]):
         joint.limited = False
     else:
-        joint.limited, joint.range = True, ends
+        # A joint that is jammed within its range is the shim's to hold.
+        joint.limited, joint.range = True, (limits.lower, limits.upper)
     if d.command == "position":
         bias = (-d.kp * d.zero_offset * s, -d.kp * s, -d.kd * s)
         _actuator(spec, d.joint, d.joint, d.kp * d.command_gain * s, bias, d.torque_limit * s)

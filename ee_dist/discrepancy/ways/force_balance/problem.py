@@ -143,6 +143,7 @@ class ForceBalance(Problem):
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
         chosen = range(len(self.measured)) if trials is None else trials
         out = np.zeros((len(hypotheses), len(self.segment_of)))
+        own = self.scale * self.own_noise
         for row, hypothesis in enumerate(hypotheses):
             for k in chosen:
                 model = apply(self.models[k], hypothesis)
@@ -150,7 +151,6 @@ class ForceBalance(Problem):
                 if kept is None:
                     out[row, self.slices[k]] = np.inf
                     continue
-                own = self.scale * self.own_noise
                 left = resting(kept[0] / own, kept[1] / own, self.balances[k].rest) * self.own_noise
                 less = (self.let_through - self.motion_noise.variance(model)) / self.scale**2
                 out[row, self.slices[k]] = with_energy(left, less).ravel()

@@ -91,10 +91,9 @@ class OpenLoop(Problem):
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
         spacing = reading_s(trials)
         self.block = block if not spacing else min(block, max(1, round(BLOCK_S / spacing)))
-        fewest = sum(len(t.log.readings) for t in trials)
-        if fewest < 2 * window:
-            # Of a single window nothing could be held out.
-            window = fewest // 2
+        self._rows = [len(t.log.readings) for t in trials]
+        # Of a single window nothing could be held out.
+        window = min(window, sum(self._rows) // 2)
         self.window = max(1, window // self.block) * self.block
         block, window = self.block, self.window
         self._members = members
@@ -103,7 +102,6 @@ class OpenLoop(Problem):
         self._unmodelled, self.gained, self.calibrated = unmodelled or {}, gained, unmodelled is not None
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self._looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
-        self._rows = [len(t.log.readings) for t in trials]
         rows = self.predictor.rows
         self._data = [digest(of_rows(t.log.sensors, r), block, window) for t, r in zip(trials, rows, strict=True)]
         self._weigh(before)
