@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from ee_dist.discrepancy.account import Account, compare_account
+from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.left import leftovers

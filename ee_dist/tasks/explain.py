@@ -8,7 +8,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ee_dist.discrepancy.account import Account, explain_account
+from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
 from ee_dist.discrepancy.measured_trial import reading_s
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials

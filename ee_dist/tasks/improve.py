@@ -12,7 +12,8 @@ import yaml
 from rich.console import Console
 
 from ee_dist.basics.files import write_whole
-from ee_dist.discrepancy.account import Account, improve_account
+from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.calibrated_away import calibrated_away
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve

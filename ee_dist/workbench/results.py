@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ee_dist.discrepancy.account import Account, above, confidence
+from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_explain import above, confidence
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from way_samples import Sample, measure, problem_by, samples
 
-from ee_dist.discrepancy.account import compare_account, explain_account
+from ee_dist.discrepancy.accounts.of_compare import compare_account
+from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.assumed import GUESSED, LABEL, assumed_drives, puts_right
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.everywhere import instead, taken_apart

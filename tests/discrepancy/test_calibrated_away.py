@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from way_samples import Sample, evaluator_for, measure
 
-from ee_dist.discrepancy.account import odd_text
+from ee_dist.discrepancy.accounts.of_improve import odd_text
 from ee_dist.discrepancy.calibrated_away import TIMES, calibrated_away
 from ee_dist.discrepancy.search.candidates import Candidate, candidates
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.account import doubt_text
+from ee_dist.discrepancy.accounts.of_improve import doubt_text
 from ee_dist.discrepancy.evidence.worth import Worth
 from ee_dist.discrepancy.importance import shares
 from ee_dist.discrepancy.ladder import Improvement, Rung

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from ee_dist.discrepancy.account import compare_account
+from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.evidence.judge import LUCK
 from ee_dist.discrepancy.evidence.left import leftovers

@@ -7,7 +7,7 @@ from functools import cache
 import pytest
 from way_samples import measure, problem_by, samples
 
-from ee_dist.discrepancy.account import explain_account
+from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.improve import improve

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from way_samples import measure, problem_by, samples
 
-from ee_dist.discrepancy.account import explain_account, improve_account
+from ee_dist.discrepancy.accounts.of_explain import explain_account
+from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.evidence.intervals import NONE_LEFT
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import explain

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from linear_problem import Linear
 
-from ee_dist.discrepancy.account import improve_account
+from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.uneven import worse_trials

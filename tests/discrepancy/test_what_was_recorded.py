@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from way_samples import measured, problem_by, samples
 
-from ee_dist.discrepancy.account import compare_account
+from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import circumstances, compare
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance

@@ -6,7 +6,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from ee_dist.discrepancy.account import Account, compare_account, explain_account, improve_account
+from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_compare import compare_account
+from ee_dist.discrepancy.accounts.of_explain import explain_account
+from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ee_dist.discrepancy.account import Account
+from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.importance import added

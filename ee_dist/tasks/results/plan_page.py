@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table as Shown
 
 from ee_dist.basics.names import listed
-from ee_dist.discrepancy.account import Account
+from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.plan import ENOUGH, Parting, Plan, PlannedTrial
 from ee_dist.discrepancy.words import placed, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ee_dist.discrepancy.account import Account, above
+from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_explain import above
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation

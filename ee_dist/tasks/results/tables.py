@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ee_dist.discrepancy.account import Account
+from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation

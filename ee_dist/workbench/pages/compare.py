@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from ee_dist.discrepancy.account import compare_account
+from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import by_trial
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.workbench import charts

@@ -1,0 +1,125 @@
+"""What was found, in words, for the terminal, the report and whoever has to mend the robot; and what several verbs say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.improve import SETTLED
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import placed, plain
+
+TWINS = 2
+"""Others that a headline names beside the one that was found,"""
+FEW = 4
+"""and the line below it, where there are more."""
+MOSTLY = 0.97
+"""Share of what is above the noise from which nobody asks for the rest."""
+GRANTED = "What is above the floor is no more than chance, and what contacts and reversals leave that come a row early or late."
+SPREAD = (
+    "What is left stands out nowhere; all together it is more than noise, and below the resolution at which channels are "
+    "compared."
+)
+NOTHING_ELSE = "Nothing else is left above the noise."
+CONTENT = (
+    "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
+)
+PLAN = "What to record to tell them apart, within limits of yours:"
+"""Before the command that finds it."""
+STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
+
+
+@dataclass(frozen=True)
+class Account:
+    """``headline``: what was found, where, how much of it, and whether more is left. ``error``: of the models, beside the
+    noise floor. ``sure``: how sure it is. ``advice``: what to do next, where a command does not say it. ``lines``: what speaks
+    for it and what stays open. ``good``: whether the question is settled. ``planner``: the command that finds the trial which
+    tells apart what is tied, where something is. ``warnings``: what may make all of it wrong."""
+
+    headline: str
+    error: str
+    sure: str
+    lines: tuple[str, ...]
+    good: bool
+    advice: str = ""
+    planner: str = ""
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def first(self) -> list[str]:
+        """What comes below the headline before anything else."""
+        planned = f"{PLAN} {self.planner}" if self.planner else ""
+        return [line for line in (*self.warnings, self.error, self.sure, self.advice, planned) if line]
+
+    @property
+    def words(self) -> list[str]:
+        """All of it, the headline first."""
+        return [self.headline, *self.first, *self.lines]
+
+
+def advised(problem: Problem, advice: str) -> str:
+    """The advice, and before it what is to be put right first."""
+    return " ".join(t for t in (problem.doubts and f"Before this is believed: {problem.doubts}", advice) if t)
+
+
+def beside_floor(error: float, floor: float, left: bool) -> list[str]:
+    """An error that is less than noise would leave needs a word, and one that is more although nothing is ``left``."""
+    if error < 0.97 * floor:
+        return ["The error is below the floor: the noise was estimated too high, and the floor is an upper bound."]
+    if error < floor:
+        return ["The error is at the floor, within chance."]
+    if error <= 1.03 * floor or left:
+        return []
+    return [GRANTED if error <= SETTLED * floor else SPREAD]
+
+
+def counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def was_or_were(count: int) -> str:
+    return "was" if count == 1 else "were"
+
+
+def error_name(problem: Problem) -> str:
+    """Its name; with its unit, where that is not told behind each number."""
+    unit = f" ({problem.natural_unit})" if problem.natural_unit == "standard deviations" else ""
+    return _capital(problem.natural_name) + unit
+
+
+def before_and_after(problem: Problem, before: float, after: float, floor: float, held_out: str) -> str:
+    """The model, the improved one and noise in one line."""
+    return (
+        f"{error_name(problem)}: model {problem.told(before)}, improved model {problem.told(after)} held out "
+        f"({held_out}), noise floor {problem.told(floor)}."
+    )
+
+
+def unexplained_rest(explained: float, settled: bool) -> str:
+    """A word on what is above the noise still, where nothing is said to be left."""
+    return "; what it leaves of that stands out nowhere" if settled and explained < MOSTLY else ""
+
+
+def listed_few(names: Sequence[str]) -> str:
+    """Candidates by name, as many as a line holds."""
+    more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
+    return "; ".join(map(placed, names[:FEW])) + more
+
+
+def tie_text(what: str, others: Sequence[str]) -> str:
+    return f"These measurements cannot tell {what} from: {', '.join(map(placed, others))}."
+
+
+def left_text(left: Sequence[Leftover], after: bool) -> str:
+    head = "Even with it, more than noise is left in" if after else "It sits in"
+    return f"{head} {counted(curves_of(left), 'curve')}; worst: {'; '.join(plain(str(g)) for g in left[:3])}."
+
+
+def curves_of(left: Sequence[Leftover]) -> int:
+    """Channels of trials: one may stand out for two reasons."""
+    return len({(g.trial, g.channel) for g in left})
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,62 @@
+"""What compare has to say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ee_dist.discrepancy.accounts.account import (
+    CONTENT,
+    Account,
+    advised,
+    beside_floor,
+    counted,
+    curves_of,
+    error_name,
+    left_text,
+)
+from ee_dist.discrepancy.assumed import assumed_text
+from ee_dist.discrepancy.compare import Comparison
+from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import plain
+
+CLOSE = 1.1
+"""Times the noise floor up to which a model is nearly right."""
+
+
+def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover]) -> Account:
+    """What compare has to say; ``left``: where more than noise is."""
+    ratio = found.error / found.noise_floor if found.noise_floor else float("inf")
+    off = problem.told(found.error)
+    lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}.", *assumed_text(problem.robot)]
+    lines += beside_floor(found.error, found.noise_floor, bool(left))
+    parted = [f"{t} at {s:.2f} s" for t, s in found.parted_s.items() if s is not None]
+    lines.append("Prediction and measurement part: " + ("; ".join(parted) or "nowhere") + ".")
+    if left:
+        lines.append(left_text(left, False))
+    if ratio < CLOSE and not left:
+        head = "The model agrees with the measurements: nothing is left above the noise."
+    else:
+        # The largest error, or, where the errors are all small, the place that noise explains least.
+        place = left[0].channel if left and ratio < CLOSE else found.channels[0].name if found.channels else ""
+        where = f", most of all at {plain(place)}" if place else ""
+        how = "The model is nearly right, and more than noise is left" if ratio < CLOSE else "The model is off"
+        least = problem.natural(found.noise_floor)
+        times = _times(problem.natural(found.error) / least) if least else "far more than"
+        head = f"{how}{where}: {problem.natural_name} {off}, {times} what noise alone would leave."
+    floor = problem.told(found.noise_floor)
+    error = f"{error_name(problem)}: model {off}, noise floor {floor}."
+    places = counted(len(found.channels) * len(problem.trials), "curve")
+    of = f"{places} ({counted(len(found.channels), 'channel')} in {counted(len(problem.trials), 'trial')})"
+    sure = (
+        f"How sure: more than noise stands out in {curves_of(left)} of {of}"
+        if left
+        else f"How sure: none of {of} stands out"
+    )
+    sure += f"; the noise floor is {found.floor_source}."
+    settled = ratio < CLOSE and not left
+    return Account(head, error, sure, (*lines, *problem.notes), settled, advised(problem, CONTENT if settled else ""))
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.3g} times" if abs(ratio - 1) >= 0.005 else "about"

@@ -1,0 +1,150 @@
+"""What explain has to say: the verdict, what it is, what speaks for it, what stays open, what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ee_dist.discrepancy.accounts.account import (
+    CONTENT,
+    NOTHING_ELSE,
+    STUCK,
+    TWINS,
+    Account,
+    advised,
+    before_and_after,
+    beside_floor,
+    counted,
+    curves_of,
+    error_name,
+    left_text,
+    listed_few,
+    tie_text,
+    unexplained_rest,
+    was_or_were,
+)
+from ee_dist.discrepancy.assumed import GUESSED, LABEL
+from ee_dist.discrepancy.evidence.judge import LUCK, Judged
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
+from ee_dist.discrepancy.improve import SETTLED
+from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.words import is_less, percent, placed, plain, told_all
+from ee_dist.effects.catalogue import CATALOGUE
+
+NOTHING_STANDS_OUT = "Nothing else stands out."
+
+
+def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None, planner: str = "") -> Account:
+    """The verdict, what it is, what speaks for it, what stays open, what to do next; ``planner`` is said where something is tied
+    that another trial might tell apart."""
+    robot, best = problem.robot, found.best
+    lines = [
+        f"Noise floor: {found.floor_source}. {counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried."
+    ]
+    error = f"{error_name(problem)}: model {problem.told(found.baseline_error)}"
+    error += f", noise floor {problem.told(found.noise_floor)}."
+    last, advice = found.baseline_error, ""
+    if found.refitted_error != found.baseline_error:
+        lines.append(f"Its own values fitted anew leave {problem.told(found.refitted_error)}.")
+        last = found.refitted_error
+    if found.as_it_was:
+        lines.append(
+            "Its own values stay as they were: with the effect on top that explains more than fitting them anew."
+        )
+    if found.verdict == NOTHING_MISSING:
+        by_luck = all(c.why_not == LUCK for c in found.candidates)
+        worth = "takes more off the residual than luck" if by_luck else "earns its place"
+        head = f"Nothing is missing: no candidate {worth}, and no channel stands out."
+        gains = "gains more than luck" if by_luck else "earns its place"
+        sure = f"How sure: {counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried, and none {gains}."
+        advice = CONTENT
+    elif found.verdict == EFFECT and best is not None:
+        entry, last = CATALOGUE[best.terms[0].effect], best.error_heldout
+        # Those that were judged are the most promising: where all of them are tied there may be more.
+        more = "at least " if len(best.tied_with) + 1 == len(found.candidates) < found.tried else ""
+        less = is_less(best.terms)
+        head = f"{'Too much' if less else 'Missing'}{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best, more)}."
+        nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
+        head += " More than noise is left with it." if found.left else f" {nothing}"
+        error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
+        sure = f"How sure: it takes off {confidence(best)}{unexplained_rest(best.explained, not found.left)}"
+        sure += f"; {_rivals(found.tried, best.tied_with, more)}."
+        guessed = best.proposal.label == LABEL
+        lines.append(GUESSED if guessed else entry.physics)
+        turned = " Here the other way round: the model has too much of it." if less else ""
+        lines += [] if guessed else [f"Its mark in a residual: {entry.signature}{turned}"]
+        if best.tied_with:
+            lines.append(tie_text("it", best.tied_with))
+    else:
+        none = f"none of {counted(found.tried, 'explanation')} that {was_or_were(found.tried)} tried earns its place"
+        head = f"Unexplained: something is left, and {none}."
+        if found.left:
+            head = f"Unexplained: more than noise is left, most at {plain(found.left[0].channel)}, and {none}."
+        places = curves_of(found.left)
+        sure = f"How sure: more than noise stands out in {counted(places, 'curve')}; noise floor: {found.floor_source}."
+        advice = STUCK
+        lines += [
+            f"Nearest, but not good enough: {told_all(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]
+        ]
+    lines += beside_floor(last, found.noise_floor, bool(found.left))
+    if found.left:
+        lines.append(left_text(found.left, found.verdict == EFFECT))
+    if ahead is not None and ahead.separation < ENOUGH:
+        advice = "No trial of the library would tell them apart either: on all of them they do the same."
+    elif ahead is not None:
+        e = ahead.excitation
+        where = f", on the {e.fixture}" if robot.free_base else ""
+        advice = (
+            f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
+            f"(predicted distance {ahead.separation:.0f} standard deviations)."
+        )
+    good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
+    tied = found.verdict == EFFECT and best is not None and best.tied_with
+    alike = ahead is not None and ahead.separation < ENOUGH
+    return Account(
+        head,
+        error,
+        sure,
+        (*lines, *problem.notes),
+        good,
+        advised(problem, advice),
+        planner if tied and not alike else "",
+    )
+
+
+def _rivals(tried: int, tied: Sequence[str], more: str) -> str:
+    if not tied:
+        return f"of {counted(tried, 'explanation')} no other does as well"
+    told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
+    return f"of {counted(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+
+
+def _doubt(found: Explanation) -> str:
+    return "" if not found.left else ", as one of several things"
+
+
+def _twins(best: Judged, more: str) -> str:
+    """What it may be instead: by name, where there are few."""
+    others = best.tied_with
+    if not others:
+        return ""
+    if len(others) > TWINS:
+        return f", or one of {more}{len(others)} others that look the same here"
+    return f", or {' or '.join(map(placed, others))}, which look{'s' if len(others) == 1 else ''} the same here"
+
+
+def above(c: Judged) -> tuple[float, float]:
+    """The interval of a candidate's gain as a share of what is above the noise."""
+    scale = c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0
+    return c.interval[0] * scale, c.interval[1] * scale
+
+
+def confidence(best: Judged) -> str:
+    """What it takes off held-out data, as a share of what is not noise, with its interval."""
+    low, high = above(best)
+    return (
+        f"{percent(max(0.0, min(best.explained, 1.0)))} of what is above the noise (95 % interval {percent(max(low, -9.99))} "
+        f"to {percent(min(high, 1.0))}), judged on {best.held_out}"
+    )

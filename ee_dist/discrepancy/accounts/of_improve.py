@@ -1,0 +1,148 @@
+"""What improve has to say: what was added, how good the model is with it, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ee_dist.discrepancy.accounts.account import (
+    CONTENT,
+    NOTHING_ELSE,
+    STUCK,
+    TWINS,
+    Account,
+    advised,
+    before_and_after,
+    beside_floor,
+    counted,
+    error_name,
+    left_text,
+    listed_few,
+    tie_text,
+    unexplained_rest,
+    was_or_were,
+)
+from ee_dist.discrepancy.calibrated_away import OddOne
+from ee_dist.discrepancy.evidence.intervals import ParameterReport
+from ee_dist.discrepancy.explain import NOTHING_MISSING
+from ee_dist.discrepancy.importance import Share, added, shares
+from ee_dist.discrepancy.improve import EXPLAINED
+from ee_dist.discrepancy.ladder import Improvement
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.uneven import worse_text, worse_trials
+from ee_dist.discrepancy.words import much, named, percent, phrase, placed, plain, quantity, span
+from ee_dist.effects.catalogue import Hypothesis, Term
+from ee_dist.robots.model import Robot
+
+NAMED = 3
+"""Effects that a headline names."""
+
+
+def improve_account(problem: Problem, found: Improvement, planner: str = "") -> Account:
+    """What was done, how good it is, and what is left; ``planner`` is said where what was added is tied."""
+    robot, first, last = problem.robot, found.ladder[0], found.ladder[-1]
+    steps = [r for r in found.ladder if r.added]
+    lines = []
+    if len(steps) > 1:
+        lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
+    names = {t.name for t in found.terms}
+    ties = {r.name: [n for n in r.tied_with if n not in names] for r in steps if names & {t.name for t in r.added}}
+    lines += [tie_text(placed(name), others) for name, others in ties.items() if others]
+    gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in names)
+    lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]
+    parts = shares(found, robot)
+    lines += doubt_text([s for s in parts if s.doubted])
+    vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
+    if vague:
+        lines.append(f"Left out in the end, since these data do not tell them from neutral: {'; '.join(vague)}.")
+    lines.append("The model: " + (phrase(found.terms, robot) or "the robot as described") + ".")
+    lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
+    lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
+    worse = worse_trials(problem, found)
+    if worse:
+        lines.append(worse_text(problem, worse))
+    settled = found.verdict in (EXPLAINED, NOTHING_MISSING)
+    lines += beside_floor(last.error_heldout, found.noise_floor, not settled)
+    if found.left:
+        lines.append(left_text(found.left, bool(steps)))
+    error = before_and_after(problem, first.error_heldout, last.error_heldout, found.noise_floor, last.held_out)
+    share = f"{percent(max(0.0, min(found.explained, 1.0)))} of what is above the noise is accounted for"
+    if len(found.ladder) == 1:
+        head = f"Nothing was added: {found.stopped}."
+        error = f"{error_name(problem)}: model {problem.told(last.error_heldout)}, noise floor "
+        error += f"{problem.told(found.noise_floor)}."
+        tried = found.last.tried if found.last else 0
+        sure = f"How sure: {counted(tried, 'explanation')} {was_or_were(tried)} tried, and none earns its place."
+    else:
+        what = _listed([s.text for s in parts]) if parts else "nothing; the model's own values were fitted anew"
+        head = f"Added: {what}."
+        where = "" if found.left or settled else f" on {last.held_out}"
+        head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
+        sure = f"How sure: {share}, judged on {last.held_out}{unexplained_rest(found.explained, settled)}"
+        sure += f"{_ranges(found, [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1], robot)}{_told_from(ties)}."
+    advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
+    tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
+    warnings = tuple(odd_text(o, robot) for o in found.odd)
+    good = settled and not warnings
+    more = (*lines, *problem.notes)
+    return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
+
+
+def _many_times(ratio: float) -> str:
+    return "more than 100 times" if ratio > 100 else f"{ratio:.0f} times"
+
+
+def odd_text(odd: OddOne, robot: Robot) -> str:
+    """What a calibration hides, if the robot that it was made on was not in order."""
+    what = "joints" if odd.term.target == odd.joint else "sensors"
+    return (
+        f"Calibrated away at {plain(odd.term.target)}: {much(odd.term, robot)}, {_many_times(odd.times)} what its like {what} "
+        "have: if this robot was not in order, this hides it."
+    )
+
+
+def doubt_text(doubted: Sequence[Share]) -> list[str]:
+    """What less depends on than is left unexplained, if there is such."""
+    if not doubted:
+        return []
+    one = len(doubted) == 1
+    return [
+        f"Less depends on {'this' if one else 'each of these'} than is left unexplained, so that "
+        f"{'it' if one else 'any of them'} may stand in for something else: {'; '.join(s.text for s in doubted)}."
+    ]
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f"; and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return "; ".join(names[:NAMED]) + more
+
+
+def _ranges(found: Improvement, named_: Sequence[Term], robot: Robot) -> str:
+    """The 95 % intervals of the values that a headline names."""
+    told_of: dict[str, list[str]] = {t.name: [] for t in named_}
+    for p in found.parameters:
+        term = found.terms[p.term]
+        if term.name in told_of:
+            range_ = span(term, p.name, p.low, p.high, robot)
+            sure = not p.flag and np.isfinite(p.high - p.low)
+            told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
+    out = [
+        (f"{placed(name)}: " if len(added(found)) > 1 else "") + ", ".join(values)
+        for name, values in told_of.items()
+        if values
+    ]
+    return f"; 95 % intervals: {'; '.join(out)}" if out else ""
+
+
+def _told_from(ties: Mapping[str, Sequence[str]]) -> str:
+    """Whether others would have done as well."""
+    others = sorted({t for names in ties.values() for t in names})
+    if not others:
+        return ""
+    several = f"{len(others)} others ({listed_few(others)})"
+    return f"; not told from {' or '.join(map(placed, others)) if len(others) <= TWINS else several}"
+
+
+def flag_text(terms: Hypothesis, p: ParameterReport) -> str:
+    return f"{named(terms[p.term])}, {quantity(terms[p.term], p.name)}: {p.flag}."
