@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.engines.one_joint import fits
+from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError, one_of
 from ee_dist.tasks.measurements import Measurements
@@ -100,19 +102,44 @@ def known_way(by: str) -> None:
 
 
 def way_of(measured: Measurements, by: str) -> Way:
-    """The way asked for; for ``auto`` the first that the channels allow. Raises ConfigError for one that cannot be."""
+    """The way asked for; for ``auto`` that of a calibration, else what the channels allow and tell most by. Raises ConfigError
+    for one that cannot be."""
     known_way(by)
     driven = all(_driven(t.log) for t in measured.trials)
+    if by == AUTO and measured.calibrated_by:
+        return _possible(WAYS[measured.calibrated_by], measured)
     if by == AUTO:
         torques = all(
             t.log.joints is not None and motor_torques(t.log, measured.robot) is not None for t in measured.trials
         )
         led = _led(measured.robot) or measured.robot.free_base
         by = "open_loop" if (driven and led) or not torques else "force_balance"
-        if driven and not led and not torques and _seen(measured):
-            # A controller may stand behind recorded torques (an arm's currents), so forces are balanced where they were measured.
-            by = "free_run"
-    way = WAYS[by]
+        if driven and not led and _seen(measured):
+            # A controller may stand behind recorded torques (an arm's currents), so forces are balanced where they were measured
+            # and tell anything.
+            weak = _weak(measured) if torques else ""
+            if weak or not torques:
+                return _possible(replace(WAYS["free_run"], why=weak or WAYS["free_run"].why), measured)
+    return _possible(WAYS[by], measured)
+
+
+def _weak(measured: Measurements) -> str:
+    """Why a balance of forces would tell little of these torques; empty where it tells much."""
+    try:
+        problem = ForceBalance(measured.trials, measured.robot)
+    except MeasurementError:
+        return "the noise of the positions hides what forces did: the model runs freely from the measured state"
+    if problem.left_to_give >= CANCELLED or problem.doubts:
+        return ""
+    return (
+        f"gravity and inertia cancel in these motions but for {problem.left_to_give:.0%}, so that torques tell little: the model "
+        "runs freely from the measured state"
+    )
+
+
+def _possible(way: Way, measured: Measurements) -> Way:
+    """The way itself. Raises ConfigError where it cannot be."""
+    by, driven = way.name, all(_driven(t.log) for t in measured.trials)
     if way.commanded and measured.trials and not driven:
         raise ConfigError(_nothing_commanded(measured, by))
     if measured.robot.free_base and not way.moves:

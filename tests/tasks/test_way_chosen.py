@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.ways.force_balance.motion import Motion, Processing, motion_of
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
@@ -63,3 +65,33 @@ def test_without_commands_forces_are_balanced_and_nothing_can_be_simulated() -> 
             way_of(with_torques, by)
     with pytest.raises(ConfigError, match="trial a holds no commands"):
         way_of(replace(known, trials=(MeasuredTrial("a", silent),)), AUTO)
+
+
+@pytest.mark.parametrize(("times", "way"), [(1.0, "free_run"), (0.2, "force_balance"), (3.0, "force_balance")])
+def test_where_gravity_and_inertia_cancel_torques_are_a_poor_witness(times: float, way: str) -> None:
+    """A pendulum that swings at its own frequency needs no torque; at another one it does."""
+    known = measured("torque")
+    robot = known.robot
+    dt = robot.time_step_s
+    t = np.arange(4000) * dt
+
+    def moved(rad_s: float) -> tuple[SensorLog, Motion]:
+        swing = 0.1 * np.sin(rad_s * t)[:, None]
+        sensors = np.tile(swing, (1, len(robot.sensors)))
+        new = replace(log(robot), times_s=t, sensors=sensors, joints=swing, commands=0.01 * swing, torques=0.01 + swing)
+        return new, motion_of(new, robot, Processing.for_rate(dt))
+
+    def own() -> float:
+        """Where weight and inertia are the same share of the position."""
+        _, motion = moved(1.0)
+        floating = replace(robot, world=replace(robot.world, gravity_m_s2=0.0))
+        inertia = motion.needed(floating)[1]
+        weight = motion.needed(robot)[1] - inertia
+        return float(np.sqrt(np.std(weight) / np.std(inertia)))
+
+    trials = (MeasuredTrial("a", moved(times * own())[0]),)
+    found = way_of(replace(known, trials=trials), AUTO)
+    assert found.name == way
+    assert ("cancel" in found.why) == (way == "free_run")
+    said = ForceBalance(trials, robot).notes
+    assert any("cancel" in line for line in said) == (way == "free_run")

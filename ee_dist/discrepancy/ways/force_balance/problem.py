@@ -20,6 +20,7 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read
 from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.discrepancy.ways.force_balance.balance import Balance
+from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED, left_to_give
 from ee_dist.discrepancy.ways.force_balance.motion import Processing
 from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, roughness_of_noise, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
@@ -186,15 +187,26 @@ class ForceBalance(Problem):
     def doubts(self) -> str:
         return weightless(self.models, self.balances, self.size)
 
+    @cached_property
+    def left_to_give(self) -> float:
+        """Share of what gravity and inertia need that the drives had to give; little where the two cancel."""
+        return left_to_give(self.models, self.motions, self.size)
+
     @property
     def notes(self) -> list[str]:
-        if self.processing.keep_every <= self.asked.keep_every:
-            return []
-        step_s = float(np.median(np.diff(self.measured[0].log.times_s)))
-        return [
-            f"The positions are so noisy that they were smoothed more than usual: motion and forces above "
-            f"{0.5 / (self.processing.keep_every * step_s):.2g} Hz are not compared."
-        ]
+        lines = []
+        if self.left_to_give < CANCELLED:
+            lines.append(
+                f"Gravity and inertia cancel in these motions but for {self.left_to_give:.0%}: a tenth off in one of them looks "
+                f"like {0.05 / self.left_to_give:.0%} of the force. Where commands were recorded, task.by=free_run tells more."
+            )
+        if self.processing.keep_every > self.asked.keep_every:
+            step_s = float(np.median(np.diff(self.measured[0].log.times_s)))
+            lines.append(
+                f"The positions are so noisy that they were smoothed more than usual: motion and forces above "
+                f"{0.5 / (self.processing.keep_every * step_s):.2g} Hz are not compared."
+            )
+        return lines
 
     def noise_floor(self) -> tuple[float, str]:
         return 1.0, "estimated: second differences of the force"
