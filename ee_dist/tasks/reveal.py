@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.effects.groups import members_of
@@ -83,7 +84,9 @@ def score(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -
             raise ConfigError(
                 f"task.explained: its summary is not as task={task} writes it; it was changed, or is of another version"
             ) from None
-    raise ConfigError(f"task.explained: a summary of task={summary.get('task')}; expected one of explain or improve")
+    raise ConfigError(
+        f"task.explained: a summary of task={quoted(summary.get('task'))}; expected one of explain or improve"
+    )
 
 
 def places(terms: Sequence[tuple[str, str]], robot: Robot | None) -> Places:

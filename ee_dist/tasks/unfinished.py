@@ -15,6 +15,7 @@ from typing import Any
 import yaml
 
 from ee_dist.basics.files import write_whole
+from ee_dist.basics.quoted import quoted, short
 from ee_dist.basics.uncut import keeping, trial_on_hardware
 from ee_dist.evaluation.installed import installed
 from ee_dist.evaluation.jobs import Evaluator
@@ -61,6 +62,8 @@ class Unfinished:
             found = json_of(text_of(self.folder / _RUN))
             digest, text, versions = str(found["digest"]), str(found["settings"]), dict(found["versions"])
             settings = plain_of(text)
+            if not isinstance(settings, dict):
+                raise TypeError("its settings are none")
         except FileNotFoundError:
             return  # killed before it began
         except (OSError, UntrustedError, KeyError, TypeError, ValueError) as error:
@@ -68,8 +71,8 @@ class Unfinished:
         for name, theirs in versions.items():
             if name in _PACKAGES and installed().get(name) != theirs:
                 raise ConfigError(
-                    f"resume={shown(self.folder.parent)}: it was begun with {name} {theirs}, here is "
-                    f"{installed().get(name)}: its results would be of two kinds; install {name} {theirs} to go on"
+                    f"resume={shown(self.folder.parent)}: it was begun with {name} {short(str(theirs), 40)}, here is "
+                    f"{installed().get(name)}: its results would be of two kinds; install that version to go on"
                 )
         if digest != self.digest:
             changed = _changed(settings, yaml.safe_load(self.settings))
@@ -231,4 +234,4 @@ def _changed(old: Any, new: Any, prefix: str = "") -> list[str]:
     """Which settings differ, as ``name=old``."""
     if isinstance(old, dict) and isinstance(new, dict):
         return [d for k in {**old, **new} for d in _changed(old.get(k), new.get(k), f"{prefix}{k}.")]
-    return [] if old == new else [f"{prefix.rstrip('.')}={old}"]
+    return [] if old == new else [f"{short(prefix.rstrip('.'))}={quoted(old)}"]

@@ -50,7 +50,10 @@ def family(
     for fixture in fixtures if robot.free_base else FIXTURES[:1]:
         for kind in kinds:
             if kind == "rest":
-                found.append(Excitation(kind, limits.seconds, limits.amplitude, 0, fixture))
+                still = Excitation(kind, limits.seconds, limits.amplitude, 0, fixture)
+                # To come to rest in the middle may be too fast a way for a robot that stands elsewhere.
+                if fastest(robot, still) <= limits.speed * (1 + 1e-9):
+                    found.append(still)
                 continue
             for k in range(draws):
                 wanted = Excitation(kind, limits.seconds, limits.amplitude, seed * draws + k, fixture)

@@ -13,10 +13,12 @@ from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Sensor
 from ee_dist.trials.log import SensorLog
+from ee_dist.trials.noise import with_noise
 
 every_way = pytest.mark.parametrize(("name", "way"), CASES, ids=[f"{n}-{w}" for n, w in CASES])
 
@@ -232,3 +234,12 @@ def test_what_was_not_measured_is_asked_for_in_one_line() -> None:
         problem_by("force_balance", still, robot)
     with pytest.raises(MeasurementError, match="of another robot"):
         problem_by("free_run", trials, samples()["arm"].robot, evaluator_for(robot))
+
+
+def test_noise_of_the_sensors_is_in_the_measurements_and_not_in_what_a_free_run_predicts() -> None:
+    """A draw of it would count against the true model as much as noise of the readings does."""
+    name = next(n for n, way in CASES if way == "free_run")
+    p = problem(name, "free_run")
+    assert isinstance(p, FreeRun)
+    noisy, quiet = (FreeRun(p.measured, with_noise(p.robot, n), p.evaluator) for n in (0.02, 0.0))
+    assert np.array_equal(noisy.residuals([()]), quiet.residuals([()]))

@@ -124,3 +124,13 @@ def test_a_robot_that_commands_cannot_drive_has_no_plan() -> None:
     assert driven(robot) and not driven(loose)
     with pytest.raises(ConfigError, match="no drive that obeys commands"):
         motions(loose, Options(), 0)
+
+
+def test_a_rest_that_is_too_fast_to_come_to_is_no_trial() -> None:
+    """A robot that stands elsewhere than in the middle of its range is led there before it rests."""
+    stage = linear_stage()
+    aside = replace(stage, joints=tuple(replace(j, start=0.8 * j.upper) for j in stage.joints))
+    slow = Limits(2.0, 0.3, speed=0.01)
+    assert any(e.kind == "rest" for e in family(stage, slow))
+    assert not any(e.kind == "rest" for e in family(aside, slow))
+    assert any(e.kind == "rest" for e in family(aside, replace(slow, speed=1e3)))

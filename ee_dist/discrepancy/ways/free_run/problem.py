@@ -84,7 +84,8 @@ class FreeRun(Problem):
         if not columns:
             raise MeasurementError(f"{robot.name}: no sensor of kind 'position', which a free run is compared by")
         self.columns = tuple(columns)
-        self.setups = [apply(robot, t.setup) for t in trials]
+        # What is predicted is the motion: noise of its sensors would count against every model.
+        self.setups = [noiseless(apply(robot, t.setup)) for t in trials]
         self.pieces = [p for k, t in enumerate(trials) for p in _pieces(k, t, robot, windows_s, every)]
         self.noise = max(float(np.mean([_noise(p, columns) for p in self.pieces])), 1e-9)
         self._lay_out(BLOCKS if windows_s is None else 1)
@@ -206,6 +207,10 @@ class FreeRun(Problem):
         """(trials,) mean absolute position error of each trial, rad or m."""
         off = np.abs(self.raw(self.residuals([hypothesis])[0]))
         return np.bincount(self.trial_of, weights=off) / np.bincount(self.trial_of)
+
+
+def noiseless(robot: Robot) -> Robot:
+    return replace(robot, sensors=tuple(replace(s, noise=0.0) for s in robot.sensors))
 
 
 @dataclass(frozen=True, eq=False)
