@@ -88,7 +88,8 @@ def hardware_of(config: Config, robot: System) -> SteppedRobot | None:
     return SteppedRobot(SocketBody(own.address, own.timeout_s, own.begin_s), robot, own.limits())
 
 
-_kept: dict[object, Evaluator] = {}
+_kept: dict[tuple[object, str], Evaluator] = {}
+"""By settings and engine."""
 
 
 def evaluator_name(config: Config) -> str:
@@ -120,10 +121,12 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
         settings.cache,
         settings.recent,
         config.ray.address,
-        engine_maker(config, True, engine),
+        engine_maker(config, True),
     )
-    if key not in _kept:
+    if any(settled != key for settled, _ in _kept):
         close_evaluators()
+    # A run may ask for several engines: a plan for the usual one while its problem goes on being simulated by that of one joint.
+    if (key, engine) not in _kept:
         inner: Evaluator
         chunk = LARGE if engine == ONE_JOINT else 256
         if name == "serial":
@@ -131,8 +134,8 @@ def evaluator_of(config: Config, engine: str = "") -> Evaluator:
         else:
             inner = RayApart(engine_maker(config, False, engine), settings.workers, settings.chunk, config.ray.address)
         inner = JournaledEvaluator(RecentEvaluator(inner) if settings.recent else inner)
-        _kept[key] = CachedEvaluator(inner) if settings.cache else inner
-    evaluator = _kept[key]
+        _kept[key, engine] = CachedEvaluator(inner) if settings.cache else inner
+    evaluator = _kept[key, engine]
     evaluator.counts.reset()
     note_in(evaluator)
     return evaluator

@@ -46,3 +46,19 @@ def test_a_comparison_does_without_ray_unless_it_is_asked_for():
         (Config(ray=RayConfig("127.0.0.1:6379")), "ray"),
     ):
         assert wiring.evaluator_name(wiring.for_few(config)) == expected
+
+
+def test_a_second_engine_of_the_same_settings_leaves_the_first_at_work(monkeypatch):
+    """explain plans a trial by the usual engine, and its report asks the problem's own once more."""
+    wiring.close_evaluators()
+    config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
+    first = wiring.evaluator_of(config, wiring.ONE_JOINT)
+    ended = []
+    monkeypatch.setattr(type(first), "close", lambda self: ended.append(self))
+    second = wiring.evaluator_of(config)
+    assert second is not first and not ended
+    assert wiring.evaluator_of(config, wiring.ONE_JOINT) is first
+    wiring.evaluator_of(Config(engine=EngineConfig("mujoco", 2), evaluator=EvaluatorConfig("serial")))
+    assert set(map(id, ended)) == {id(first), id(second)}
+    monkeypatch.undo()
+    wiring.close_evaluators()
