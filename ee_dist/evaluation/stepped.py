@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.basics.uncut import keeping
-from ee_dist.engines.drivers import Controllers, scaling
+from ee_dist.engines.drivers import Controllers, command_scaling
 from ee_dist.robots.model import Robot
 from ee_dist.trials.hardware import Body, HardwareError, Limiter, Limits, Reading
 from ee_dist.trials.log import Array, LogError, SensorLog
@@ -19,11 +19,12 @@ class SteppedRobot:
     """Implements ``ee_dist.trials.hardware.Hardware``. ``robot`` names its channels and drives, and bounds its joints.
 
     ``aborted`` is the log of a trial that did not reach its end, whatever ended it; ``made`` that of the last one that did, for
-    whoever was interrupted before it was handed over.
+    whoever was interrupted before it was handed over. Raises HardwareError for limits that the robot cannot keep.
     """
 
     def __init__(self, body: Body, robot: Robot, limits: Limits) -> None:
         self.body, self.robot, self.limits = body, robot, limits
+        Limiter(robot, limits)  # What it refuses must be said before hours of search, not after.
         self.trials = 0
         self.aborted: SensorLog | None = None
         self.made: SensorLog | None = None
@@ -40,7 +41,7 @@ class SteppedRobot:
 
     def trial(self, driver: Any, steps: int) -> SensorLog:
         robot, limiter = self.robot, Limiter(self.robot, self.limits)
-        controllers = Controllers([robot], [driver], [scaling(robot)], steps)
+        controllers = Controllers([robot], [driver], [command_scaling(robot)], steps)
         sensors: list[Array] = []
         commands: list[Array] = []
         self.aborted = self.made = None

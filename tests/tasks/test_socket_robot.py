@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ee_dist.engines.drivers import Commands
+from ee_dist.engines.drivers import Commands, Network, weight_count
 from ee_dist.evaluation.socket_body import SocketBody
 from ee_dist.evaluation.stepped import SteppedRobot
 from ee_dist.recording.reader import read_logs
+from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.trials.hardware import HardwareError, Limiter, Limits, Reading
 
@@ -159,6 +160,56 @@ def test_no_command_leaves_that_is_outside_of_the_limits():
     free = Dummy()
     SteppedRobot(free, robot, Limits()).trial(Commands(within), 60)
     assert np.array(free.sent).tobytes() == within.tobytes(), "what is allowed is sent as it is"
+
+
+def test_a_command_brakes_before_the_end_of_the_range():
+    robot, most = quadruped(), 50.0
+    limiter = Limiter(robot, Limits(speed=5.0, acceleration=most))
+    asked = np.concatenate([np.full((60, 8), 9.0), np.full((90, 8), -9.0)])
+    sent = np.array([np.zeros(8), np.zeros(8), *[limiter(a) for a in asked]])
+    speed = np.diff(sent, axis=0) / robot.time_step_s
+    assert np.abs(np.diff(speed, axis=0)).max() <= most * robot.time_step_s * (1 + 1e-6)
+    upper = robot.joint(robot.drives[0].joint).upper
+    assert sent[:, 0].max() == pytest.approx(upper) and sent[:, 0].min() < 0, "it does not come to the end at all"
+
+
+def standing(start: float, lower: float, upper: float, **drive: object) -> Robot:
+    robot = quadruped()
+    for name in robot.motor_names:
+        robot = robot.with_joint(name, start=start, lower=lower, upper=upper).with_drive(name, **drive)
+    return robot
+
+
+def test_the_first_command_begins_where_the_robot_stands():
+    limiter = Limiter(standing(1.5, -2.0, 2.0), Limits(speed=1.0))
+    assert limiter(np.full(8, 1.5)).tolist() == [1.5] * 8
+    outside = standing(0.0, 0.0, 2.0)
+    with pytest.raises(HardwareError, match=r"range_share=0\.5: .* starts at 0, outside of 0\.5 to 1\.5") as caught:
+        SteppedRobot(Dummy(), outside, Limits(range_share=0.5))
+    assert "\n" not in str(caught.value)
+
+
+def test_drives_that_obey_torques_or_speeds_are_limited_in_their_own_units():
+    torque = standing(0.0, -0.5, 0.5, command="torque", torque_limit=8.0)
+    assert Limiter(torque, Limits())(np.full(8, 6.0)).tolist() == [6.0] * 8
+    assert Limiter(torque, Limits(torque=3.0))(np.full(8, -6.0)).tolist() == [-3.0] * 8
+    with pytest.raises(HardwareError, match=r"hardware\.speed=1: .* obeys torques"):
+        Limiter(torque, Limits(speed=1.0))
+    speed = standing(0.0, -0.5, 0.5, command="speed", speed_limit=8.0)
+    limiter = Limiter(speed, Limits(speed=2.0, acceleration=100.0))
+    assert limiter(np.full(8, 6.0)) == pytest.approx(np.full(8, 100.0 * speed.time_step_s))
+    assert np.max([limiter(np.full(8, 6.0)) for _ in range(9)]) == 2.0
+    body = Dummy()
+    count = weight_count(len(torque.sensors), 8)
+    SteppedRobot(body, torque, Limits()).trial(Network((0.0,) * (count - 1) + (1.0,)), 3)
+    assert body.sent[-1][-1] == 8.0, "a network's 1 is the largest torque, as in the engines"
+
+
+def test_what_limits_make_no_number_is_never_sent():
+    limiter = Limiter(quadruped(), Limits())
+    limiter.low = np.full(8, np.nan)
+    with pytest.raises(HardwareError, match="not 8 numbers"):
+        limiter(np.zeros(8))
 
 
 def test_what_ends_a_trial_stops_the_body_and_keeps_what_was_measured():
