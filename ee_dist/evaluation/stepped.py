@@ -13,6 +13,7 @@ from ee_dist.trials.hardware import Body, HardwareError, Limiter, Limits, Readin
 from ee_dist.trials.log import Array, LogError, SensorLog
 
 _REST = ("base_pose", "joints", "torques", "supply_v")
+_TRAVEL = "travel_m"
 
 
 class SteppedRobot:
@@ -91,9 +92,16 @@ class SteppedRobot:
     def _rest(self, reading: Reading) -> dict[str, Any]:
         if reading.rest is None:
             raise HardwareError("it did not say that the trial is over")
-        return {k: np.asarray(v, dtype=float) for k, v in reading.rest.items() if k in _REST and v is not None} | {
-            "travel_m": float(reading.rest.get("travel_m", float("nan")))
-        }
+        name, found = "", {}
+        try:
+            for name in (*_REST, _TRAVEL):
+                value = reading.rest.get(name)
+                if value is not None:
+                    found[name] = float(value) if name == _TRAVEL else np.asarray(value, dtype=float)
+        except (TypeError, ValueError, OverflowError) as error:
+            said = " ".join(str(error).split())[:200]
+            raise HardwareError(f"at the end it answered {name} that cannot be read as numbers ({said})") from None
+        return found
 
     def _log(self, sensors: list[Array], commands: list[Array], rest: dict[str, Any]) -> SensorLog:
         robot = self.robot

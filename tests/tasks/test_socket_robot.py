@@ -119,8 +119,9 @@ def test_trials_of_it_with_the_plug_pulled_and_a_resume_are_recorded_as_the_undi
 class Dummy:
     """A body that answers what it is told to."""
 
-    def __init__(self, torque: float = 0.0, sensors: int = 8, fail_at: int = 10**9) -> None:
+    def __init__(self, torque: float = 0.0, sensors: int = 8, fail_at: int = 10**9, **rest: object) -> None:
         self.torque, self.sensors, self.fail_at = torque, sensors, fail_at
+        self.rest = {"travel_m": 1.0, **rest}
         self.sent: list[np.ndarray] = []
         self.stopped, self.steps = 0, 0
 
@@ -133,9 +134,7 @@ class Dummy:
         if len(self.sent) == self.fail_at:
             raise KeyboardInterrupt
         over = len(self.sent) == self.steps
-        return Reading(
-            np.zeros(self.sensors), np.full(8, self.torque * len(self.sent)), {"travel_m": 1.0} if over else None
-        )
+        return Reading(np.zeros(self.sensors), np.full(8, self.torque * len(self.sent)), self.rest if over else None)
 
     def abort(self) -> None:
         self.stopped += 1
@@ -230,6 +229,23 @@ def test_what_ends_a_trial_stops_the_body_and_keeps_what_was_measured():
         SteppedRobot(Dummy(sensors=3), robot, Limits()).trial(drive, 40)
     with pytest.raises(HardwareError, match="not 8 numbers"):
         Limiter(robot, Limits())(np.full(8, np.nan))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("travel_m", "far"), ("travel_m", [1.0]), ("joints", [[0.0], [0.0, 1.0]]), ("supply_v", {"a": 1})],
+)
+def test_an_end_that_cannot_be_read_is_one_line_and_the_log_is_kept(name, value):
+    robot, drive = quadruped(), Commands(np.zeros((20, 8)))
+    with pytest.raises(HardwareError, match=f"trial 1, step 20 of 20: at the end it answered {name}") as caught:
+        SteppedRobot(Dummy(**{name: value}), robot, Limits()).trial(drive, 20)
+    assert "\n" not in str(caught.value)
+    assert caught.value.log is not None and len(caught.value.log) == 20
+
+
+def test_null_at_the_end_is_as_if_it_were_not_said():
+    log = SteppedRobot(Dummy(travel_m=None, joints=None), quadruped(), Limits()).trial(Commands(np.zeros((20, 8))), 20)
+    assert np.isnan(log.travel_m) and log.joints is None
 
 
 ANSWERS = (b"", b"no json\n", b"[1]\n", b'{"error": "too hot"}\n', b"[" * 9000 + b"\n", b'{"a": 1}\n', None)
