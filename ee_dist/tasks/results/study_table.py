@@ -111,7 +111,7 @@ def _named(rows: Rows) -> int:
 
 def by_case(rows: Rows) -> list[dict[str, Any]]:
     """A line for each scenario and metric. ``test`` is of the last trial against the one after the change, one pair for each
-    seed and engine, corrected for as many cases as the metric has; ``p`` and ``p_corrected`` are its. Of one run there is none."""
+    seed and engine, corrected for as many cases as the metric has; ``p`` and ``p_corrected`` are its. One pair has none."""
     groups: dict[tuple[str, Any], list[Row]] = defaultdict(list)
     for r in rows:
         groups[r["metric"], r["scenario"]].append(r)
