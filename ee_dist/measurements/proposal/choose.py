@@ -50,6 +50,11 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     add_speeds(v)
     add_torques(v)
     add_commands(v)
+    if v.hints.gains is not None and not v.gained:
+        v.out.notes.append(
+            "task.gains: applied to nothing, as no columns can be told to be the motors' currents; write them into the mapping "
+            "as torques, with the gain as their scale"
+        )
     add_rest(v)
     add_switches(v)
     _ask_the_rest(v)

@@ -36,7 +36,7 @@ class Scored:
 
 class View:
     """One proposal in the making. ``position`` and ``units`` are the block of the positions and its units, once known;
-    ``needed`` the torques (T, J) that the motion needs and its speeds."""
+    ``needed`` the torques (T, J) that the motion needs and its speeds; ``gained`` the blocks that the gains were applied to."""
 
     position: Scored
     units: UnitChoice
@@ -48,6 +48,7 @@ class View:
         self.times: dict[str, TimeChoice] = {}
         self.blocks: list[Block] = []
         self.needed: tuple[Array, Array] | None = None
+        self.gained: list[str] = []
 
     def gathered(self) -> list[Block]:
         """The blocks of all tables that have a time."""
