@@ -71,7 +71,7 @@ class Options:
 def run(config: Config, options: Options, out: Path) -> None:
     """Write recovery.mcap, recovery.rrd and summary.json into ``out`` and print the result."""
     console, watch = Console(), Stopwatch()
-    own = config.hardware.address
+    own, noise = config.hardware.address, config.noise or 0.0
     if config.scenario is None and not own:
         raise ConfigError(_which(config.system is None))
     scenario = config.scenario or ScenarioConfig(title=f"a robot at {own}, of which nothing is known")
@@ -85,8 +85,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     hardware = engine_maker(config, alone=True)()
     seeds = np.random.SeedSequence(config.seed)
     search_seed, intact_seed, changed_seed = seeds.spawn(3)
-    intact = PhysicalRobot(hardware, robot, (), intact_seed, config.noise)
-    changed = PhysicalRobot(hardware, robot, hidden, changed_seed, config.noise)
+    intact = PhysicalRobot(hardware, robot, (), intact_seed, noise)
+    changed = PhysicalRobot(hardware, robot, hidden, changed_seed, noise)
     body = hardware_of(config, robot)
     first, later = remembered("intact", body or intact, robot), remembered("changed", body or changed, robot)
     metadata = {
@@ -140,7 +140,7 @@ def run(config: Config, options: Options, out: Path) -> None:
             measured.trials[1:],
             yardstick,
             evaluator,
-            config.noise,
+            noise,
             doubt_seed,
         )
         known = {} if truth is None else {"truth": json.dumps([t.as_dict() for t in truth])}
