@@ -29,6 +29,7 @@ from ee_dist.recovery.metrics import RollingMean
 from ee_dist.recovery.observer import Observers
 from ee_dist.recovery.repertoire import Repertoire
 from ee_dist.recovery.subject import Subject
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.compose import config_folder
 from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig, one_of
 from ee_dist.tasks.observers import Beliefs, Measured, Recorder
@@ -79,6 +80,11 @@ def run(config: Config, options: Options, out: Path) -> None:
     truth = scenario.hidden() if config.scenario else None
     hidden = truth or ()
     robot = build_system(config)
+    if own and isinstance(robot, Robot) and not (robot.free_base and robot.world.has_floor):
+        raise ConfigError(
+            f"hardware.address={own}: {robot.name} stands on no floor or on a fixed base, and what is restored here is how far a "
+            "robot goes; what is wrong with this one says task=trial with the same address, and then task=explain"
+        )
     subject = subject_of(robot)
     metric = config.metric.build(subject.function)
     apply(robot, hidden)  # A wrong target must be said before hours of work, not after.

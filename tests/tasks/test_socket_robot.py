@@ -288,3 +288,11 @@ def test_a_wrong_setting_is_one_line(cli, setting, said):
     assert outcome.status == 2
     (line,) = outcome.err.strip().splitlines()
     assert said in line
+
+
+@pytest.mark.parametrize("robot", ["servo_pendulum", "linear_stage"])
+def test_a_robot_that_goes_nowhere_is_refused_before_its_first_trial(cli, robot):
+    outcome = cli("task=recover", f"robot={robot}", "hardware.address=127.0.0.1:1")
+    assert outcome.status == 2
+    (line,) = outcome.err.strip().splitlines()
+    assert "stands on no floor or on a fixed base" in line
