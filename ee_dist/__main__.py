@@ -178,7 +178,9 @@ def _folder(hydra_settings: Any) -> Path:
 def _unwritten(error: OSError) -> str:
     where = shown(Path(error.filename)) if error.filename else "the output folder"
     room = "make room on the disk, or " if error.errno in FULL else ""
-    return f"{where}: {error.strerror or error}; {room}choose a folder with hydra.run.dir=FOLDER"
+    settings: Any = HydraConfig.get() if HydraConfig.initialized() else None
+    key = "hydra.sweep.dir" if settings is not None and settings.mode == RunMode.MULTIRUN else "hydra.run.dir"
+    return f"{where}: {error.strerror or error}; {room}choose a folder with {key}=FOLDER"
 
 
 def main() -> int:

@@ -7,23 +7,25 @@ from typing import Any
 import numpy as np
 
 from ee_dist.basics.uncut import keeping
-from ee_dist.engines.drivers import Controllers, scaling
+from ee_dist.engines.drivers import Controllers, command_scaling
 from ee_dist.robots.model import Robot
 from ee_dist.trials.hardware import Body, HardwareError, Limiter, Limits, Reading
 from ee_dist.trials.log import Array, LogError, SensorLog
 
 _REST = ("base_pose", "joints", "torques", "supply_v")
+_TRAVEL = "travel_m"
 
 
 class SteppedRobot:
     """Implements ``ee_dist.trials.hardware.Hardware``. ``robot`` names its channels and drives, and bounds its joints.
 
     ``aborted`` is the log of a trial that did not reach its end, whatever ended it; ``made`` that of the last one that did, for
-    whoever was interrupted before it was handed over.
+    whoever was interrupted before it was handed over. Raises HardwareError for limits that the robot cannot keep.
     """
 
     def __init__(self, body: Body, robot: Robot, limits: Limits) -> None:
         self.body, self.robot, self.limits = body, robot, limits
+        Limiter(robot, limits)  # What it refuses must be said before hours of search, not after.
         self.trials = 0
         self.aborted: SensorLog | None = None
         self.made: SensorLog | None = None
@@ -40,7 +42,7 @@ class SteppedRobot:
 
     def trial(self, driver: Any, steps: int) -> SensorLog:
         robot, limiter = self.robot, Limiter(self.robot, self.limits)
-        controllers = Controllers([robot], [driver], [scaling(robot)], steps)
+        controllers = Controllers([robot], [driver], [command_scaling(robot)], steps)
         sensors: list[Array] = []
         commands: list[Array] = []
         self.aborted = self.made = None
@@ -90,9 +92,16 @@ class SteppedRobot:
     def _rest(self, reading: Reading) -> dict[str, Any]:
         if reading.rest is None:
             raise HardwareError("it did not say that the trial is over")
-        return {k: np.asarray(v, dtype=float) for k, v in reading.rest.items() if k in _REST and v is not None} | {
-            "travel_m": float(reading.rest.get("travel_m", float("nan")))
-        }
+        name, found = "", {}
+        try:
+            for name in (*_REST, _TRAVEL):
+                value = reading.rest.get(name)
+                if value is not None:
+                    found[name] = float(value) if name == _TRAVEL else np.asarray(value, dtype=float)
+        except (TypeError, ValueError, OverflowError) as error:
+            said = " ".join(str(error).split())[:200]
+            raise HardwareError(f"at the end it answered {name} that cannot be read as numbers ({said})") from None
+        return found
 
     def _log(self, sensors: list[Array], commands: list[Array], rest: dict[str, Any]) -> SensorLog:
         robot = self.robot

@@ -19,7 +19,7 @@ from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.need import beside_need, torques_needed
 from ee_dist.measurements.report import Report
-from ee_dist.measurements.robot_channels import check_names, command_kind, command_units, torque_units
+from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
     command_suspicion,
@@ -255,7 +255,7 @@ class _Import:
         if found is not None:
             return found
         assert torques is not None
-        if all(command_kind(d) == "torque" for d in self.robot.drives):
+        if command_kinds(self.robot) == {"torque"}:
             self.report.done.append(
                 "no commands: the drives obey torques, so the measured ones are taken as what was asked"
             )
@@ -284,8 +284,13 @@ class _Import:
     def _motor_columns(self, columns: Any, units: dict[str, str], what: str) -> Array | None:
         if not columns:
             return None
+        nothing = np.zeros(len(self.at_s))  # what a passive joint is told
         return np.stack(
-            [self._column(columns[m], units[m], f"{what} of {m}", True) for m in self.robot.motor_names], axis=1
+            [
+                self._column(columns[m], units[m], f"{what} of {m}", True) if m in units else nothing
+                for m in self.robot.motor_names
+            ],
+            axis=1,
         )
 
     def _external(self) -> Array | None:

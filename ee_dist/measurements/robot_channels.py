@@ -14,6 +14,11 @@ def command_kind(drive: Drive) -> str:
     return drive.command
 
 
+def command_kinds(robot: Robot) -> set[str]:
+    """What its drives obey; passive joints, which obey nothing, do not count."""
+    return {command_kind(d) for d in robot.drives} - {"none"}
+
+
 def command_units(robot: Robot) -> dict[str, str]:
     """The unit of the command of each driven joint; passive joints have none."""
     return {joint: unit for joint, unit in ranges.command_units(robot).items() if unit is not None}

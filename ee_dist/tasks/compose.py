@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import re
 from pathlib import Path
@@ -57,6 +58,8 @@ USED_BY = {
     "repair": (("recover",), ""),
 }
 """Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
+LONGEST_NAME = 200
+"""Characters of the folder name of a job of a sweep; file systems take 255 bytes."""
 _OPENS = re.compile(r"^\+{0,2}(measured|log)=(?!null$)")
 _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}
 """Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
@@ -157,8 +160,13 @@ def check_used(overrides: list[str], task: str) -> None:
 
 
 def folder_name(overrides: str) -> str:
-    """A job's overrides as the name of its folder, without signs that mean something to a shell."""
-    return re.sub(r"[^A-Za-z0-9._=-]+", "_", overrides.replace("'", "").replace("+", "")).strip("_")
+    """A job's overrides as the name of its folder, without signs that mean something to a shell. Of a longer name than file
+    systems take the end is a digest of all."""
+    name = re.sub(r"[^A-Za-z0-9._=-]+", "_", overrides.replace("'", "").replace("+", "")).strip("_")
+    if len(name) <= LONGEST_NAME:
+        return name
+    digest = hashlib.sha256(overrides.encode()).hexdigest()[:16]
+    return f"{name[: LONGEST_NAME - len(digest) - 1]}_{digest}"
 
 
 OmegaConf.register_new_resolver("folder_name", folder_name, replace=True)

@@ -256,7 +256,8 @@ class Config:
     """Everything but the options of the chosen task, which are the task's own dataclass."""
 
     seed: int = 0
-    noise: float = 0.0
+    noise: float | None = None
+    """None: of task=trial its own, elsewhere none."""
     plugins: list[str] = field(default_factory=list)
     measured: Any = None
     model: str | None = None
@@ -291,7 +292,7 @@ class Config:
             raise ConfigError(
                 f"metric.header={self.metric.header}: longer than a trial; must be at most budget.steps ({self.budget.steps})"
             )
-        if not 0.0 <= self.noise <= 1.0:
+        if self.noise is not None and not 0.0 <= self.noise <= 1.0:
             raise ConfigError(f"noise={self.noise}: must be a share of the channels' range, from 0 to 1")
 
 

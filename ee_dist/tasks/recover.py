@@ -29,6 +29,7 @@ from ee_dist.recovery.metrics import RollingMean
 from ee_dist.recovery.observer import Observers
 from ee_dist.recovery.repertoire import Repertoire
 from ee_dist.recovery.subject import Subject
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.compose import config_folder
 from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig, one_of
 from ee_dist.tasks.observers import Beliefs, Measured, Recorder
@@ -71,7 +72,7 @@ class Options:
 def run(config: Config, options: Options, out: Path) -> None:
     """Write recovery.mcap, recovery.rrd and summary.json into ``out`` and print the result."""
     console, watch = Console(), Stopwatch()
-    own = config.hardware.address
+    own, noise = config.hardware.address, config.noise or 0.0
     if config.scenario is None and not own:
         raise ConfigError(_which(config.system is None))
     scenario = config.scenario or ScenarioConfig(title=f"a robot at {own}, of which nothing is known")
@@ -79,14 +80,19 @@ def run(config: Config, options: Options, out: Path) -> None:
     truth = scenario.hidden() if config.scenario else None
     hidden = truth or ()
     robot = build_system(config)
+    if own and isinstance(robot, Robot) and not (robot.free_base and robot.world.has_floor):
+        raise ConfigError(
+            f"hardware.address={own}: {robot.name} stands on no floor or on a fixed base, and what is restored here is how far a "
+            "robot goes; what is wrong with this one says task=trial with the same address, and then task=explain"
+        )
     subject = subject_of(robot)
     metric = config.metric.build(subject.function)
     apply(robot, hidden)  # A wrong target must be said before hours of work, not after.
     hardware = engine_maker(config, alone=True)()
     seeds = np.random.SeedSequence(config.seed)
     search_seed, intact_seed, changed_seed = seeds.spawn(3)
-    intact = PhysicalRobot(hardware, robot, (), intact_seed, config.noise)
-    changed = PhysicalRobot(hardware, robot, hidden, changed_seed, config.noise)
+    intact = PhysicalRobot(hardware, robot, (), intact_seed, noise)
+    changed = PhysicalRobot(hardware, robot, hidden, changed_seed, noise)
     body = hardware_of(config, robot)
     first, later = remembered("intact", body or intact, robot), remembered("changed", body or changed, robot)
     metadata = {
@@ -140,7 +146,7 @@ def run(config: Config, options: Options, out: Path) -> None:
             measured.trials[1:],
             yardstick,
             evaluator,
-            config.noise,
+            noise,
             doubt_seed,
         )
         known = {} if truth is None else {"truth": json.dumps([t.as_dict() for t in truth])}

@@ -40,6 +40,10 @@ def config_digest(config: Config, options: Any) -> str:
     assert isinstance(tree, DictConfig)
     for key in ("evaluator", "ray", "plugins"):
         tree.pop(key, None)
+    if tree.noise is None:
+        tree.noise = 0.0
+    elif tree.noise == 0.0 and tree.task.name == "trial":  # where it takes the place of task.noise
+        tree.noise = "none"
     if tree.hardware.address is None:
         tree.pop("hardware")
     for key in ("address", "timeout_s", "begin_s", "torque"):  # these end a trial or not, and alter none

@@ -69,7 +69,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     described = build_robot(config)
     if options.motor_torque:
         described = with_motor_torques(described)
-    robot = with_noise(described, config.noise or options.noise)
+    noise = options.noise if config.noise is None else config.noise
+    robot = with_noise(described, noise)
     if not robot.drives:
         raise ConfigError(
             f"robot: {robot.name} has no drives, so nothing moves it; name them with robot.drives=FILE.yaml, which "
@@ -89,7 +90,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "task": "trial",
         "version": package_version(),
         "engine": config.engine.name,
-        "noise": str(config.noise or options.noise),
+        "noise": str(noise),
         **({} if body is not None else {"seal": digest}),
         "trials": json.dumps([e.as_dict() for e in plan * options.repeats]),
     }
@@ -117,10 +118,10 @@ def run(config: Config, options: Options, out: Path) -> None:
     engine.close()
     console.print(table)
     if body is None:
-        told = f"Noise: {config.noise or options.noise:.1%} of each channel's range. Seal {digest[:16]}."
+        told = f"Noise: {noise:.1%} of each channel's range. Seal {digest[:16]}."
         console.print(told, highlight=False)
     write_summary(out, "trial", config, options, watch, sums.hexdigest(), {
-        "trials": [e.as_dict() for e in plan * options.repeats], "noise": config.noise or options.noise,
+        "trials": [e.as_dict() for e in plan * options.repeats], "noise": noise,
         "seal": None if body else digest,
         "log": str(path), "channels": [{"name": s.name, "unit": s.unit} for s in robot.sensors],
     })  # fmt: skip

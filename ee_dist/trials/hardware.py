@@ -12,8 +12,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Drive, Robot
+from ee_dist.robots.ranges import command_span
 from ee_dist.trials.log import Array, SensorLog
+
+NEAR = 1e-9
+"""How far a start may lie outside of what may be commanded, by rounding; rad (m)."""
 
 
 class HardwareError(RuntimeError):
@@ -53,7 +57,7 @@ class Body(Protocol):
         ...
 
     def step(self, commands: Array) -> Reading:
-        """Obey commanded positions (M,) for one step, then read."""
+        """Obey commands (M,), in the units of the drives, for one step, then read."""
         ...
 
     def abort(self) -> None:
@@ -65,8 +69,8 @@ class Body(Protocol):
 class Limits:
     """What may be asked of a body: share of each joint's range, speed (rad/s), change of speed (rad/s^2), for slides in m.
 
-    ``torque`` (N.m) cannot be commanded away where positions are commanded: a trial in which it is measured beyond is
-    aborted.
+    Of drives that obey speeds or torques it is the share of the speed or torque that they can be told. ``torque`` (N.m) cannot
+    be commanded away where positions are commanded: a trial in which it is measured beyond is aborted.
     """
 
     range_share: float = 1.0
@@ -83,31 +87,75 @@ class Limits:
 
 
 class Limiter:
-    """Commands of one trial, brought within the limits before they are sent. What is no number is never sent."""
+    """Commands of one trial, brought within the limits before they are sent. What is no number is never sent.
+
+    A drive that obeys speeds or torques has the limits of these in place of its joint's range. Raises HardwareError where the
+    robot's start is outside of what may be commanded, and for a limit that no command can keep.
+    """
 
     def __init__(self, robot: Robot, limits: Limits) -> None:
-        joints = [robot.joint(d.joint) for d in robot.drives]
-        middle = np.array([(j.lower + j.upper) / 2 for j in joints])
-        half = np.array([(j.upper - j.lower) / 2 for j in joints])
-        self.limits, self.step_s = limits, robot.time_step_s
-        self.low, self.high = middle - half * limits.range_share, middle + half * limits.range_share
-        if limits.range_share == 1.0:
-            # The joints' own numbers, not their middle plus half of their distance: those differ in the last bit.
-            self.low, self.high = np.array([j.lower for j in joints]), np.array([j.upper for j in joints])
-        # The start pose is the zero of all joints.
-        self.last, self.moved = np.zeros(len(joints)), np.zeros(len(joints))
+        self.limits = limits
+        kinds = [d.command for d in robot.drives]
+        bounds = np.array([_bounds(robot, d, limits) for d in robot.drives]).reshape(-1, 2)
+        self.low, self.high = bounds[:, 0], bounds[:, 1]
+        step_s = robot.time_step_s
+        per_step = {"position": limits.speed * step_s, "speed": limits.acceleration * step_s}
+        self.most = np.array([per_step.get(k, math.inf) for k in kinds])
+        self.change = np.array([limits.acceleration * step_s**2 if k == "position" else math.inf for k in kinds])
+        self.last = np.array([robot.joint(d.joint).start if d.command == "position" else 0.0 for d in robot.drives])
+        self.moved = np.zeros(len(kinds))
+        for drive, start, low, high in zip(robot.drives, self.last, self.low, self.high, strict=True):
+            if not low - NEAR <= start <= high + NEAR:
+                raise HardwareError(
+                    f"hardware.range_share={limits.range_share:g}: {drive.joint} starts at {start:.4g}, outside of {low:.4g} to "
+                    f"{high:.4g} that may be commanded: its first command would be a jump"
+                )
 
     def __call__(self, wanted: Array) -> Array:
         """The commands (M,) that may be sent. Raises HardwareError for one that is no number."""
         if wanted.shape != self.last.shape or not np.isfinite(wanted).all():
             raise HardwareError(f"a controller asked for {np.asarray(wanted).tolist()}: not {len(self.last)} numbers")
         allowed = np.clip(wanted, self.low, self.high)
-        most = self.limits.speed * self.step_s
-        if math.isfinite(most):
-            allowed = np.clip(allowed, self.last - most, self.last + most)
-        change = self.limits.acceleration * self.step_s**2
-        if math.isfinite(change):
-            moved = np.clip(allowed - self.last, self.moved - change, self.moved + change)
-            allowed = np.clip(self.last + moved, self.low, self.high)
+        allowed = np.clip(allowed, self.last - self.most, self.last + self.most)
+        held = np.isfinite(self.change)
+        if held.any():
+            up, down = _stopping(self.high - self.last, self.change), _stopping(self.last - self.low, self.change)
+            moved = np.clip(allowed - self.last, -down, up)
+            moved = np.clip(moved, self.moved - self.change, self.moved + self.change)
+            allowed = np.where(held, np.clip(self.last + moved, self.low, self.high), allowed)
+        if not np.isfinite(allowed).all():
+            raise HardwareError(
+                f"the limits leave {allowed.tolist()} of what was asked for: not {len(self.last)} numbers"
+            )
         self.moved, self.last = allowed - self.last, allowed
         return allowed
+
+
+def _bounds(robot: Robot, drive: Drive, limits: Limits) -> tuple[float, float]:
+    """(lowest, highest) command of a drive, in its own unit. Raises HardwareError for a limit that no command can keep."""
+    joint = robot.joint(drive.joint)
+    if drive.command == "position" and math.isfinite(joint.upper - joint.lower):
+        low, high = joint.lower, joint.upper
+    else:
+        low, high = command_span(robot, drive)
+    if limits.range_share != 1.0:
+        # Else the joint's own numbers, not their middle plus half of their distance: those differ in the last bit.
+        middle, half = (low + high) / 2, (high - low) / 2
+        low, high = middle - half * limits.range_share, middle + half * limits.range_share
+    if drive.command == "torque":
+        for name in ("speed", "acceleration"):
+            if math.isfinite(getattr(limits, name)):
+                raise HardwareError(
+                    f"hardware.{name}={getattr(limits, name):g}: {drive.joint} obeys torques, and no torque keeps to it; "
+                    "leave it to the robot, and limit hardware.torque"
+                )
+    most = {"speed": limits.speed, "torque": limits.torque}.get(drive.command, math.inf)
+    return max(low, -most), min(high, most)
+
+
+def _stopping(way: Array, change: Array) -> Array:
+    """The longest step from which one can still come to rest within ``way``, each step shorter by ``change`` at most: in
+    steps what the speed sqrt(2 a way) is in time."""
+    way = np.maximum(way, 0.0)
+    n = np.floor((np.sqrt(1 + 8 * way / change) - 1) / 2)
+    return (way + np.where(n > 0, change, 0.0) * n * (n + 1) / 2) / (n + 1)

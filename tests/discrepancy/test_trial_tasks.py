@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +11,12 @@ import pytest
 
 from ee_dist.effects.catalogue import EffectError, term
 from ee_dist.robots.quadruped_lab import quadruped_lab
-from ee_dist.tasks.config import ConfigError
+from ee_dist.tasks import recover
+from ee_dist.tasks.config import Config, ConfigError, EngineConfig, RobotConfig
 from ee_dist.tasks.measurements import checked, files_of
 from ee_dist.tasks.seal import FILE, opened, sealed
-from ee_dist.tasks.trial import hypothesis
+from ee_dist.tasks.summary import config_digest
+from ee_dist.tasks.trial import Options, hypothesis, run
 from ee_dist.trials.log import LogError, SensorLog
 
 ROBOT = quadruped_lab()
@@ -109,3 +112,20 @@ def test_files_are_found_or_told(tmp_path: Path) -> None:
     assert files_of(str(tmp_path)) == [tmp_path / "trial.mcap"]
     with pytest.raises(ConfigError, match=r"did you mean trial\.mcap"):
         files_of(str(tmp_path / "trail.mcap"))
+
+
+def test_noise_of_none_is_none(tmp_path: Path) -> None:
+    """noise=0 is what was asked for; where nothing was, task.noise counts."""
+    found = {}
+    for name, noise in (("asked", 0.0), ("silent", None)):
+        config = Config(robot=RobotConfig(name="servo_pendulum"), engine=EngineConfig(name="mujoco"), noise=noise)
+        (tmp_path / name).mkdir()
+        run(config, Options(excitations=["sway:seconds=0.5"], repeats=1), tmp_path / name)
+        found[name] = json.loads((tmp_path / name / "summary.json").read_text())
+    assert (found["asked"]["noise"], found["silent"]["noise"]) == (0.0, 0.02)
+    assert found["asked"]["result_digest"] != found["silent"]["result_digest"]
+    assert found["asked"]["config_digest"] != found["silent"]["config_digest"]
+
+
+def test_a_run_without_noise_has_the_digest_it_always_had() -> None:
+    assert config_digest(Config(), recover.Options()) == config_digest(Config(noise=0.0), recover.Options())

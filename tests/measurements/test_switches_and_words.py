@@ -7,9 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import small_logs as logs
-from measurement_files import motion
+from measurement_files import STEP_S, motion, robot_file
 
+from ee_dist.measurements.need import torques_needed
+from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.model import Hints
 from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, read_name
+from ee_dist.robots.describe import load_robot
 
 
 @pytest.mark.parametrize(
@@ -53,3 +57,36 @@ def test_current_positions_are_positions(tmp_path: Path) -> None:
     frame = logs.frame_of(m["t"], m["q"], m["g"], "{what}_position_{joint}", what=("current", "target"))
     log, _ = logs.imported(tmp_path, logs.written(tmp_path, frame))
     assert np.allclose(log.sensors[:, :2], m["q"])
+
+
+@pytest.mark.parametrize(
+    ("name", "command", "unit"),
+    [("i1_A", None, "A"), ("i_ref1_A", True, "A"), ("i_2_A", None, "A"), ("i_a", None, None)],
+)
+def test_an_i_with_amperes_is_a_current(name: str, command: bool | None, unit: str | None) -> None:
+    found = read_name(name)
+    assert (found.kind, found.command, found.unit) == (CURRENT, command, unit)
+    assert found.weak == (unit is None)
+
+
+def test_currents_that_were_measured_are_taken_not_those_that_were_asked_for(tmp_path: Path) -> None:
+    m = motion()
+    robot, _ = load_robot(robot_file(tmp_path))
+    frame = logs.frame_of(m["t"], m["q"], m["g"])
+    needed = torques_needed(robot, m["q"], STEP_S)
+    assert needed is not None
+    noise = np.random.default_rng(0).normal(scale=0.01, size=m["q"].shape)
+    for k in range(2):
+        frame[f"i_ref{k + 1}_A"] = needed[0][:, k] / 0.2
+        frame[f"i{k + 1}_A"] = needed[0][:, k] / 0.2 + noise[:, k]
+    proposal = proposal_for([logs.written(tmp_path, frame)], robot, Hints(gains=[0.2, 0.2]))
+    assert [c.column for c in proposal.choices if c.group == "torques"] == ["i1_A", "i2_A"]
+    assert not any("applied to nothing" in n for n in proposal.notes)
+
+
+def test_gains_that_are_applied_to_nothing_are_told(tmp_path: Path) -> None:
+    m = motion()
+    robot, _ = load_robot(robot_file(tmp_path))
+    file = logs.written(tmp_path, logs.frame_of(m["t"], m["q"], m["g"]))
+    proposal = proposal_for([file], robot, Hints(gains=[0.2, 0.2]))
+    assert [n for n in proposal.notes if "task.gains: applied to nothing" in n]

@@ -15,6 +15,7 @@ import pytest
 
 from ee_dist.evaluation.journal import Journal
 from ee_dist.recording.reader import read_run
+from ee_dist.tasks.compose import LONGEST_NAME, folder_name
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.folder import LOCK, claimed, free_name, missing
 from ee_dist.tasks.wiring import close_evaluators
@@ -205,3 +206,11 @@ def test_a_read_only_folder_is_one_line(cli, tmp_path):
     assert outcome.status == 2
     (line,) = outcome.err.strip().splitlines()
     assert "choose a folder with hydra.run.dir=FOLDER" in line
+
+
+def test_a_job_of_a_sweep_has_a_name_that_file_systems_take():
+    assert folder_name("+scenario=8,seed=1") == "scenario=8_seed=1"
+    long = ",".join(f"budget.population={k}" for k in range(40))
+    names = {folder_name(f"{long},seed={seed}") for seed in (1, 2)}
+    assert len(names) == 2, "what differs at the end only is not lost"
+    assert all(len(n) == LONGEST_NAME and n.startswith("budget.population=0_") for n in names)

@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ee_dist.engines.drivers import Commands
+from ee_dist.engines.drivers import Commands, Network, weight_count
 from ee_dist.evaluation.socket_body import SocketBody
 from ee_dist.evaluation.stepped import SteppedRobot
 from ee_dist.recording.reader import read_logs
+from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.trials.hardware import HardwareError, Limiter, Limits, Reading
 
@@ -118,8 +119,9 @@ def test_trials_of_it_with_the_plug_pulled_and_a_resume_are_recorded_as_the_undi
 class Dummy:
     """A body that answers what it is told to."""
 
-    def __init__(self, torque: float = 0.0, sensors: int = 8, fail_at: int = 10**9) -> None:
+    def __init__(self, torque: float = 0.0, sensors: int = 8, fail_at: int = 10**9, **rest: object) -> None:
         self.torque, self.sensors, self.fail_at = torque, sensors, fail_at
+        self.rest = {"travel_m": 1.0, **rest}
         self.sent: list[np.ndarray] = []
         self.stopped, self.steps = 0, 0
 
@@ -132,9 +134,7 @@ class Dummy:
         if len(self.sent) == self.fail_at:
             raise KeyboardInterrupt
         over = len(self.sent) == self.steps
-        return Reading(
-            np.zeros(self.sensors), np.full(8, self.torque * len(self.sent)), {"travel_m": 1.0} if over else None
-        )
+        return Reading(np.zeros(self.sensors), np.full(8, self.torque * len(self.sent)), self.rest if over else None)
 
     def abort(self) -> None:
         self.stopped += 1
@@ -161,6 +161,56 @@ def test_no_command_leaves_that_is_outside_of_the_limits():
     assert np.array(free.sent).tobytes() == within.tobytes(), "what is allowed is sent as it is"
 
 
+def test_a_command_brakes_before_the_end_of_the_range():
+    robot, most = quadruped(), 50.0
+    limiter = Limiter(robot, Limits(speed=5.0, acceleration=most))
+    asked = np.concatenate([np.full((60, 8), 9.0), np.full((90, 8), -9.0)])
+    sent = np.array([np.zeros(8), np.zeros(8), *[limiter(a) for a in asked]])
+    speed = np.diff(sent, axis=0) / robot.time_step_s
+    assert np.abs(np.diff(speed, axis=0)).max() <= most * robot.time_step_s * (1 + 1e-6)
+    upper = robot.joint(robot.drives[0].joint).upper
+    assert sent[:, 0].max() == pytest.approx(upper) and sent[:, 0].min() < 0, "it does not come to the end at all"
+
+
+def standing(start: float, lower: float, upper: float, **drive: object) -> Robot:
+    robot = quadruped()
+    for name in robot.motor_names:
+        robot = robot.with_joint(name, start=start, lower=lower, upper=upper).with_drive(name, **drive)
+    return robot
+
+
+def test_the_first_command_begins_where_the_robot_stands():
+    limiter = Limiter(standing(1.5, -2.0, 2.0), Limits(speed=1.0))
+    assert limiter(np.full(8, 1.5)).tolist() == [1.5] * 8
+    outside = standing(0.0, 0.0, 2.0)
+    with pytest.raises(HardwareError, match=r"range_share=0\.5: .* starts at 0, outside of 0\.5 to 1\.5") as caught:
+        SteppedRobot(Dummy(), outside, Limits(range_share=0.5))
+    assert "\n" not in str(caught.value)
+
+
+def test_drives_that_obey_torques_or_speeds_are_limited_in_their_own_units():
+    torque = standing(0.0, -0.5, 0.5, command="torque", torque_limit=8.0)
+    assert Limiter(torque, Limits())(np.full(8, 6.0)).tolist() == [6.0] * 8
+    assert Limiter(torque, Limits(torque=3.0))(np.full(8, -6.0)).tolist() == [-3.0] * 8
+    with pytest.raises(HardwareError, match=r"hardware\.speed=1: .* obeys torques"):
+        Limiter(torque, Limits(speed=1.0))
+    speed = standing(0.0, -0.5, 0.5, command="speed", speed_limit=8.0)
+    limiter = Limiter(speed, Limits(speed=2.0, acceleration=100.0))
+    assert limiter(np.full(8, 6.0)) == pytest.approx(np.full(8, 100.0 * speed.time_step_s))
+    assert np.max([limiter(np.full(8, 6.0)) for _ in range(9)]) == 2.0
+    body = Dummy()
+    count = weight_count(len(torque.sensors), 8)
+    SteppedRobot(body, torque, Limits()).trial(Network((0.0,) * (count - 1) + (1.0,)), 3)
+    assert body.sent[-1][-1] == 8.0, "a network's 1 is the largest torque, as in the engines"
+
+
+def test_what_limits_make_no_number_is_never_sent():
+    limiter = Limiter(quadruped(), Limits())
+    limiter.low = np.full(8, np.nan)
+    with pytest.raises(HardwareError, match="not 8 numbers"):
+        limiter(np.zeros(8))
+
+
 def test_what_ends_a_trial_stops_the_body_and_keeps_what_was_measured():
     robot, drive = quadruped(), Commands(np.zeros((40, 8)))
     hot = SteppedRobot(Dummy(torque=0.1), robot, Limits(torque=1.05))
@@ -179,6 +229,23 @@ def test_what_ends_a_trial_stops_the_body_and_keeps_what_was_measured():
         SteppedRobot(Dummy(sensors=3), robot, Limits()).trial(drive, 40)
     with pytest.raises(HardwareError, match="not 8 numbers"):
         Limiter(robot, Limits())(np.full(8, np.nan))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("travel_m", "far"), ("travel_m", [1.0]), ("joints", [[0.0], [0.0, 1.0]]), ("supply_v", {"a": 1})],
+)
+def test_an_end_that_cannot_be_read_is_one_line_and_the_log_is_kept(name, value):
+    robot, drive = quadruped(), Commands(np.zeros((20, 8)))
+    with pytest.raises(HardwareError, match=f"trial 1, step 20 of 20: at the end it answered {name}") as caught:
+        SteppedRobot(Dummy(**{name: value}), robot, Limits()).trial(drive, 20)
+    assert "\n" not in str(caught.value)
+    assert caught.value.log is not None and len(caught.value.log) == 20
+
+
+def test_null_at_the_end_is_as_if_it_were_not_said():
+    log = SteppedRobot(Dummy(travel_m=None, joints=None), quadruped(), Limits()).trial(Commands(np.zeros((20, 8))), 20)
+    assert np.isnan(log.travel_m) and log.joints is None
 
 
 ANSWERS = (b"", b"no json\n", b"[1]\n", b'{"error": "too hot"}\n', b"[" * 9000 + b"\n", b'{"a": 1}\n', None)
@@ -221,3 +288,11 @@ def test_a_wrong_setting_is_one_line(cli, setting, said):
     assert outcome.status == 2
     (line,) = outcome.err.strip().splitlines()
     assert said in line
+
+
+@pytest.mark.parametrize("robot", ["servo_pendulum", "linear_stage"])
+def test_a_robot_that_goes_nowhere_is_refused_before_its_first_trial(cli, robot):
+    outcome = cli("task=recover", f"robot={robot}", "hardware.address=127.0.0.1:1")
+    assert outcome.status == 2
+    (line,) = outcome.err.strip().splitlines()
+    assert "stands on no floor or on a fixed base" in line

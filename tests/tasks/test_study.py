@@ -136,6 +136,15 @@ def test_the_test_is_corrected_for_the_number_of_cases():
     assert p_text(single) == "one run: no test"
 
 
+def test_runs_of_one_seed_with_other_settings_are_one_pair():
+    runs = study_of([1], range(4))
+    gain = [s["distance_m"]["trials"][-1] - s["distance_m"]["after"] for s in runs]
+    variants = [{**s, "budget": budget} for s in runs for budget in ("paper", "quick", "small")]
+    (line,) = by_case([row(s) for s in variants])
+    assert (line["runs"], line["test"].n) == (12, 4)
+    assert line["test"].low == pytest.approx(min(gain)) and line["test"].high == pytest.approx(max(gain))
+
+
 def test_no_bar_whisker_or_dot_of_a_figure_is_cut():
     summaries = study_of([1, 2], range(4))
     summaries[0]["distance_m"]["after"] = -0.9

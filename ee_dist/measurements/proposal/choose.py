@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from ee_dist.measurements.errors import MeasurementError, nearest
-from ee_dist.measurements.proposal.blocks import blocks_of, unreadable
+from ee_dist.measurements.proposal.blocks import unreadable
 from ee_dist.measurements.proposal.commands import add_commands
 from ee_dist.measurements.proposal.model import FIT, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.positions import add_positions, ask_for_positions, ranked_positions
@@ -16,6 +16,7 @@ from ee_dist.measurements.proposal.time import time_flaw, time_of
 from ee_dist.measurements.proposal.torques import add_torques
 from ee_dist.measurements.proposal.units import position_units
 from ee_dist.measurements.proposal.view import View
+from ee_dist.measurements.robot_channels import command_units
 from ee_dist.measurements.table import Recorded
 from ee_dist.robots.model import Robot
 
@@ -25,22 +26,19 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     _check_hints(robot, hints)
     v = View(recorded, robot, hints)
     flaws = _add_times(v)
-    known = {n: t.column for n, t in v.times.items() if t.column is not None}
-    known |= {t.name: t.clock for t in v.recorded.tables if t.clock is not None}
     timed = replace(v.recorded, tables=tuple(t for t in v.recorded.tables if t.name in v.times))
     if not timed.tables:
         cure = "mend that row or drop it, or say task.rate_hz=ROWS_A_SECOND"
         v.out.ask(f"{flaws[0]}; {cure}" if flaws else "no column rises like a time; say task.rate_hz=ROWS_A_SECOND")
         return v.out
     flaws += [error for t in timed.tables for error in unreadable(t, v.robot.motor_names)]
-    order = v.hints.joints
-    v.blocks = [v.even(b) for b in blocks_of(timed, v.robot.motor_names, order, known) if len(b.values) > 20]
+    v.blocks = v.gathered()
     position = v.pick(ranked_positions(v))
     if position is None:
         _time_choice(v, timed.tables[0].name)
         ask_for_positions(v)
         v.out.choices += [
-            Choice("commands", m, {"column": "???"}, UNKNOWN, "not looked for yet") for m in robot.motor_names
+            Choice("commands", m, {"column": "???"}, UNKNOWN, "not looked for yet") for m in command_units(robot)
         ]
         _tell_flaws(v, flaws)
         return v.out
@@ -52,6 +50,11 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     add_speeds(v)
     add_torques(v)
     add_commands(v)
+    if v.hints.gains is not None and not v.gained:
+        v.out.notes.append(
+            "task.gains: applied to nothing, as no columns can be told to be the motors' currents; write them into the mapping "
+            "as torques, with the gain as their scale"
+        )
     add_rest(v)
     add_switches(v)
     _ask_the_rest(v)

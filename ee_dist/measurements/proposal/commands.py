@@ -14,7 +14,7 @@ from ee_dist.measurements.proposal.torques import torque_units
 from ee_dist.measurements.proposal.units import LOOSE, UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE
-from ee_dist.measurements.robot_channels import command_kind
+from ee_dist.measurements.robot_channels import command_kinds
 
 CLOSE = 0.9
 """Correlation below which commands are likely at best, whatever they are called."""
@@ -22,11 +22,13 @@ CLOSE = 0.9
 
 def add_commands(v: View) -> None:
     """The commands, or a question; none at all where torques were found, which a balance of forces does without."""
-    kinds = {command_kind(d) for d in v.robot.drives}
+    kinds = command_kinds(v.robot)
+    if not kinds:
+        return
     if len(kinds) > 1:
         v.out.ask("commands: joints differ in what they obey (position, speed, torque); write them into the mapping")
         return
-    kind = kinds.pop()
+    kind, v = kinds.pop(), v.driven()
     score: Callable[[View, Block], Scored | None] = {
         "position": _as_position_command, "speed": _as_speed_command, "torque": _as_torque_command
     }[kind]  # fmt: skip

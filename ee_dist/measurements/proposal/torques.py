@@ -201,6 +201,8 @@ def torque_units(v: View, block: Block) -> UnitChoice:
     gains = _gains(v, relations) if current else []
     if current and not gains:
         return UnitChoice((), UNKNOWN, "a current whose gain cannot be estimated")
+    if current:
+        v.gained.append(block.name)
     entries, turned, unclear, checked = [], [], [], 0
     sizes: dict[int, float] = {}
     for k, unit in enumerate(kinds):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from ee_dist.measurements import signals
 from ee_dist.measurements.alignment import match, one_clock
-from ee_dist.measurements.proposal.blocks import BY_NAME, BY_NUMBER, BY_PLACE, Block, empty_cells
+from ee_dist.measurements.proposal.blocks import BY_NAME, BY_NUMBER, BY_PLACE, Block, blocks_of, empty_cells
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.time import TimeChoice
 from ee_dist.measurements.proposal.units import UnitChoice
@@ -35,7 +36,7 @@ class Scored:
 
 class View:
     """One proposal in the making. ``position`` and ``units`` are the block of the positions and its units, once known;
-    ``needed`` the torques (T, J) that the motion needs and its speeds."""
+    ``needed`` the torques (T, J) that the motion needs and its speeds; ``gained`` the blocks that the gains were applied to."""
 
     position: Scored
     units: UnitChoice
@@ -47,6 +48,42 @@ class View:
         self.times: dict[str, TimeChoice] = {}
         self.blocks: list[Block] = []
         self.needed: tuple[Array, Array] | None = None
+        self.gained: list[str] = []
+
+    def gathered(self) -> list[Block]:
+        """The blocks of all tables that have a time."""
+        timed = replace(self.recorded, tables=tuple(t for t in self.recorded.tables if t.name in self.times))
+        known = {n: t.column for n, t in self.times.items() if t.column is not None}
+        known |= {t.name: t.clock for t in self.recorded.tables if t.clock is not None}
+        found = blocks_of(timed, self.robot.motor_names, self.hints.joints, known)
+        return [self.even(b) for b in found if len(b.values) > 20]
+
+    def driven(self) -> View:
+        """The same without passive joints, which take no commands; its blocks are those not used yet."""
+        places = [k for k, d in enumerate(self.robot.drives) if d.command != "none"]
+        if len(places) == len(self.robot.drives):
+            return self
+        names, order, gains = self.robot.motor_names, self.hints.joints, self.hints.gains
+        kept = [names[k] for k in places]
+        if gains is not None and not isinstance(gains, str):
+            gains = [g for j, g in zip(order or names, gains, strict=True) if j in kept]
+        hints = replace(self.hints, joints=order and [j for j in order if j in kept], gains=gains)
+        found = copy.copy(self)
+        found.robot, found.hints = replace(self.robot, drives=tuple(self.robot.drives[k] for k in places)), hints
+        found.joints = [self.joints[k] for k in places]
+        block = self.position.block
+        part = replace(
+            block, columns=tuple(block.columns[k] for k in places), values=block.values[:, places],
+            units=tuple(block.units[k] for k in places) if block.units else (),
+        )  # fmt: skip
+        found.position = replace(self.position, block=part)
+        if self.units.entries:
+            found.units = replace(self.units, entries=tuple(self.units.entries[k] for k in places))
+        if self.needed is not None:
+            found.needed = (self.needed[0][:, places], self.needed[1][:, places])
+        taken = {(b.table.name, c) for b in self.blocks if b.used for c in b.columns}
+        found.blocks = [b for b in found.gathered() if not taken & {(b.table.name, c) for c in b.columns}]
+        return found
 
     def even(self, block: Block) -> Block:
         """The block on an even grid of its own median step, and no longer than it need be."""

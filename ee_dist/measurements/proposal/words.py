@@ -141,7 +141,7 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     if unit is None and len(texts) > 1 and texts[-1] in _UNIT:
         unit = _UNIT[texts[-1]]
         texts = texts[:-1]
-    elif unit is None and len(texts) > 1 and texts[-1] in _LETTERS and kinds:
+    elif unit is None and len(texts) > 1 and texts[-1] in _LETTERS and (kinds or _amperes(bare, texts)):
         unit = _LETTERS[texts[-1]]
         texts = texts[:-1]
     # A lone d behind a quantity is "desired": q_d, qd_d.
@@ -151,6 +151,11 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     return Reading(
         kind, command, unit, numbers[-1] if numbers else None, " ".join(texts), any(w in _SECOND for w in texts), weak
     )
+
+
+def _amperes(name: str, texts: list[str]) -> bool:
+    """Whether a name is that of a current by an i and a capital A alone: ``i1_A``; i_a is that of a phase."""
+    return name.endswith("A") and texts[-1] == "a" and "i" in texts[:-1]
 
 
 def role_of(name: str) -> bool | None:

@@ -110,8 +110,8 @@ def _named(rows: Rows) -> int:
 
 
 def by_case(rows: Rows) -> list[dict[str, Any]]:
-    """A line for each scenario and metric. ``test`` is of the last trial against the one after the change, one pair a run,
-    corrected for as many cases as the metric has; ``p`` and ``p_corrected`` are its. Of one run there is none."""
+    """A line for each scenario and metric. ``test`` is of the last trial against the one after the change, one pair for each
+    seed and engine, corrected for as many cases as the metric has; ``p`` and ``p_corrected`` are its. One pair has none."""
     groups: dict[tuple[str, Any], list[Row]] = defaultdict(list)
     for r in rows:
         groups[r["metric"], r["scenario"]].append(r)
@@ -129,13 +129,22 @@ def by_case(rows: Rows) -> list[dict[str, Any]]:
             "named": _named(mine),
             "doubts_told": len(told),
             "doubts": sum(r["doubt"] for r in told),
-            "test": paired([r["last_m"] - r["after_m"] for r in mine]),
+            "test": paired(_gains(mine)),
         })  # fmt: skip
     for metric in {x["metric"] for x in lines}:
         own = [x for x in lines if x["metric"] == metric]
         for x, test in zip(own, corrected([x["test"] for x in own]), strict=True):
             x |= {"test": test, "p": test.p, "p_corrected": test.corrected}
     return lines
+
+
+def _gains(rows: Rows) -> list[float]:
+    """What the last trial has over the one after the change, m, by seed and engine: runs that differ in another setting only
+    are no pairs of their own."""
+    found: dict[tuple[Any, ...], list[float]] = defaultdict(list)
+    for r in rows:
+        found[r["seed"], r["engine"]].append(r["last_m"] - r["after_m"])
+    return [float(np.mean(gains)) for gains in found.values()]
 
 
 def against(rows: Rows) -> dict[Any, Paired]:

@@ -1,0 +1,38 @@
+"""Joints that nothing drives have sensors, and no commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import measurement_files as samples
+import numpy as np
+import pytest
+import small_logs as logs
+
+from ee_dist.measurements.importer import import_files
+from ee_dist.measurements.mapping_file import read_mapping
+from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.model import Hints
+from ee_dist.measurements.proposal.write import as_yaml
+from ee_dist.robots.describe import load_robot
+
+
+@pytest.mark.parametrize("driven", samples.JOINTS)
+@pytest.mark.parametrize(("command", "word"), [("kp: 20, speed_limit: 8", "goal"), ("command: torque", "torque_cmd")])
+def test_a_passive_joint_needs_no_command(tmp_path: Path, driven: str, command: str, word: str) -> None:
+    m, k = samples.motion(), samples.JOINTS.index(driven)
+    path = samples.robot_file(tmp_path)
+    rest = {j: f"{j}: {{{command if j == driven else 'command: none'}}}" for j in samples.JOINTS}
+    text = path.read_text().split("drives:")[0]
+    path.write_text(f"{text}drives:\n" + "".join(f"  {line}\n" for line in rest.values()))
+    robot, _ = load_robot(path)
+    frame = logs.frame_of(m["t"], m["q"], m["g"])
+    frame = frame.drop(columns=[c for c in frame if "goal" in c]).assign(**{f"{driven}_{word}": m["g"][:, k]})
+    file = logs.written(tmp_path, frame)
+    proposal = proposal_for([file], robot, Hints())
+    assert not proposal.questions, proposal.questions
+    assert [c.name for c in proposal.choices if c.group == "commands"] == [driven]
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(path), file.name))
+    ((record, _),) = import_files([file], read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert np.allclose(record.log.commands[:, k], m["g"][:, k])
+    assert (record.log.commands[:, 1 - k] == 0.0).all()
