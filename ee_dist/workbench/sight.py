@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, compare, rows_of
-from ee_dist.discrepancy.problem import Problem, Series, error
+from ee_dist.discrepancy.problem import Problem, Series, error, joined
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import Measurements
@@ -83,7 +83,7 @@ class Sight:
     def series(self, terms: Hypothesis, place: Place) -> Series | None:
         """Measured and predicted of one channel of one trial, simulating that trial alone."""
         trial, channel = place
-        found = [s for s in self._of(trial).series(terms) if s.channel == channel]
+        found = [s for s in joined(self._of(trial).series(terms)) if s.channel == channel]
         if not found:
             return None
         return replace(found[0], trial=trial)

@@ -65,7 +65,11 @@ def said(problem: Problem, label: str, terms: Hypothesis) -> drawn.Account:
     series = problem.series(terms)
     logs = []
     for k, (trial, motion) in enumerate(zip(problem.measured, motions, strict=True)):
-        own = {problem.channels[s.channel]: s for s in series if s.trial == k}
+        # Of a trial in windows the first, which is what is simulated.
+        own: dict[str, Series] = {}
+        for s in series:
+            if s.trial == k:
+                own.setdefault(problem.channels[s.channel], s)
         if motion is None:
             logs.append(_of_series(trial.log, own))
             continue

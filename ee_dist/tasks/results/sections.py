@@ -10,7 +10,7 @@ from ee_dist.discrepancy.accounts.of_explain import above
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
-from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.problem import Problem, joined
 from ee_dist.discrepancy.words import percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, trial_name, worst_trials
@@ -34,7 +34,7 @@ Models = Sequence[tuple[str, Hypothesis]]
 def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
     """Every channel of every trial, with the error that the first of the models leaves there."""
     rms = by_trial(problem, residual)
-    later = [{(s.trial, s.channel): s.predicted for s in problem.series(terms)} for _, terms in models[1:]]
+    later = [{(s.trial, s.channel): s.predicted for s in joined(problem.series(terms))} for _, terms in models[1:]]
     return [
         Overlay(
             plain(problem.channels[s.channel]),
@@ -46,7 +46,7 @@ def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
             later[0].get((s.trial, s.channel)) if later else None,
             float(rms[s.trial, s.channel]),
         )
-        for s in problem.series(models[0][1])
+        for s in joined(problem.series(models[0][1]))
     ]
 
 
