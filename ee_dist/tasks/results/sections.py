@@ -13,6 +13,7 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.problem import Problem, joined
 from ee_dist.discrepancy.words import percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
+from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, trial_name, worst_trials
 from ee_dist.tasks.results.tables import standing
 from ee_dist.tasks.results.values import Kind
@@ -149,11 +150,12 @@ def signature_section(
     for c in worst:
         j = layout.joint_of_channel[c]
         mine = np.flatnonzero((problem.channel_of == c) & layout.reading)
-        angle = "m" if problem.robot.joint(problem.robot.motor_names[j or 0]).kind == "slide" else "rad"
+        name = problem.robot.motor_names[j or 0]
+        angle = "m" if problem.robot.joint(name).kind == "slide" else "rad"
         for label, key in (
             (f"position ({angle})", "position"),
             (f"speed ({angle}/s)", "speed"),
-            (f"command ({angle})", "command"),
+            (f"command ({unit_at(problem.robot, name) or angle})", "command"),
             (f"load ({'N' if angle == 'm' else 'N.m'})", "load"),
         ):
             x = np.full(len(mine), np.nan)
