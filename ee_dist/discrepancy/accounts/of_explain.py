@@ -34,6 +34,7 @@ from ee_dist.discrepancy.words import is_less, percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE
 
 NOTHING_STANDS_OUT = "Nothing else stands out."
+NO_MOTION_TRIED = "None of the motions tried is expected to tell them apart."
 
 
 def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None, planner: str = "") -> Account:
@@ -92,7 +93,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     if found.left:
         lines.append(left_text(found.left, found.verdict == EFFECT))
     if ahead is not None and ahead.separation < ENOUGH:
-        advice = "No trial of the library would tell them apart either: on all of them they do the same."
+        advice = NO_MOTION_TRIED
     elif ahead is not None:
         e = ahead.excitation
         where = f", on the {e.fixture}" if robot.free_base else ""
@@ -102,7 +103,6 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         )
     good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
     tied = found.verdict == EFFECT and best is not None and best.tied_with
-    alike = ahead is not None and ahead.separation < ENOUGH
     return Account(
         head,
         error,
@@ -110,7 +110,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         (*lines, *problem.notes),
         good,
         advised(problem, advice),
-        planner if tied and not alike else "",
+        planner if tied else "",
     )
 
 
