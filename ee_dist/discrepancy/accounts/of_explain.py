@@ -141,10 +141,14 @@ def above(c: Judged) -> tuple[float, float]:
     return c.interval[0] * scale, c.interval[1] * scale
 
 
+def shown_gain(c: Judged) -> tuple[float, float, float]:
+    """The gain of a candidate and the ends of its interval as they are told: no more than all of it, nor less than nothing."""
+    low, high = above(c)
+    return max(0.0, min(c.explained, 1.0)), max(low, -1.0), min(high, 1.0)
+
+
 def confidence(best: Judged) -> str:
     """What it takes off held-out data, as a share of what is not noise, with its interval."""
-    low, high = above(best)
-    return (
-        f"{percent(max(0.0, min(best.explained, 1.0)))} of what is above the noise (95 % interval {percent(max(low, -9.99))} "
-        f"to {percent(min(high, 1.0))}), judged on {best.held_out}"
-    )
+    share, low, high = shown_gain(best)
+    interval = f"95 % interval {percent(low)} to {percent(high)}"
+    return f"{percent(share)} of what is above the noise ({interval}), judged on {best.held_out}"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ee_dist.discrepancy.accounts.account import Account
-from ee_dist.discrepancy.accounts.of_explain import above
+from ee_dist.discrepancy.accounts.of_explain import shown_gain
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
@@ -149,4 +149,4 @@ def _candidate(problem: Problem, found: Explanation, c: Judged, shown: bool) -> 
     label = told_all(c.terms, problem.robot)
     kind = STANDINGS.get(standing(c, found.candidates[0]), drawn.REFUSED)
     account = said(problem, placed(c.name), (*found.fixed, *c.hypothesis)) if shown else None
-    return drawn.Candidate(label, c.explained, *above(c), kind, account)
+    return drawn.Candidate(label, *shown_gain(c), kind, account)

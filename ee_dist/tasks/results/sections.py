@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.accounts.of_explain import above
+from ee_dist.discrepancy.accounts.of_explain import above, shown_gain
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
@@ -197,8 +197,8 @@ def ranking_section(
     best = judged[0]
     kinds = [_kind(c, best) for c in judged]
     rows = [
-        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(max(0.0, min(c.explained, 1.0))),
-         f"{percent(max(above(c)[0], -1.0))} to {percent(min(above(c)[1], 1.0))}", standing(c, best)]
+        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
+         " to ".join(map(percent, shown_gain(c)[1:])), standing(c, best)]
         for c in judged
     ]  # fmt: skip
     pale = [k for k, kind in enumerate(kinds) if kind == "not"]
