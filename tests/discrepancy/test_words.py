@@ -14,7 +14,7 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.words import phrase, plain, span, told, told_all
+from ee_dist.discrepancy.words import percent, phrase, plain, span, told, told_all
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped
@@ -220,3 +220,11 @@ def test_the_ends_of_an_interval_differ(low: float, high: float, said: str) -> N
     unit = " kg.m^2"
     found = span(term("rotor_inertia", "servo", added_kg_m2=0.1), "added_kg_m2", low, high, None)
     assert found.replace(unit, "") == said
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(0.9999999999999998, "100 %"), (0.9996, "99.9 %"), (0.995, "99.5 %"), (0.42, "42 %"), (1.0, "100 %")],
+)
+def test_a_share_is_never_all_of_it_where_something_is_left(share: float, said: str) -> None:
+    assert percent(share) == said

@@ -14,7 +14,7 @@ from ee_dist.discrepancy.problem import Problem, joined
 from ee_dist.discrepancy.words import percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, trial_name, worst_trials
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share, trial_name, worst_trials
 from ee_dist.tasks.results.tables import standing
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
@@ -237,7 +237,7 @@ def trials_section(problem: Problem, found: Comparison) -> Section:
 
 def regimes_section(problem: Problem, found: Comparison) -> Section:
     regimes = sorted(found.regimes, key=lambda r: -r.error)
-    rows = [[r.name, problem.told(r.error), percent(r.share), percent(r.values)] for r in regimes]
+    rows = [[r.name, problem.told(r.error), excess_share(found, r), percent(r.values)] for r in regimes]
     errors = [drawn(problem, r.error) for r in regimes]
     figure = figures.bars([r.name for r in regimes], errors, axis_of(problem), drawn(problem, found.noise_floor))
     table = Table(["regime", "error", "share of the excess", "share of the data"], rows, (1, 2, 3))
