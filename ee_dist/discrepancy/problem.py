@@ -75,7 +75,7 @@ def _one(parts: Sequence[Series]) -> Series:
             found += [own[:1] if name == "times_s" else np.array([np.nan]), own]
         return np.concatenate(found)
 
-    return replace(parts[0], **{name: across(name) for name in ("times_s", "measured", "predicted")})
+    return replace(parts[0], times_s=across("times_s"), measured=across("measured"), predicted=across("predicted"))
 
 
 class Problem(ABC):
