@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import released
-from ee_dist.discrepancy.problem import Problem, error
+from ee_dist.discrepancy.problem import Index, Problem, error
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.signals import change
 from ee_dist.robots.model import Robot
@@ -82,21 +82,24 @@ def compare(problem: Problem, residual: Array) -> Comparison:
 
 
 def heat(problem: Problem, residual: Array) -> Array:
-    """(segments, channels) root mean square of a residual (n,); zero where there is no value."""
-    shape = (len(problem.segments), len(problem.channels))
-    cell = problem.segment_of * shape[1] + problem.channel_of
-    energy = np.bincount(cell, weights=residual**2, minlength=shape[0] * shape[1])
-    count = np.bincount(cell, minlength=shape[0] * shape[1])
-    return np.sqrt(np.divide(energy, count, out=np.zeros_like(energy), where=count > 0)).reshape(shape)
+    """(segments, channels) root mean square of a residual (n,), each by the weight of its trial; zero where there is no value."""
+    return _rms(problem, residual, problem.segment_of, problem.trial_of_segment)
 
 
 def by_trial(problem: Problem, residual: Array) -> Array:
-    """(trials, channels) root mean square of a residual (n,); zero where there is no value."""
-    shape = (len(problem.trials), len(problem.channels))
-    cell = problem.trial_of * shape[1] + problem.channel_of
+    """(trials, channels) root mean square of a residual (n,), each by the weight of its trial; zero where there is no value."""
+    return _rms(problem, residual, problem.trial_of, np.arange(len(problem.trials)))
+
+
+def _rms(problem: Problem, residual: Array, row_of: Index, trial_of_row: Index) -> Array:
+    """(rows, channels), as ``trial_error`` tells it of a trial."""
+    shape = (len(trial_of_row), len(problem.channels))
+    cell = row_of * shape[1] + problem.channel_of
     energy = np.bincount(cell, weights=residual**2, minlength=shape[0] * shape[1])
     count = np.bincount(cell, minlength=shape[0] * shape[1])
-    return np.sqrt(energy / np.maximum(count, 1)).reshape(shape)
+    weights = np.array([problem.weight_of(k) for k in range(len(problem.trials))])[trial_of_row]
+    rms = np.sqrt(np.divide(energy, count, out=np.zeros_like(energy), where=count > 0)).reshape(shape)
+    return np.asarray(rms / np.sqrt(weights)[:, None])
 
 
 def span_of(problem: Problem, segment: int) -> tuple[float, float]:

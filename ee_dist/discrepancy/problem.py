@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -56,6 +56,26 @@ class Series:
     times_s: Array
     measured: Array
     predicted: Array
+
+
+def joined(series: Sequence[Series]) -> list[Series]:
+    """One of each trial and channel, in the order in which they come: stretches of a trial one after another, with a row of NaN
+    between, so that no line is drawn from one to the next."""
+    parts: dict[tuple[int, int], list[Series]] = {}
+    for s in series:
+        parts.setdefault((s.trial, s.channel), []).append(s)
+    return [own[0] if len(own) == 1 else _one(own) for own in parts.values()]
+
+
+def _one(parts: Sequence[Series]) -> Series:
+    def across(name: str) -> Array:
+        found = [getattr(parts[0], name)]
+        for p in parts[1:]:
+            own = getattr(p, name)
+            found += [own[:1] if name == "times_s" else np.array([np.nan]), own]
+        return np.concatenate(found)
+
+    return replace(parts[0], times_s=across("times_s"), measured=across("measured"), predicted=across("predicted"))
 
 
 class Problem(ABC):

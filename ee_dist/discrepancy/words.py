@@ -15,6 +15,9 @@ DIGITS, MOST_DIGITS = 3, 8
 MANY = 3
 """Places of one effect from which their values are told as a range: each has its line in a table."""
 
+EXACT = 1e-9
+"""What a share of all of it may lack by the arithmetic alone."""
+
 
 def plain(name: str) -> str:
     return name.replace("_", " ").replace("+", ", ")
@@ -99,7 +102,7 @@ def _unit(term: Term, key: str, robot: Robot | None) -> str:
 
 def percent(share: float) -> str:
     """Never all of it where something is left."""
-    return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 else f"{100 * share:.0f} %"
+    return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 - EXACT else f"{100 * share:.0f} %"
 
 
 def named(term: Term) -> str:

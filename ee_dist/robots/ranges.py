@@ -80,6 +80,11 @@ def command_units(robot: Robot) -> dict[str, str | None]:
     return {d.joint: command_unit(robot, d) for d in robot.drives}
 
 
+def unit_at(robot: Robot, joint: str) -> str:
+    """The unit of the commands of a joint; empty where it takes none."""
+    return command_units(robot).get(joint) or ""
+
+
 _UNITS = {
     ("position", "hinge"): "rad",
     ("position", "slide"): "m",

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
@@ -24,6 +23,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_comparison
 from ee_dist.tasks.results.tables import show_account, show_comparison
 from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.unfinished import note_nothing
 from ee_dist.tasks.ways import known_way, way_of
 from ee_dist.tasks.wiring import for_few
@@ -43,7 +43,7 @@ class Options:
 def run(config: Config, options: Options, out: Path) -> tuple[Problem, Comparison, Account]:
     """Write summary.json, report.html and compare.rrd into ``out``. Raises ConfigError, LogError, RecordingError."""
     note_nothing()  # it is over in seconds
-    console, watch, measured = Console(), Stopwatch(), load(config)
+    console, watch, measured = terminal(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)

@@ -6,8 +6,6 @@ import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rich.console import Console
-
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
@@ -27,6 +25,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_explanation
 from ee_dist.tasks.results.tables import show_account, show_explanation, typed
 from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.ways import known_way, way_of
 from ee_dist.tasks.wiring import evaluator_of
 from ee_dist.viewing.report import write_page
@@ -50,7 +49,7 @@ class Options:
 def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> tuple[Problem, Explanation, Account]:
     """Write summary.json, report.html and explain.rrd into ``out``; ``told`` hears of the progress. Raises ConfigError,
     LogError, RecordingError."""
-    console, watch, measured = Console(), Stopwatch(), load(config)
+    console, watch, measured = terminal(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
     check(measured.robot, options.without, options.only)
     for remark in measured.remarks:

@@ -20,6 +20,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.robots.serial import robot_to_dict
 from ee_dist.tasks.config import Config, ConfigError, one_of
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
+from ee_dist.tasks.terminal import terminal
 
 
 @dataclass
@@ -48,7 +49,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "effects": [{**f.term.as_dict(), "how": f.how, "why": f.why} for f in told],
     }
     write_summary(out, "export", config, options, watch, digest_of(sorted(files.items())), rest)
-    tell(Console(), model, told, list(files), out)
+    tell(terminal(), model, told, list(files), out)
 
 
 def files_of(found: ModelFile, model: Robot, to: str, told: Sequence[Fate]) -> dict[str, str]:

@@ -36,6 +36,7 @@ from ee_dist.robots.describe import BUILT_IN, load_robot, robot_of
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError, one_of
 from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.tasks.terminal import terminal
 
 MAPPING = "mapping.yaml"
 
@@ -57,7 +58,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     Without a mapping the proposed one is written to ``out/mapping.yaml`` and read back. Raises MeasurementError, RobotError,
     EffectError, ConfigError.
     """
-    watch, console = Stopwatch(), Console()
+    watch, console = Stopwatch(), terminal()
     if Path(options.output).name != options.output or Path(options.output).suffix != ".mcap":
         raise ConfigError(
             f"task.output={options.output}: expected the name of a file that ends in .mcap, such as measured.mcap"
@@ -141,7 +142,7 @@ def written(proposal: Proposal, config: Config, files: list[Path], out: Path, co
     for row in rows(proposal):
         table.add_row(*row)
     # A pipe has no width of its own.
-    Console(width=None if console.is_terminal else 140).print(table, highlight=False, markup=False)
+    terminal(width=None if console.is_terminal else 140).print(table, highlight=False, markup=False)
     for note in proposal.notes:
         console.print(f"note: {note}", highlight=False, markup=False, soft_wrap=True)
     out.mkdir(parents=True, exist_ok=True)

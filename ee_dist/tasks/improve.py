@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from rich.console import Console
 
 from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.accounts.account import Account
@@ -38,6 +37,7 @@ from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_improvement
 from ee_dist.tasks.results.tables import show_account, show_candidates, show_ladder
 from ee_dist.tasks.summary import Stopwatch, write_summary
+from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.ways import known_way, open_loop, way_of
 from ee_dist.viewing.report import write_page
 
@@ -61,7 +61,7 @@ class Options:
 def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> tuple[Problem, Improvement, Account]:
     """Write model.yaml, summary.json, report.html and improve.rrd into ``out``; ``told`` hears of the progress. Raises
     ConfigError, EffectError, LogError."""
-    console, watch, measured = Console(), Stopwatch(), load(config)
+    console, watch, measured = terminal(), Stopwatch(), load(config)
     wanted = effects_of(config.effect, measured.robot)
     for key in ("without", "only"):
         if wanted is not None and getattr(options, key) and not options.calibrate:

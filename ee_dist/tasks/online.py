@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from ee_dist.effects.catalogue import apply
 from ee_dist.engines.contract import Rollout
@@ -19,6 +18,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import BudgetConfig, Config, ConfigError, ScenarioConfig
 from ee_dist.tasks.results.commands import command, simulated
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
+from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.wiring import build_robot, evaluator_of
 from ee_dist.viewing.report import Page, Section, write_page
 from ee_dist.viewing.study_figures import Curve, on_the_body
@@ -37,7 +37,7 @@ class Options:
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Write report.html and summary.json. Every evaluation counts as a trial on the body."""
-    console, watch = Console(), Stopwatch()
+    console, watch = terminal(), Stopwatch()
     if config.scenario is None:
         raise ConfigError("which scenario? add one, such as +scenario=3")
     robot = build_robot(config)

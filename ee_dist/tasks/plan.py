@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from rich.console import Console
 
 from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.contenders import contenders, suspected
@@ -30,6 +29,7 @@ from ee_dist.tasks.results.commands import command, setting
 from ee_dist.tasks.results.plan_page import account_of, of_plan, plan_page, show_plan
 from ee_dist.tasks.results.tables import show_account
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
+from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.ways import way_of
 from ee_dist.tasks.wiring import evaluator_of, for_few
 from ee_dist.trials.excitation import FIXTURES, Excitation
@@ -89,7 +89,7 @@ class Options:
 def run(config: Config, options: Options, out: Path) -> Plan:
     """Write plan.csv, summary.json and report.html into ``out``, and a robot's description where it has no name. Raises
     ConfigError, EffectError, ExcitationError, LogError, RecordingError."""
-    console, watch = Console(), Stopwatch()
+    console, watch = terminal(), Stopwatch()
     found = explained(options.explained, for_few(config))
     if len(found.explanations) < 2 and not options.suspects:
         raise ConfigError(nothing_tied(found))

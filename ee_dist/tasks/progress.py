@@ -9,6 +9,7 @@ from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.text import Text
 
 from ee_dist.recording.records import (
     DIAGNOSIS,
@@ -123,5 +124,6 @@ class PassProgress(Observer):
         seconds = time.monotonic() - self.started
         left = seconds * max(self.total - self.done, 0.0) / self.done if self.done else float("nan")
         self.bars.console.print(
-            f"[dim]{seconds:6.0f} s[/dim]  {text}  [dim]about {left:.0f} s left[/dim]", highlight=False
+            Text.assemble((f"{seconds:6.0f} s", "dim"), f"  {text}  ", (f"about {left:.0f} s left", "dim")),
+            highlight=False,
         )

@@ -6,6 +6,7 @@ import time
 
 from rich.console import Console
 from rich.status import Status
+from rich.text import Text
 
 from ee_dist.discrepancy.search.search import Progress, quiet
 
@@ -44,7 +45,7 @@ class SearchProgress:
         left = (now - self.stage_began) * (1 - share) / share if share > 0 else 0.0
         ahead = f"{what} {share:.0%}, about {left:.0f} s left of this stage"
         if self.status:
-            self.status.update(f"{ahead}, {now - self.began:.0f} s so far")
+            self.status.update(Text(f"{ahead}, {now - self.began:.0f} s so far"))
             return
         long = left >= EVERY_S and (self.short or now - self.said >= EVERY_S)
         if another or long:

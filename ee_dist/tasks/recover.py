@@ -45,6 +45,7 @@ from ee_dist.tasks.summary import (
     package_version,
     write_summary,
 )
+from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.unfinished import remembered
 from ee_dist.tasks.wiring import build_system, engine_maker, evaluator_name, evaluator_of, hardware_of
 from ee_dist.viewing.story import told
@@ -71,7 +72,7 @@ class Options:
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Write recovery.mcap, recovery.rrd and summary.json into ``out`` and print the result."""
-    console, watch = Console(), Stopwatch()
+    console, watch = terminal(), Stopwatch()
     own, noise = config.hardware.address, config.noise or 0.0
     if config.scenario is None and not own:
         raise ConfigError(_which(config.system is None))

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
@@ -19,6 +17,7 @@ from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.explained import summary_of
 from ee_dist.tasks.seal import FILE, opened
 from ee_dist.tasks.summary import Stopwatch, hypothesis_list, write_summary
+from ee_dist.tasks.terminal import terminal
 
 Places = frozenset[tuple[str, str]]
 """Effects by the joints, parts or sensors that they act on: an effect on a group is one on each of its members."""
@@ -43,7 +42,7 @@ class Score:
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Print the truth; ``options.explained`` is the folder of an explain or improve run to score."""
-    console, watch = Console(), Stopwatch()
+    console, watch = terminal(), Stopwatch()
     if not config.log:
         raise ConfigError("log=: whose truth? name the folder of a trial, such as log=logs/trial/...")
     folder = Path(config.log)

@@ -19,6 +19,7 @@ from ee_dist.robots.ranges import span
 from ee_dist.robots.starter import JOINT_COLUMNS, Starter, source_from, starter
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
+from ee_dist.tasks.terminal import terminal
 from ee_dist.trials.log import Array, SensorLog, start_of
 from ee_dist.viewing.rerun_scene import write_rrd
 
@@ -66,7 +67,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     }
     write_summary(out, "robot", config, options, watch, digest_of((robot, found.text)), rest)
     write_rrd(scene(robot), out / "robot.rrd")
-    tell(Console(), found, out / options.output)
+    tell(terminal(), found, out / options.output)
 
 
 def text_of(found: Starter) -> str:

@@ -29,6 +29,7 @@ from ee_dist.tasks.results.study_page import Extra, study_page
 from ee_dist.tasks.results.study_sections import TEST, brief, cells, head
 from ee_dist.tasks.results.study_table import COLUMNS, Rows, against, by_case, method, once, plain, row, total
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
+from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.wiring import evaluator_of, for_few
 from ee_dist.viewing.parting_figures import Parting
 from ee_dist.viewing.report import write_page
@@ -47,7 +48,7 @@ SHORT = ("case", "runs", "intact", "after", "last", "restored", "right", "named"
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Write study.csv, study.md, report.html and summary.json from the runs below ``config.log``. Raises ConfigError."""
-    console, watch = Console(), Stopwatch()
+    console, watch = terminal(), Stopwatch()
     if not config.log:
         raise ConfigError("log=: which runs? name the folder of a sweep, such as log=logs/recover/..._sweep")
     folder = Path(config.log)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from ee_dist.basics.files import write_whole
@@ -32,6 +31,7 @@ from ee_dist.tasks.results.commands import asked, command
 from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.seal import FILE, sealed
 from ee_dist.tasks.summary import Stopwatch, package_version, write_summary
+from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.unfinished import remembered
 from ee_dist.tasks.wiring import build_robot, engine_maker, hardware_of
 from ee_dist.trials.excitation import Excitation, parse
@@ -62,7 +62,7 @@ class Options:
 
 def run(config: Config, options: Options, out: Path) -> None:
     """Write trial.mcap, sealed.json, trial.rrd and summary.json into ``out``."""
-    console, watch = Console(), Stopwatch()
+    console, watch = terminal(), Stopwatch()
     seeds = np.random.SeedSequence(config.seed)
     hidden_seed, noise_seed = seeds.spawn(2)
     engine = engine_maker(config, alone=True)()
@@ -118,7 +118,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     engine.close()
     console.print(table)
     if body is None:
-        told = f"Noise: {noise:.1%} of each channel's range. Seal {digest[:16]}."
+        told = f"Noise: {100 * noise:.3g}% of each channel's range. Seal {digest[:16]}."
         console.print(told, highlight=False)
     write_summary(out, "trial", config, options, watch, sums.hexdigest(), {
         "trials": [e.as_dict() for e in plan * options.repeats], "noise": noise,

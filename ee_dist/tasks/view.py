@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-
 from ee_dist.recording.reader import ANY, read_run
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.terminal import terminal
 from ee_dist.viewing.scenes import write_scene
 from ee_dist.viewing.viewer import open_viewer
 
@@ -27,7 +26,7 @@ def run(config: Config, options: Options, out: Path) -> None:
             "log=: which log? name an .mcap, an .rrd or the folder of a run, such as log=logs/recover/..."
         )
     recording = find(Path(config.log), options.rebuild, out)
-    Console().print(f"rerun recording: {recording}", highlight=False, soft_wrap=True)
+    terminal().print(f"rerun recording: {recording}", highlight=False, soft_wrap=True)
     if options.open:
         open_viewer(recording)
 

@@ -11,6 +11,7 @@ from rerun.blueprint.components import AbsoluteTimeRange
 
 from ee_dist.recording.clock import SECOND_NS
 from ee_dist.robots.model import Robot, Sensor
+from ee_dist.robots.ranges import command_units
 from ee_dist.viewing.stream import RUN_TIME
 
 WINDOW_S = (-0.5, 3.5)
@@ -88,9 +89,9 @@ def in_brackets(unit: str) -> str:
 
 
 def command_unit(robot: Robot) -> str:
-    """The unit of a robot's commands, in brackets; nothing where its drives are of both kinds."""
-    kinds = {robot.joint(name).kind for name in robot.motor_names}
-    return in_brackets({"hinge": "rad", "slide": "m"}.get(kinds.pop(), "")) if len(kinds) == 1 else ""
+    """The unit of a robot's commands, in brackets; nothing where they have several."""
+    units = {u for u in command_units(robot).values() if u is not None}
+    return in_brackets(units.pop()) if len(units) == 1 else ""
 
 
 def lanes(origin: str, name: str) -> rrb.StateTimelineView:

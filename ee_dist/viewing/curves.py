@@ -77,7 +77,8 @@ def browser(curves: Sequence[Overlay], names: Sequence[str]) -> Browser:
 
 
 def thinned(curve: Overlay, points: int) -> Overlay:
-    """Of each stretch of time the rows in which a curve, or its distance from what was measured, is largest or smallest."""
+    """Of each stretch of time the rows in which a curve, or its distance from what was measured, is largest or smallest, and
+    those at which it breaks off."""
     count = len(curve.times_s)
     if count <= points:
         return curve
@@ -89,7 +90,9 @@ def thinned(curve: Overlay, points: int) -> Overlay:
     padded = np.pad(np.nan_to_num(np.stack(looked_at)), ((0, 0), (0, len(starts) * size - count)), mode="edge")
     blocks = padded.reshape(len(looked_at), len(starts), size)
     kept = np.concatenate([(starts + blocks.argmax(axis=2)).ravel(), (starts + blocks.argmin(axis=2)).ravel()])
-    rows = np.unique(np.minimum(np.append(kept, [0, count - 1]), count - 1))
+    breaks = np.flatnonzero(np.isnan(curve.measured))
+    kept = np.append(kept, [0, count - 1, *(breaks if len(breaks) < points else [])])
+    rows = np.unique(np.minimum(kept, count - 1))
     return rows_of(curve, rows)
 
 

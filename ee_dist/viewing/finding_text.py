@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ee_dist.discrepancy.words import percent
 from ee_dist.viewing.finding import BEST, TIED, Candidate, Finding
 
 BAR = 5
@@ -68,8 +69,8 @@ def candidate_table(candidates: Sequence[Candidate]) -> list[str]:
     lines = ["| # | missing effect | gain | | 95 % interval | |", "|---|---|---|---|---|---|"]
     for k, c in enumerate(candidates):
         name = f"**{c.label}**" if c.kind in (BEST, TIED) else c.label
-        told = f"{100 * c.low:.1f} to {100 * c.high:.1f} %"
-        lines.append(f"| {k + 1} | {name} | {100 * c.gain:.1f} % | {bar(c.gain, largest)} | {told} | {c.kind} |")
+        told = f"{percent(c.low)} to {percent(c.high)}"
+        lines.append(f"| {k + 1} | {name} | {percent(c.gain)} | {bar(c.gain, largest)} | {told} | {c.kind} |")
     return lines
 
 

@@ -70,6 +70,11 @@ def beliefs(run: RunRecord) -> dict[int, HypothesisRecord]:
     return {r.pass_index: r for r in run.hypotheses if r.final}
 
 
+def diagnosed_after(pass_index: int) -> str:
+    """The last trial that a diagnosis pass has seen: the first comes after that in which the change showed."""
+    return "after the change" if pass_index == 0 else f"after trial {pass_index}"
+
+
 def evolved(run: RunRecord) -> dict[int, HypothesisRecord]:
     """The best of the last population of each diagnosis pass: where polish and prune began."""
     return {r.pass_index: r for r in run.hypotheses if r.stage == EVOLVED and r.rank == 0 and not r.final}

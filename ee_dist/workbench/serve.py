@@ -17,7 +17,6 @@ from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.responses import FileResponse
 from nicegui import app as toolkit
 from nicegui import ui
-from rich.console import Console
 
 from ee_dist import beginning
 from ee_dist.effects.model_file import read_model
@@ -25,6 +24,7 @@ from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.errors import defect
 from ee_dist.tasks.results.commands import command, setting
+from ee_dist.tasks.terminal import terminal
 from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
 from ee_dist.workbench import saved
 from ee_dist.workbench.guard import Guard, is_loopback
@@ -118,7 +118,7 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
     named = host if host not in EVERYWHERE else socket.gethostname()
     address = f"http://{named if ':' not in named else f'[{named}]'}:{sock.getsockname()[1]}/"
     address += f"?token={token}" if token else ""
-    console = Console()
+    console = terminal()
     console.print(f"The workbench: {address} (Ctrl-C ends it)", highlight=False, soft_wrap=True)
     sys.stdout.flush()
     if show and (os.environ.get("DISPLAY") or sys.platform in ("darwin", "win32")):

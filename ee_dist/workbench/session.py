@@ -70,6 +70,8 @@ class Session:
         self.bench = Bench()
         self.explained: Explained | None = None
         self.kept: Compared | None = None
+        self.shown: Compared | None = None
+        """The model that is looked at in 3-D, which need not be the one that was kept."""
         self.commands: tuple[str, ...] = ()
         self.notice = ""
         self.worker = Worker(self._heard, self._ended)
@@ -139,7 +141,7 @@ class Session:
         way_of(found, self.by)
         self.worker.cancel()
         self.measured, self._began = found, model
-        self.sight, self.seen, self.explained, self.kept = None, None, None, None
+        self.sight, self.seen, self.explained, self.kept, self.shown = None, None, None, None, None
         self.bench, self._past = bench_of(found.robot, found.model), []
         self._gripped, self._slid = False, None
         self._files = {found.model: model}
@@ -339,7 +341,8 @@ class Session:
 
         config = replace(self._asked(self.bench.terms), to=to)
         if config.model is None:
-            path = self.folder / MODEL_FILE
+            # A file of its own: what was kept stays what it is.
+            path = self.folder / STEPS / "described.yaml"
             commands.written(path, self._open(), self.bench.terms, self._began)
             config = replace(config, model=str(path))
         folder = fresh(self.folder / f"export_{to}")
@@ -367,7 +370,9 @@ class Session:
             self.explained = result
             self.tell("explained")
         elif isinstance(result, Compared):
-            self.kept = result
+            self.shown = result
+            if request.config.model == str(self.folder / MODEL_FILE):
+                self.kept = result
             self.tell("kept")
         elif isinstance(result, Improved):
             self._improved(result, request)

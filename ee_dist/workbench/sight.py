@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, compare, rows_of
-from ee_dist.discrepancy.problem import Problem, Series, error
+from ee_dist.discrepancy.problem import Problem, Series, error, joined
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.ways import Way
@@ -83,7 +84,7 @@ class Sight:
     def series(self, terms: Hypothesis, place: Place) -> Series | None:
         """Measured and predicted of one channel of one trial, simulating that trial alone."""
         trial, channel = place
-        found = [s for s in self._of(trial).series(terms) if s.channel == channel]
+        found = [s for s in joined(self._of(trial).series(terms)) if s.channel == channel]
         if not found:
             return None
         return replace(found[0], trial=trial)
@@ -100,8 +101,10 @@ class Sight:
             return []
         at = rows_of(problem, trial, layout.time_s[mine])
         around = circumstances(problem, trial)
-        slide = problem.robot.joint(problem.robot.motor_names[j]).kind == "slide"
-        units = dict(zip(AGAINST, ("m", "m/s", "m", "N") if slide else ("rad", "rad/s", "rad", "N.m"), strict=True))
+        joint = problem.robot.motor_names[j]
+        slide = problem.robot.joint(joint).kind == "slide"
+        sent = unit_at(problem.robot, joint)
+        units = dict(zip(AGAINST, ("m", "m/s", sent, "N") if slide else ("rad", "rad/s", sent, "N.m"), strict=True))
         raw, out = problem.raw(residual)[mine], []
         for name in AGAINST:
             x = getattr(around, name)[at, j]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from way_samples import Sample, evaluator_for, measure, sines, two_joint_arm
 
-from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.compare import by_trial, compare, heat
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import error
@@ -93,3 +93,12 @@ def test_the_error_of_a_trial_is_its_own_however_long_the_others_are() -> None:
     raw = np.abs(problem.raw(residual))
     for k, value in enumerate(found):
         assert problem.natural(value) == pytest.approx(raw[problem.trial_of == k].mean(), rel=1e-6)
+
+
+def test_in_trials_of_unequal_length_equal_errors_look_equal() -> None:
+    problem = unequal()
+    residual = np.sqrt(np.where(problem.trial_of == 0, 2.0, 1.0) * problem.weight)
+    cells, trials = heat(problem, residual)[:, 0], by_trial(problem, residual)[:, 0]
+    np.testing.assert_allclose(cells**2, np.where(problem.trial_of_segment == 0, 2.0, 1.0))
+    np.testing.assert_allclose(trials, [problem.trial_error(residual, k) for k in range(2)])
+    assert compare(problem, residual).channels[0].worst_trial == "motion 0"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from linear_problem import Linear
 
+from ee_dist.discrepancy.accounts.account import curves_of
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Layout
@@ -60,3 +61,13 @@ def test_what_calibration_left_is_no_news_but_much_more_of_it_is() -> None:
     noise = rng.standard_normal(len(p.floor))
     assert not leftovers(p, noise + np.sqrt(0.5) * steady)
     assert leftovers(p, noise + 4.0 * steady)
+
+
+def test_repeats_of_a_motion_are_told_apart() -> None:
+    p = problem()
+    p.measured = tuple(MeasuredTrial("sway", t.log) for t in p.measured)
+    residual = np.random.default_rng(1).standard_normal(len(p.floor))
+    residual[np.isin(p.trial_of, (4, 5)) & (p.channel_of == 3)] += 0.8
+    left = leftovers(p, residual)
+    assert curves_of(left) == 2 and {g.index for g in left} == {4, 5}
+    assert {str(g).split(" (")[0] for g in left} == {"channel 3 during 5. sway", "channel 3 during 6. sway"}

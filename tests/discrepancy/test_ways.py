@@ -12,7 +12,7 @@ from way_samples import measure, measured, problem, problem_by, samples
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
 from ee_dist.discrepancy.improve import improve
-from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.problem import error, joined
 from ee_dist.discrepancy.search.candidates import candidate, candidates
 from ee_dist.discrepancy.search.cloud import effort_of, follow_cloud
 from ee_dist.discrepancy.search.fit import fit_one
@@ -25,6 +25,8 @@ from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.effects.catalogue import apply, term
 from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.tasks.results.sections import curves
+from ee_dist.viewing.curves import thinned
 
 SUSPECTS = ("coulomb_friction", "viscous_friction", "parallel_spring", "offset_torque")
 QUICK = Effort(first=4, second=2, final=2, starts=1)
@@ -136,3 +138,22 @@ def test_a_longer_search_has_more_generations_and_seeds() -> None:
     assert effort_of(4, 0.1) == (4, (1,))
     assert effort_of(2) == (20, (1,))
     assert effort_of(1, 0.01)[0] == 1
+
+
+def test_windows_of_a_trial_are_one_curve_that_breaks_off_between_them() -> None:
+    free = problem("pendulum", "free_run")
+    assert isinstance(free, FreeRun)
+    again = FreeRun(measured("pendulum"), free.robot, free.evaluator, windows_s=0.5)
+    parts, whole = again.series(()), joined(again.series(()))
+    assert len(parts) == 2 * 6 and [(s.trial, s.channel) for s in whole] == [(0, 0), (1, 0)]
+    for s in whole:
+        own = [p for p in parts if p.trial == s.trial]
+        assert np.isnan(s.predicted).sum() == 5 and (np.diff(s.times_s) >= 0).all()
+        read = np.isfinite(s.predicted)
+        np.testing.assert_array_equal(s.predicted[read], np.concatenate([p.predicted for p in own]))
+    shown = curves(again, again.residuals([()])[0], [("model", ()), ("improved", samples()["pendulum"].hidden)])
+    for o in shown:
+        assert (
+            o.improved is not None and len(o.improved) == len(o.times_s) and o.times_s[0] == 0 and o.times_s[-1] > 2.5
+        )
+        assert np.isnan(thinned(o, 60).predicted).sum() == 5

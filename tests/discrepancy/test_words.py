@@ -14,7 +14,7 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.words import phrase, plain, span, told, told_all
+from ee_dist.discrepancy.words import percent, phrase, plain, span, told, told_all
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped
@@ -23,7 +23,7 @@ from ee_dist.tasks.improve import effects_of
 from ee_dist.tasks.results.tables import typed
 
 
-def account(tied: list[str], explained: float = 1.0) -> Account:
+def account(tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "") -> Account:
     best = SimpleNamespace(
         terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
         explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""),
@@ -43,7 +43,7 @@ def account(tied: list[str], explained: float = 1.0) -> Account:
     problem = SimpleNamespace(
         robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts="", trials=("a",)
     )
-    return explain_account(problem, found, None)  # type: ignore[arg-type]
+    return explain_account(problem, found, ahead, planner)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -62,6 +62,14 @@ def test_what_looks_the_same_is_named(tied: list[str], said: str) -> None:
 def test_a_rest_above_the_noise_is_no_contradiction_where_nothing_is_left() -> None:
     assert "; what it leaves of that stands out nowhere; of 9" in account([], 0.66).sure
     assert "leaves" not in account([], 0.99).sure
+
+
+def test_that_no_motion_tried_helps_is_not_that_none_does() -> None:
+    ahead = SimpleNamespace(separation=0.1)
+    told_of = account(["a@c"], ahead=ahead, planner="plan it")
+    assert told_of.advice == "None of the motions tried is expected to tell them apart."
+    assert told_of.planner == "plan it" and told_of.first[-1].endswith(" plan it")
+    assert not account([], ahead=None, planner="plan it").planner, "nothing is tied"
 
 
 def test_more_twins_than_a_headline_holds_are_named_below_it() -> None:
@@ -212,3 +220,11 @@ def test_the_ends_of_an_interval_differ(low: float, high: float, said: str) -> N
     unit = " kg.m^2"
     found = span(term("rotor_inertia", "servo", added_kg_m2=0.1), "added_kg_m2", low, high, None)
     assert found.replace(unit, "") == said
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(0.9999999999999998, "100 %"), (0.9996, "99.9 %"), (0.995, "99.5 %"), (0.42, "42 %"), (1.0, "100 %")],
+)
+def test_a_share_is_never_all_of_it_where_something_is_left(share: float, said: str) -> None:
+    assert percent(share) == said

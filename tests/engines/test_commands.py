@@ -14,8 +14,9 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.engines.one_joint import OneJointEngine
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.model import Robot
-from ee_dist.robots.ranges import command_span, command_unit
+from ee_dist.robots.ranges import command_span, command_unit, unit_at
 from ee_dist.trials.excitation import Excitation
+from ee_dist.viewing import blueprint
 
 STEP_S = 0.002
 
@@ -117,6 +118,8 @@ def test_the_unit_and_span_of_a_command_follow_from_the_drive(
         robot = robot.with_joint("joint", lower=-5.0, upper=5.0)
         span = (-5.0, 5.0)
     assert command_unit(robot, robot.drives[0]) == unit
+    assert unit_at(robot, "joint") == (unit or "")
+    assert blueprint.command_unit(robot) == ("" if unit is None else f" ({unit})")
     assert command_span(robot, robot.drives[0]) == span
     planned = Excitation("multisine", 1.0, 0.5).commands(robot)
     assert np.abs(planned).max() <= 0.5 * span[1]

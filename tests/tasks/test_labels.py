@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
-from ee_dist.tasks.results.labels import trial_name, worst_trials
+from ee_dist.tasks import trial
+from ee_dist.tasks.config import Config, EngineConfig, RobotConfig
+from ee_dist.tasks.results.labels import excess_share, trial_name, worst_trials
 
 
 def test_the_worst_trial_is_told_from_its_repeat() -> None:
@@ -16,3 +20,17 @@ def test_the_worst_trial_is_told_from_its_repeat() -> None:
     found = SimpleNamespace(heat=np.array([[1.0, 0.0], [3.0, 1.0], [2.0, 5.0]]))
     assert worst_trials(problem, found) == {"a": "1. sway", "b": "2. sway"}  # type: ignore[arg-type]
     assert trial_name(SimpleNamespace(trials=("sway",)), 0) == "sway"  # type: ignore[arg-type]
+
+
+def test_shares_of_next_to_nothing_are_not_told() -> None:
+    regimes = [SimpleNamespace(share=s) for s in (1.07, -0.07, 0.5)]
+    for error, said in ((1.02, ["-", "-", "-"]), (3.0, ["100 %", "0 %", "50 %"])):
+        found = SimpleNamespace(error=error, noise_floor=1.0)
+        assert [excess_share(found, r) for r in regimes] == said  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("noise", "said"), [(0.0004, "0.04%"), (0.02, "2%")])
+def test_little_noise_is_not_none(noise: float, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = Config(robot=RobotConfig(name="servo_pendulum"), engine=EngineConfig("mujoco"))
+    trial.run(config, trial.Options(excitations=["multisine:seconds=0.5"], repeats=1, noise=noise), tmp_path)
+    assert f"Noise: {said} of each channel's range." in capsys.readouterr().out

@@ -8,9 +8,9 @@ import pytest
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
 from ee_dist.tasks.config import AUTO, Config, EngineConfig
-from ee_dist.tasks.results.commands import asked, command
+from ee_dist.tasks.results.commands import asked, command, setting
 
-NAMES = ("plain.mcap", "with a space/a#b.mcap", "ünï,code=[1].mcap")
+NAMES = ("plain.mcap", "with a space/a#b.mcap", "ünï,code=[1].mcap", "Müller/trial", "bob's/it's\\'so\\")
 
 
 def read(line: str) -> dict[str, object]:
@@ -31,3 +31,8 @@ def test_files_come_through_a_shell(measured):
 
 def test_what_every_run_has_is_left_out():
     assert asked("compare", Config(measured="a.mcap"), AUTO) == ["task=compare", "measured=a.mcap"]
+
+
+@pytest.mark.parametrize("name", ["123", "1e3", "-0.5", "1_000", "null", "True", "nan", "", "a@Gelenk_ü", "2024-05-01"])
+def test_words_stay_words(name):
+    assert read(command([setting("effect", name)])) == {"effect": name}

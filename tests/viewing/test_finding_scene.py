@@ -97,8 +97,8 @@ def test_candidates_can_be_switched_between_and_the_chosen_stand_out(tmp_path: P
     for tab in ("1. coulomb friction at turn", "2. load friction at turn", "The model"):
         assert tab in layout
     text = text_of(tmp_path / "scene.rrd")
-    assert "| 1 | **coulomb friction at turn (torque 0.31 N.m)** | 93.0 % |" in text
-    assert "| 3 | viscous friction at turn (0.02 N.m.s/rad) | 20.0 % |" in text
+    assert "| 1 | **coulomb friction at turn (torque 0.31 N.m)** | 93 % |" in text
+    assert "| 3 | viscous friction at turn (0.02 N.m.s/rad) | 20 % |" in text
     for k, c in enumerate(c for c in f.candidates if c.account):
         _, values = rows_of(tmp_path / "scene.rrd", f"sensors/turn_angle/predicted_{k + 1}", "Scalars:scalars")
         assert c.account is not None

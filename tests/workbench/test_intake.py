@@ -10,6 +10,7 @@ import pytest
 
 from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, RobotConfig
+from ee_dist.viewing.story import diagnosed_after
 from ee_dist.workbench.intake import Answers, Intake, options_of
 from ee_dist.workbench.session import Session
 
@@ -79,3 +80,7 @@ def test_a_csv_of_a_robot_from_a_file(tmp_path):
     assert session.measured.robot.motor_names == joints
     assert "robot=urdf robot.drives=" in session.commands[0] and "arm.yaml" in session.commands[0]
     session.close()
+
+
+def test_the_first_diagnosis_comes_after_the_change():
+    assert [diagnosed_after(k) for k in range(3)] == ["after the change", "after trial 1", "after trial 2"]

@@ -7,7 +7,7 @@ import io
 import os
 import signal
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from ee_dist.tasks import compare, trial
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, EvaluatorConfig, RobotConfig
 from ee_dist.workbench import saved, verbs
 from ee_dist.workbench.bench import FIT, HAND, Step
-from ee_dist.workbench.results import Improved
+from ee_dist.workbench.results import Compared, Improved
 from ee_dist.workbench.session import Session
 from ee_dist.workbench.verbs import Ended, Request
 from ee_dist.workbench.worker import BUSY
@@ -192,3 +192,20 @@ def test_an_effect_that_is_on_the_bench_is_judged_beside_the_model_without_it(se
     session.switch(0, False)
     session._after(asked[0], Ended(Improved("", (), (fitted,), (), (step,), session.folder)))
     assert [(e.on, dict(e.term.values)) for e in session.bench.entries] == [(True, {"torque_nm": 0.135})]
+
+
+def test_what_was_kept_stays_when_an_empty_bench_is_exported_or_shown(session, monkeypatch):
+    asked = []
+    monkeypatch.setattr(session.worker, "start", asked.append)
+    session.add(FRICTION, {"torque_nm": 0.09})
+    path = session.keep()
+    text = path.read_text()
+    kept, bare = (Compared(*[None] * len(fields(Compared))) for _ in range(2))
+    session._after(asked[-1], Ended(kept))
+    assert session.kept is kept and session.shown is kept
+    session.remove(0)
+    session.export("yaml")
+    assert path.read_text() == text and "effects: []" not in text
+    session.start(verbs.COMPARE)
+    session._after(asked[-1], Ended(bare))
+    assert session.kept is kept and session.shown is bare

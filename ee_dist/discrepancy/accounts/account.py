@@ -118,7 +118,7 @@ def left_text(left: Sequence[Leftover], after: bool) -> str:
 
 def curves_of(left: Sequence[Leftover]) -> int:
     """Channels of trials: one may stand out for two reasons."""
-    return len({(g.trial, g.channel) for g in left})
+    return len({(g.index, g.channel) for g in left})
 
 
 def _capital(text: str) -> str:

@@ -34,6 +34,7 @@ from ee_dist.discrepancy.words import is_less, percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE
 
 NOTHING_STANDS_OUT = "Nothing else stands out."
+NO_MOTION_TRIED = "None of the motions tried is expected to tell them apart."
 
 
 def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None, planner: str = "") -> Account:
@@ -92,7 +93,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     if found.left:
         lines.append(left_text(found.left, found.verdict == EFFECT))
     if ahead is not None and ahead.separation < ENOUGH:
-        advice = "No trial of the library would tell them apart either: on all of them they do the same."
+        advice = NO_MOTION_TRIED
     elif ahead is not None:
         e = ahead.excitation
         where = f", on the {e.fixture}" if robot.free_base else ""
@@ -102,7 +103,6 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         )
     good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
     tied = found.verdict == EFFECT and best is not None and best.tied_with
-    alike = ahead is not None and ahead.separation < ENOUGH
     return Account(
         head,
         error,
@@ -110,7 +110,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         (*lines, *problem.notes),
         good,
         advised(problem, advice),
-        planner if tied and not alike else "",
+        planner if tied else "",
     )
 
 
@@ -141,10 +141,14 @@ def above(c: Judged) -> tuple[float, float]:
     return c.interval[0] * scale, c.interval[1] * scale
 
 
+def shown_gain(c: Judged) -> tuple[float, float, float]:
+    """The gain of a candidate and the ends of its interval as they are told: no more than all of it, nor less than nothing."""
+    low, high = above(c)
+    return max(0.0, min(c.explained, 1.0)), max(low, -1.0), min(high, 1.0)
+
+
 def confidence(best: Judged) -> str:
     """What it takes off held-out data, as a share of what is not noise, with its interval."""
-    low, high = above(best)
-    return (
-        f"{percent(max(0.0, min(best.explained, 1.0)))} of what is above the noise (95 % interval {percent(max(low, -9.99))} "
-        f"to {percent(min(high, 1.0))}), judged on {best.held_out}"
-    )
+    share, low, high = shown_gain(best)
+    interval = f"95 % interval {percent(low)} to {percent(high)}"
+    return f"{percent(share)} of what is above the noise ({interval}), judged on {best.held_out}"

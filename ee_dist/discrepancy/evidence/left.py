@@ -25,18 +25,22 @@ MANY = 1000
 @dataclass(frozen=True)
 class Leftover:
     """A place where more is left than noise. ``z``: by how many standard deviations; ``excess``: energy above noise;
-    ``trend``: whether it drifts slowly (True) or scatters (False)."""
+    ``trend``: whether it drifts slowly (True) or scatters (False). ``index`` of the trial: repeats have one name, and are told
+    with their number where ``repeated``."""
 
     trial: str
     channel: str
     z: float
     excess: float
     trend: bool
+    index: int = 0
+    repeated: bool = False
 
     def __str__(self) -> str:
         shape = "slow" if self.trend else "quick"
+        trial = f"{self.index + 1}. {self.trial}" if self.repeated else self.trial
         far = f"{self.z:.0f}" if self.z < MANY else f"more than {MANY}"
-        return f"{self.channel} during {self.trial} ({shape}, {far} standard deviations above noise)"
+        return f"{self.channel} during {trial} ({shape}, {far} standard deviations above noise)"
 
 
 def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[Leftover]:
@@ -75,9 +79,9 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
             slow_z = min(slow_z, _rarity(slow[:, c].sum(), mean_floor[:, c].sum() / max(windows, 1.0), windows))
             z = max(quick_z, slow_z)
             if z > limit:
-                found.append(
-                    Leftover(trial, problem.channels[c], float(z), float(energy[c] - floor[c]), bool(slow_z >= quick_z))
-                )
+                excess, trend = float(energy[c] - floor[c]), bool(slow_z >= quick_z)
+                repeated = problem.trials.count(trial) > 1
+                found.append(Leftover(trial, problem.channels[c], float(z), excess, trend, k, repeated))
     return sorted(found, key=lambda g: -g.z)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 from collections.abc import Sequence
 
@@ -25,7 +26,17 @@ def setting(key: str, value: str | os.PathLike[str] | Sequence[str | os.PathLike
 
 def _quoted(value: str | os.PathLike[str]) -> str:
     text = os.path.relpath(value) if os.path.exists(value) else str(value)
-    return text if all(ch.isalnum() or ch in "/._-@:" for ch in text) else f"'{text}'"
+    plain = bool(text) and all((ch.isascii() and ch.isalnum()) or ch in "/._-@:" for ch in text)
+    return text if plain and not _OTHER.fullmatch(text) else _in_quotes(text)
+
+
+_OTHER = re.compile(r"null|true|false|[-+]?(inf|nan|[\d_.]+(e[-+]?[\d_]+)?)", re.IGNORECASE)
+"""Words that Hydra takes for something else than text."""
+
+
+def _in_quotes(text: str) -> str:
+    """As Hydra escapes it: a quote, and the backslashes right before one or at the end."""
+    return "'" + re.sub(r"(\\*)('|$)", lambda m: 2 * m[1] + (m[2] and "\\'"), text) + "'"
 
 
 def asked(task: str, config: Config, by: str = AUTO, *more: str) -> list[str]:

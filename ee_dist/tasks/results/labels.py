@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from ee_dist.discrepancy.compare import Comparison
+from ee_dist.discrepancy.accounts.of_compare import CLOSE
+from ee_dist.discrepancy.compare import Comparison, RegimeReport
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import phrase, placed
+from ee_dist.discrepancy.words import percent, phrase, placed
 from ee_dist.trials.log import Array
 
 MODEL = "model"
@@ -58,3 +59,8 @@ def worst_trials(problem: Problem, found: Comparison) -> dict[str, str]:
         name: trial_name(problem, int(problem.trial_of_segment[k]))
         for name, k in zip(problem.channels, segments, strict=True)
     }
+
+
+def excess_share(found: Comparison, r: RegimeReport) -> str:
+    """The share of what is above the noise that falls in a regime; a dash where next to nothing is above it."""
+    return percent(max(0.0, min(r.share, 1.0))) if found.error > CLOSE * found.noise_floor else "-"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ee_dist.discrepancy.accounts.account import Account
-from ee_dist.discrepancy.accounts.of_explain import above
+from ee_dist.discrepancy.accounts.of_explain import shown_gain
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
@@ -65,7 +65,11 @@ def said(problem: Problem, label: str, terms: Hypothesis) -> drawn.Account:
     series = problem.series(terms)
     logs = []
     for k, (trial, motion) in enumerate(zip(problem.measured, motions, strict=True)):
-        own = {problem.channels[s.channel]: s for s in series if s.trial == k}
+        # Of a trial in windows the first, which is what is simulated.
+        own: dict[str, Series] = {}
+        for s in series:
+            if s.trial == k:
+                own.setdefault(problem.channels[s.channel], s)
         if motion is None:
             logs.append(_of_series(trial.log, own))
             continue
@@ -145,4 +149,4 @@ def _candidate(problem: Problem, found: Explanation, c: Judged, shown: bool) -> 
     label = told_all(c.terms, problem.robot)
     kind = STANDINGS.get(standing(c, found.candidates[0]), drawn.REFUSED)
     account = said(problem, placed(c.name), (*found.fixed, *c.hypothesis)) if shown else None
-    return drawn.Candidate(label, c.explained, *above(c), kind, account)
+    return drawn.Candidate(label, *shown_gain(c), kind, account)

@@ -6,14 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.accounts.of_explain import above
+from ee_dist.discrepancy.accounts.of_explain import above, shown_gain
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
-from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.problem import Problem, joined
 from ee_dist.discrepancy.words import percent, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, trial_name, worst_trials
+from ee_dist.robots.ranges import unit_at
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share, trial_name, worst_trials
 from ee_dist.tasks.results.tables import standing
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
@@ -34,7 +35,7 @@ Models = Sequence[tuple[str, Hypothesis]]
 def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
     """Every channel of every trial, with the error that the first of the models leaves there."""
     rms = by_trial(problem, residual)
-    later = [{(s.trial, s.channel): s.predicted for s in problem.series(terms)} for _, terms in models[1:]]
+    later = [{(s.trial, s.channel): s.predicted for s in joined(problem.series(terms))} for _, terms in models[1:]]
     return [
         Overlay(
             plain(problem.channels[s.channel]),
@@ -46,7 +47,7 @@ def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
             later[0].get((s.trial, s.channel)) if later else None,
             float(rms[s.trial, s.channel]),
         )
-        for s in problem.series(models[0][1])
+        for s in joined(problem.series(models[0][1]))
     ]
 
 
@@ -149,11 +150,12 @@ def signature_section(
     for c in worst:
         j = layout.joint_of_channel[c]
         mine = np.flatnonzero((problem.channel_of == c) & layout.reading)
-        angle = "m" if problem.robot.joint(problem.robot.motor_names[j or 0]).kind == "slide" else "rad"
+        name = problem.robot.motor_names[j or 0]
+        angle = "m" if problem.robot.joint(name).kind == "slide" else "rad"
         for label, key in (
             (f"position ({angle})", "position"),
             (f"speed ({angle}/s)", "speed"),
-            (f"command ({angle})", "command"),
+            (f"command ({unit_at(problem.robot, name) or angle})", "command"),
             (f"load ({'N' if angle == 'm' else 'N.m'})", "load"),
         ):
             x = np.full(len(mine), np.nan)
@@ -195,8 +197,8 @@ def ranking_section(
     best = judged[0]
     kinds = [_kind(c, best) for c in judged]
     rows = [
-        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(max(0.0, min(c.explained, 1.0))),
-         f"{percent(max(above(c)[0], -1.0))} to {percent(min(above(c)[1], 1.0))}", standing(c, best)]
+        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
+         " to ".join(map(percent, shown_gain(c)[1:])), standing(c, best)]
         for c in judged
     ]  # fmt: skip
     pale = [k for k, kind in enumerate(kinds) if kind == "not"]
@@ -235,7 +237,7 @@ def trials_section(problem: Problem, found: Comparison) -> Section:
 
 def regimes_section(problem: Problem, found: Comparison) -> Section:
     regimes = sorted(found.regimes, key=lambda r: -r.error)
-    rows = [[r.name, problem.told(r.error), percent(r.share), percent(r.values)] for r in regimes]
+    rows = [[r.name, problem.told(r.error), excess_share(found, r), percent(r.values)] for r in regimes]
     errors = [drawn(problem, r.error) for r in regimes]
     figure = figures.bars([r.name for r in regimes], errors, axis_of(problem), drawn(problem, found.noise_floor))
     table = Table(["regime", "error", "share of the excess", "share of the data"], rows, (1, 2, 3))

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_explain import shown_gain
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
@@ -20,7 +21,7 @@ from ee_dist.discrepancy.words import percent, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.folder import SETTINGS
 from ee_dist.tasks.results.commands import command
-from ee_dist.tasks.results.labels import step_phrase, worst_trials
+from ee_dist.tasks.results.labels import excess_share, step_phrase, worst_trials
 from ee_dist.tasks.results.values import kinds_of, within
 
 TIED_STANDING = "tied with the best"
@@ -46,7 +47,7 @@ def show_comparison(console: Console, problem: Problem, found: Comparison) -> No
     columns = (("channel", False), ("rmse", True), ("error", True), ("worst", False))
     console.print(_table("Where it fails: channels", columns, rows))
     ordered = sorted(found.regimes, key=lambda r: -r.error)
-    rows2 = [(r.name, problem.told(r.error), percent(r.share), percent(r.values)) for r in ordered]
+    rows2 = [(r.name, problem.told(r.error), excess_share(found, r), percent(r.values)) for r in ordered]
     columns = (("regime", False), ("error", True), ("share of excess", True), ("of data", True))
     console.print(_table("Where it fails: regimes", columns, rows2))
 
@@ -56,7 +57,7 @@ def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged]
         return
     best = judged[0]
     rows = [
-        (str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(max(0.0, min(c.explained, 1.0))),
+        (str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
          standing(c, best)) for c in judged
     ]  # fmt: skip
     columns = (("", True), ("effect", False), ("held out", True), ("gain", True), ("", False))

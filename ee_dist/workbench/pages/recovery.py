@@ -147,7 +147,7 @@ class RecoveryPage:
         self.beliefs.clear()
         with self.beliefs:
             for k, r in sorted(story.beliefs(run).items()):
-                ui.label(f"After trial {k + 1} (error {r.error:.4g}): {story.told(r.terms)}")
+                ui.label(f"{story.diagnosed_after(k).capitalize()} (error {r.error:.4g}): {story.told(r.terms)}")
             truth = story.truth_of(run)
             if truth is not None:
                 ui.label(f"Truth: {story.told(truth)}").style("font-weight:600")

@@ -51,15 +51,15 @@ class RobotPanel:
         await self.page.begin(verbs.COMPARE)
 
     def draw(self, topics: set[str]) -> None:
-        kept = self.page.session.kept
-        if kept is None or not self._wanted or str(kept.folder) == self._shown:
+        seen = self.page.session.shown
+        if seen is None or not self._wanted or str(seen.folder) == self._shown:
             self._follow(topics)
             return
-        recording = kept.folder / f"{verbs.COMPARE}.rrd"
+        recording = seen.folder / f"{verbs.COMPARE}.rrd"
         if not recording.is_file():
             self.note.set_text("Nothing is simulated in this way of comparing, so there is no robot to show.")
             return
-        self._shown = str(kept.folder)
+        self._shown = str(seen.folder)
         path = quote(recording.relative_to(self.page.session.folder).as_posix())
         self.place.clear()
         with self.place:
@@ -70,9 +70,9 @@ class RobotPanel:
 
     def _follow(self, topics: set[str]) -> None:
         """Tell the page where on the recording's clock the trial begins that the charts show; go where they are zoomed to."""
-        kept, place = self.page.session.kept, self.page.place
-        if kept is None or place is None or not topics & {"place", "look"}:
+        seen, place = self.page.session.shown, self.page.place
+        if seen is None or place is None or not topics & {"place", "look"}:
             return
         span = self.page.span_s
         at = "" if span is None else f" window.robotAt({span[0]});"
-        ui.run_javascript(f"window.robotOn = {json.dumps([kept.timeline, kept.starts_s[place[0]]])};{at}")
+        ui.run_javascript(f"window.robotOn = {json.dumps([seen.timeline, seen.starts_s[place[0]]])};{at}")

@@ -1,0 +1,30 @@
+"""A candidate's gain is told alike in the terminal and in rerun."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from ee_dist.discrepancy.accounts.of_explain import confidence
+from ee_dist.tasks.results.scenes import _candidate
+from ee_dist.tasks.results.tables import show_candidates
+from ee_dist.tasks.terminal import terminal
+from ee_dist.viewing.finding_text import candidate_table
+
+
+@pytest.mark.parametrize(("explained", "said"), [(1.07, "100 %"), (-0.2, "0 %"), (0.9996, "99.9 %")])
+def test_no_more_than_all_of_it_nor_less_than_nothing(
+    explained: float, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    c = SimpleNamespace(
+        rank=1, terms=(), name="a@b", error_heldout=1.0, explained=explained, gain=explained, interval=(-1.5, 1.2),
+        earned=True, tied_with=[], held_out="windows",
+    )  # fmt: skip
+    problem = SimpleNamespace(robot=None, told=str)
+    show_candidates(terminal(120), problem, [c], "Candidates")  # type: ignore[arg-type, list-item]
+    assert f" {said} " in capsys.readouterr().out
+    found = SimpleNamespace(candidates=[c])
+    line = candidate_table([_candidate(problem, found, c, False)])[-1]  # type: ignore[arg-type]
+    assert f"| {said} |" in line and "| -100 % to 100 % |" in line
+    assert confidence(c).startswith(f"{said} of what is above the noise (95 % interval -100 %")  # type: ignore[arg-type]
