@@ -65,7 +65,7 @@ class World:
             p.setCollisionFilterGroupMask(self.floor, -1, FLOOR_GROUP, ROBOT_GROUP, physicsClientId=c)
             p.changeDynamics(self.floor, -1, lateralFriction=1.0, physicsClientId=c)
         joints = {j.child: j for j in robot.present_joints}
-        self.order = [q.name for q in robot.present_parts if q.name in joints]
+        self.order = _depth_first(robot)
         link = {name: i for i, name in enumerate(self.order)}
         link[robot.root.name] = -1
         self.link_of_part = link
@@ -200,6 +200,18 @@ class World:
 
     def close(self) -> None:
         p.disconnect(self.client)
+
+
+def _depth_first(robot: Robot) -> list[str]:
+    """Names of the carried parts in the order in which Bullet numbers links, whatever the order in which they are given."""
+    carried = {j.child: j.parent for j in robot.present_joints}
+    order: list[str] = []
+    waiting = [robot.root.name]
+    while waiting:
+        name = waiting.pop()
+        order.append(name)
+        waiting += [q.name for q in reversed(robot.present_parts) if carried.get(q.name) == name]
+    return order[1:]
 
 
 def _with_rotor(robot: Robot, part: Part) -> Part:
