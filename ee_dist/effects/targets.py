@@ -22,6 +22,11 @@ def motors(robot: Robot) -> tuple[str, ...]:
     return robot.motor_names
 
 
+def stopped_joints(robot: Robot) -> tuple[str, ...]:
+    """Joints with a drive that do not turn without end."""
+    return tuple(name for name in robot.motor_names if math.isfinite(robot.joint(name).ends[1]))
+
+
 def powered(robot: Robot) -> tuple[str, ...]:
     """Joints that a motor moves."""
     return tuple(d.joint for d in robot.drives if d.command != "none")
