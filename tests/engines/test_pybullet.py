@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from engine_robots import calm_commands, loose_drive, one_joint, run
+from engine_robots import at, calm_commands, loose_drive, one_joint, run
 
 from ee_dist.engines.contract import Engine, Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.pybullet import engine as pybullet_engine
 from ee_dist.engines.pybullet.engine import POOL, WORLDS, PyBulletEngine
 from ee_dist.engines.pybullet.world import World
-from ee_dist.robots.model import Joint, Part, Robot, Sensor, Wiring
+from ee_dist.robots.model import CONTINUOUS_RAD, Joint, Part, Robot, Sensor, Wiring
 from ee_dist.robots.quadruped import quadruped
 
 
@@ -111,3 +111,11 @@ def test_parts_that_are_listed_branch_by_branch_keep_their_order() -> None:
         world = World(robot, 1)
         assert world.order == [q.name for q in robot.parts[1:]]
         world.close()
+
+
+def test_a_joint_without_stops_turns_as_fast_as_it_is_driven(engines: dict[str, Engine]) -> None:
+    wheel = one_joint("hinge", (0.0, 0.0, 1.0)).with_joint("joint", lower=-CONTINUOUS_RAD, upper=CONTINUOUS_RAD)
+    wheel = wheel.with_drive("joint", offset_torque=0.4)
+    for engine in engines.values():
+        speed = run(engine, wheel, 501, at([0.0], [150.0])).channel("velocity")
+        assert speed[[0, -1]] == pytest.approx([150.0, 150.0 + 0.4 / 0.008], rel=1e-3)

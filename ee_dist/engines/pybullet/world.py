@@ -8,6 +8,7 @@ between uses; anything else needs another world.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,6 +22,8 @@ from ee_dist.trials.log import State
 FLOOR_GROUP, ROBOT_GROUP = 1, 2
 SOLVER_ITERATIONS = 10
 """A fixed number: stopping at a residual would let the robots of a world decide each other's precision."""
+NO_TOP_SPEED = 1e9
+"""rad/s: a limit that no joint meets. Bullet's own is 100 rad/s, which a wheel or a rotor may pass."""
 
 _JOINTS = {"hinge": p.JOINT_REVOLUTE, "slide": p.JOINT_PRISMATIC, "fixed": p.JOINT_FIXED}
 
@@ -121,6 +124,9 @@ class World:
                 p.changeDynamics(
                     body, k, contactStiffness=stiffness, contactDamping=0.02 * stiffness, physicsClientId=c
                 )
+        if any(math.isinf(replace(joint, freedom=1.0).ends[1]) for joint, _ in self.joint_links):
+            # It is one number for all joints of a robot. Where all have stops it stays: any other could change a last bit.
+            p.changeDynamics(body, -1, maxJointVelocity=NO_TOP_SPEED, physicsClientId=c)
         driven = set(robot.motor_names)
         for joint, k in self.joint_links:
             # Bullet's own motors are off: torques are ours.
