@@ -50,6 +50,7 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
             kd=d.kd * scale,
             torque_limit=d.torque_limit * scale,
             speed_limit=d.speed_limit * scale,
+            command_gain=d.command_gain * scale if d.command == "torque" else d.command_gain,
         )
 
     return robot.map_drive(target, stronger)
