@@ -42,6 +42,11 @@ def position_drives(robot: Robot) -> tuple[str, ...]:
     return tuple(d.joint for d in robot.drives if d.command == "position")
 
 
+def controlled(robot: Robot) -> tuple[str, ...]:
+    """Joints under a controller of position or speed."""
+    return tuple(d.joint for d in robot.drives if d.command in ("position", "speed"))
+
+
 def damped_drives(robot: Robot) -> tuple[str, ...]:
     """Joints whose controller has a gain on their speed."""
     return tuple(d.joint for d in robot.drives if d.command == "position" and d.kd > 0)

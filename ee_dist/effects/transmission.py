@@ -10,7 +10,7 @@ from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range
-from ee_dist.effects.targets import motors, powered, stopped_joints
+from ee_dist.effects.targets import controlled, motors, powered, stopped_joints
 from ee_dist.robots.model import Drive, Robot
 
 
@@ -56,7 +56,7 @@ def _twists(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "elastic_transmission",
     family="drive",
-    targets=powered,
+    targets=controlled,
     parameters=(
         Parameter(
             "compliance_rad_nm", "rad/(N.m)", 0.0, math.inf, 0.0, "twist between motor and joint for each N.m", 0.001

@@ -170,6 +170,12 @@ def test_elastic_transmission_twists_by_compliance_times_torque(bench: Bench) ->
     assert found == pytest.approx(PULL_N / SERVO["kp"] + 0.004 * PULL_N, rel=1e-3)
 
 
+@pytest.mark.parametrize(("command", "acts"), [("position", True), ("speed", True), ("torque", False), ("none", False)])
+def test_elastic_transmission_is_for_drives_whose_controller_reads_the_motor(command: str, acts: bool) -> None:
+    # Where the torque is commanded, the joint gets it through a spring as well as without.
+    assert bool(CATALOGUE["elastic_transmission"].targets(slider(command=command))) is acts
+
+
 def test_elastic_transmission_swings_with_the_stiffness_of_motor_and_shaft_in_series(bench: Bench) -> None:
     soft = term("elastic_transmission", "joint", compliance_rad_nm=0.01)
     log = bench.run(slider(kp=400.0), soft, steps=3000, position=0.1)
