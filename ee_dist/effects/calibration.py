@@ -50,6 +50,7 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
             kd=d.kd * scale,
             torque_limit=d.torque_limit * scale,
             speed_limit=d.speed_limit * scale,
+            command_gain=d.command_gain * scale if d.command == "torque" else d.command_gain,
         )
 
     return robot.map_drive(target, stronger)
@@ -194,10 +195,12 @@ def gear_ratio(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
             rotor_inertia=d.rotor_inertia * n * n,
             torque_limit=d.torque_limit * n,
             speed_limit=d.speed_limit / n,
-            command_speed=d.command_speed / n if d.command == "position" else d.command_speed,
+            command_speed=d.command_speed / n,
             command_gain=d.command_gain * n if d.command == "torque" else d.command_gain / n,
             zero_offset=d.zero_offset / n,
             deadband=d.deadband / n,
+            current_gain=d.current_gain * n,
+            back_emf=d.back_emf * n * n,
         )
 
     return robot.map_drive(target, geared)

@@ -22,6 +22,11 @@ def motors(robot: Robot) -> tuple[str, ...]:
     return robot.motor_names
 
 
+def stopped_joints(robot: Robot) -> tuple[str, ...]:
+    """Joints with a drive that do not turn without end."""
+    return tuple(name for name in robot.motor_names if math.isfinite(robot.joint(name).ends[1]))
+
+
 def powered(robot: Robot) -> tuple[str, ...]:
     """Joints that a motor moves."""
     return tuple(d.joint for d in robot.drives if d.command != "none")
@@ -35,6 +40,11 @@ def bolted_motors(robot: Robot) -> tuple[str, ...]:
 def position_drives(robot: Robot) -> tuple[str, ...]:
     """Joints under a position controller."""
     return tuple(d.joint for d in robot.drives if d.command == "position")
+
+
+def controlled(robot: Robot) -> tuple[str, ...]:
+    """Joints under a controller of position or speed."""
+    return tuple(d.joint for d in robot.drives if d.command in ("position", "speed"))
 
 
 def damped_drives(robot: Robot) -> tuple[str, ...]:

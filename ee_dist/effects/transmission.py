@@ -10,14 +10,14 @@ from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range
-from ee_dist.effects.targets import motors, powered
+from ee_dist.effects.targets import controlled, motors, powered, stopped_joints
 from ee_dist.robots.model import Drive, Robot
 
 
 @effect(
     "joint_jam",
     family="drive",
-    targets=motors,
+    targets=stopped_joints,
     parameters=(Parameter("loss", "1", 0.0, 1.0, 0.0, "share of the range of motion that is lost", 0.02),),
     physics="Something blocks the joint: it moves freely, but only within a part of its range about the rest pose.",
     signature="The joint follows until a fixed position, then stops dead however large the command.",
@@ -56,7 +56,7 @@ def _twists(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "elastic_transmission",
     family="drive",
-    targets=powered,
+    targets=controlled,
     parameters=(
         Parameter(
             "compliance_rad_nm", "rad/(N.m)", 0.0, math.inf, 0.0, "twist between motor and joint for each N.m", 0.001

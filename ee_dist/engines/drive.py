@@ -214,6 +214,10 @@ class DrivePath:
             self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, sloped,
             self.integral, self.last_active, self.current, active, stiffness, damping,
         )  # fmt: skip
+        if self.uses["back_emf"]:
+            # Taken with the friction, at the end of the step; the current is less by it all the same.
+            lost = self.p["back_emf"] * speed * closed
+            self.current = np.where(self.p["back_emf"] != 0, self.current - lost, self.current)
         if self.uses["current_gain"]:
             self.current = self.current / self.p["current_gain"]
         return active, stiffness, damping

@@ -138,7 +138,7 @@ def _rub(
                 load = (per_step[r, j] + last_give[i, j]) * (speed[i, j] - last_speed[i, j]) - last_torque[i, j]
             limit = dry + stribeck * fading[i, j]
             if loaded:
-                external = _between(asked - motor[i, j] + load, -table[10, r, j], table[10, r, j])
+                external = _between(torque[i, j] - motor[i, j] + load, -table[10, r, j], table[10, r, j])
                 limit = limit + abs(driving * motor[i, j] - backdriving * external)
                 through = abs(motor[i, j] - external)
                 limit = limit + quadratic * (through * through)

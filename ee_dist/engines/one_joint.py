@@ -17,7 +17,8 @@ import numpy as np
 from ee_dist.engines.contract import EngineError, Rollout, Truth
 from ee_dist.engines.loop import in_batches, up_to
 from ee_dist.robots.inverse_dynamics import joint_torques
-from ee_dist.robots.model import Drive, Robot
+from ee_dist.robots.kinematics import compose, part_poses
+from ee_dist.robots.model import NO_TURN, Drive, Robot, Shape
 from ee_dist.trials.log import Array, SensorLog
 
 _PLAIN = Drive("", kp=0.0, ki=0.0, kd=0.0, torque_limit=0.0, speed_limit=1.0)
@@ -26,7 +27,8 @@ _PLAIN = Drive("", kp=0.0, ki=0.0, kd=0.0, torque_limit=0.0, speed_limit=1.0)
 def fits(robot: Robot) -> bool:
     """Whether this engine can simulate the robot."""
     moving = [j.name for j in robot.joints if j.kind != "fixed"]
-    return not robot.free_base and not robot.lost and moving == list(robot.motor_names) and len(moving) == 1
+    one = not robot.free_base and not robot.lost and moving == list(robot.motor_names) and len(moving) == 1
+    return one and not _may_touch(robot)
 
 
 class OneJointEngine:
@@ -89,6 +91,40 @@ class OneJointBodies:
 
     def close(self) -> None:
         """Nothing is held."""
+
+
+def _may_touch(robot: Robot) -> bool:
+    """Whether a shape that the joint moves could come down to the floor, by where its smallest ball goes."""
+    if not robot.world.has_floor:
+        return False
+    joint = next(j for j in robot.joints if j.kind != "fixed")
+    carried = [p for name in robot.subtree(joint.child) if (p := robot.part(name)).shapes]
+    # Height is a first harmonic of a hinge's angle, which is taken all the way round; on a slide the ends are the lowest.
+    span = joint.ends if joint.kind == "slide" else (0.0, math.pi / 2, math.pi)
+    if carried and not all(map(math.isfinite, span)):
+        return True
+    base = np.array([*robot.start_position_m, *robot.start_rotation])
+    base[3:] /= np.linalg.norm(base[3:])
+    poses = part_poses(robot, base, np.array([span]).T) if carried else {}
+    for part in carried:
+        for shape in part.shapes:
+            centre = compose(poses[part.name], np.array([*shape.position_m, *NO_TURN]))[:, 2]
+            lowest = centre.min()
+            if joint.kind == "hinge":
+                middle = (centre[0] + centre[2]) / 2
+                lowest = middle - math.hypot(centre[0] - middle, centre[1] - middle)
+            if lowest <= _radius(shape):
+                return True
+    return False
+
+
+def _radius(shape: Shape) -> float:
+    """Of a ball about the middle of a shape that holds all of it."""
+    if shape.kind == "capsule":
+        return shape.size[0] + shape.size[1] / 2
+    if shape.kind == "cylinder":
+        return math.hypot(shape.size[0], shape.size[1] / 2)
+    return math.hypot(*shape.size)
 
 
 def _dynamics(robot: Robot) -> tuple[float, float, float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ee_dist.effects.catalogue import Hypothesis, Term
-from ee_dist.effects.targets import carried_parts, motors, parts, sensors
+from ee_dist.effects.targets import carried_parts, motors, parts, sensors, stopped_joints
 from ee_dist.evaluation.jobs import Travel
 from ee_dist.evolution.ga import SCALE
 from ee_dist.recovery.behaviour import gait_of
@@ -69,7 +69,7 @@ WALKING = Subject(
         Situation("part_mass", parts, _heavier),
         Situation("motor_weak", motors, _loss),
         Situation("sensor_failing", sensors, _loss),
-        Situation("joint_jam", motors, _loss),
+        Situation("joint_jam", stopped_joints, _loss),
         Situation("floor_tilt", _floor, _tilt),
     ),
     normal=normal,

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.effects.catalogue import Hypothesis, Term, term
-from ee_dist.effects.targets import carried_parts, floor, motors, parts, sensors
+from ee_dist.effects.targets import carried_parts, floor, motors, parts, sensors, stopped_joints
 from ee_dist.engines.drivers import Network
 from ee_dist.recovery.diagnosis import Judge
 from ee_dist.recovery.kinds import subject_of
@@ -42,7 +42,7 @@ def faults(robot: Robot, beside: bool = False, pairs: bool = True) -> list[Hypot
     sizes, heavier, tilts = (SIZES_BESIDE, HEAVIER_BESIDE, TILTS_BESIDE_DEG) if beside else (SIZES, HEAVIER, TILTS_DEG)
     single: list[Term] = [term("part_lost", p) for p in carried_parts(robot)]
     single += [term("part_mass", p, change=c) for p in parts(robot) for c in heavier]
-    for name, places in (("motor_weak", motors), ("sensor_failing", sensors), ("joint_jam", motors)):
+    for name, places in (("motor_weak", motors), ("sensor_failing", sensors), ("joint_jam", stopped_joints)):
         single += [term(name, p, loss=s) for p in places(robot) for s in sizes]
     single += [term("floor_tilt", p, sideways_deg=s * t) for p in floor(robot) for t in tilts for s in (1.0, -1.0)]
     normal = subject_of(robot).normal

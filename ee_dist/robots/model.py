@@ -82,7 +82,8 @@ class Joint:
     upper: float
     rotation: Quat = NO_TURN
     freedom: float = 1.0
-    """Share of the range about position zero that a jam leaves; commands and sensors keep their scale."""
+    """Share of the range about the rest pose that a jam leaves; commands and sensors keep their scale. A joint rests at zero, or
+    where it starts if zero is out of its range."""
     top_speed: float = float("inf")
     """Highest speed that a data sheet states, rad/s (m/s for a slide): a scale for what is measured; it limits nothing."""
     start: float = 0.0
@@ -91,7 +92,10 @@ class Joint:
     @property
     def stops(self) -> tuple[float, float]:
         """The positions that the joint can reach."""
-        return self.lower * self.freedom, self.upper * self.freedom
+        if self.lower <= 0.0 <= self.upper or self.freedom == 1.0:
+            return self.lower * self.freedom, self.upper * self.freedom
+        rest = min(max(self.start, self.lower), self.upper)
+        return rest + (self.lower - rest) * self.freedom, rest + (self.upper - rest) * self.freedom
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from ee_dist.effects import CATALOGUE, apply, term
 from ee_dist.robots.inertia import mass_matrix
+from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.inverse_dynamics import joint_torques, parameters
 from ee_dist.robots.model import Drive, Joint, Part, Robot, Sensor, Wiring, World
 from ee_dist.robots.quadruped import quadruped
@@ -150,6 +151,20 @@ def test_gear_ratio_moves_less_and_pulls_more(bench: Bench) -> None:
     assert log.channel("torque").max() == pytest.approx(12.5)
     torque = bench.run(slider(command="torque"), geared, steps=2, command=4.0)
     assert torque.channel("torque")[-1] == pytest.approx(5.0)
+
+
+def test_gear_ratio_leaves_the_motor_as_it_is(bench: Bench) -> None:
+    geared = term("gear_ratio", "joint", change=0.25)
+    held = with_motor_torques(slider(kp=1e4, torque_limit=10.0))
+    log = bench.run(held, geared, steps=3, command=9.0)
+    assert log.channel("torque")[-1] == pytest.approx(12.5)
+    assert log.channel("motor_torque_joint")[-1] == pytest.approx(10.0), "the same current as before"
+    led = bench.run(slider(command="speed", kp=400.0, command_speed=0.5), geared, steps=500, command=2.0)
+    assert led.channel("velocity")[-1] == pytest.approx(0.4, rel=1e-3)
+    # Its speed without load is less by the ratio, whether by its data sheet or by more than that.
+    for own in ({"speed_limit": 1.0}, {"back_emf": 10.0}):
+        free = bench.run(slider(kp=1e4, torque_limit=10.0, **own), geared, steps=4000, command=9.0)
+        assert free.channel("velocity")[-1] == pytest.approx(1.0 / 1.25, rel=0.01)
 
 
 def test_sensor_group_delay_is_one_age_for_all_of_a_kind(bench: Bench) -> None:

@@ -25,6 +25,13 @@ def test_motor_gain_scales_the_torque_and_leaves_the_back_emf(bench: Bench, chan
     assert log.channel("velocity")[-1] == pytest.approx(1 + change, rel=0.01)
 
 
+def test_motor_gain_scales_a_commanded_torque_and_its_limit(bench: Bench) -> None:
+    robot, gain = slider(command="torque", torque_limit=10.0), term("motor_gain", "joint", change=0.5)
+    for command, expected in ((4.0, 6.0), (30.0, 15.0)):
+        log = bench.run(robot, gain, command=command, steps=3)
+        assert log.channel("torque")[-1] == pytest.approx(expected)
+
+
 def test_current_gain_changes_what_is_read_and_not_what_moves(bench: Bench) -> None:
     robot = with_motor_torques(slider(kp=100.0, torque_limit=10.0))
     plain, other = (

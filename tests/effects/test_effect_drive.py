@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from effect_robots import ARM_M, MASS_KG, Bench, G, block, lever, slider
 
-from ee_dist.effects import term
+from ee_dist.effects import CATALOGUE, term
 from ee_dist.effects.catalogue import Term
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import CONTINUOUS_M, Robot
 
 HOLD_NM = MASS_KG * G * ARM_M
 PULL_N = 10.0
@@ -109,6 +109,21 @@ def test_joint_jam_stops_the_joint_within_its_range(bench: Bench) -> None:
     assert found == pytest.approx(0.5, abs=0.002)
 
 
+def test_joint_jam_leaves_a_joint_whose_range_is_without_zero_about_where_it_starts(bench: Bench) -> None:
+    knee = slider(kp=400.0, kd=120.0).with_joint("joint", lower=-2.0, upper=-1.0, start=-1.2)
+    jam = term("joint_jam", "joint", loss=0.5)
+    for command, expected in ((0.0, -1.1), (-3.0, -1.6)):
+        log = bench.run(knee, jam, command=command, position=-1.2, steps=3000)
+        assert log.channel("position")[-1] == pytest.approx(expected, abs=0.002)
+    assert knee.with_joint("joint", freedom=0.0, start=-5.0).joint("joint").stops == (-2.0, -2.0)
+
+
+def test_joint_jam_is_for_joints_that_have_stops() -> None:
+    robot = slider()
+    assert CATALOGUE["joint_jam"].targets(robot) == ("joint",)
+    assert CATALOGUE["joint_jam"].targets(robot.with_joint("joint", lower=-CONTINUOUS_M, upper=CONTINUOUS_M)) == ()
+
+
 def test_backlash_is_how_far_the_joint_can_be_moved_with_the_motor_held(bench: Bench) -> None:
     ends = [
         settled(
@@ -153,6 +168,12 @@ def test_elastic_transmission_twists_by_compliance_times_torque(bench: Bench) ->
     grease = term("viscous_friction", "joint", damping_nm_s_rad=20.0)
     found = settled(bench, slider(**SERVO), soft, grease, term("offset_torque", "joint", torque_nm=PULL_N))
     assert found == pytest.approx(PULL_N / SERVO["kp"] + 0.004 * PULL_N, rel=1e-3)
+
+
+@pytest.mark.parametrize(("command", "acts"), [("position", True), ("speed", True), ("torque", False), ("none", False)])
+def test_elastic_transmission_is_for_drives_whose_controller_reads_the_motor(command: str, acts: bool) -> None:
+    # Where the torque is commanded, the joint gets it through a spring as well as without.
+    assert bool(CATALOGUE["elastic_transmission"].targets(slider(command=command))) is acts
 
 
 def test_elastic_transmission_swings_with_the_stiffness_of_motor_and_shaft_in_series(bench: Bench) -> None:

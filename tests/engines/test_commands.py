@@ -62,6 +62,27 @@ def test_a_speed_command_is_reached_and_held_against_friction(any_engine: Engine
     assert log.channel("velocity")[-1] == pytest.approx(0.4, rel=2e-3)
 
 
+@pytest.mark.parametrize("name", ["mujoco", "one_joint"])
+def test_friction_by_load_takes_no_damping_of_a_stiff_controller_for_load(
+    name: str, engines: dict[str, Engine]
+) -> None:
+    engine = engines.get(name) or OneJointEngine()
+    # The damping is taken at the end of the step; against the motor is viscous friction alone.
+    robot = slide(command="speed", kp=2 * MASS_KG / STEP_S, viscous=4.0, load_friction=0.2)
+    log = run(engine, with_motor_torques(robot), 400, at([0.0], [3.0]), np.full((1, 1), 3.0))
+    assert log.channel("velocity")[-1] == pytest.approx(3.0, rel=0.02)
+    assert log.channel("motor_torque_joint")[-1] == pytest.approx(3.0 * 4.0 / 0.8, rel=0.02)
+
+
+def test_speed_that_costs_more_torque_shows_in_the_motors_current(any_engine: Engine) -> None:
+    robot = with_motor_torques(slide(command="speed", kp=40.0, viscous=2.0, speed_limit=10.0))
+    # The same back-EMF in all, once the data sheet's own and once in part on top of it.
+    alone, on_top = robot.with_drive("joint", speed_limit=5.0), robot.with_drive("joint", back_emf=5.0)
+    told, extra = (run(any_engine, r, 300, commands=np.full((1, 1), 2.0)) for r in (alone, on_top))
+    assert told.channel("velocity")[-1] > 1.5
+    assert extra.channel("motor_torque_joint")[2:] == pytest.approx(told.channel("motor_torque_joint")[2:], rel=0.02)
+
+
 def test_a_passive_joint_takes_no_command_but_has_its_spring_and_friction(any_engine: Engine) -> None:
     robot = slide(command="none", kp=100.0, spring=20.0, spring_rest=0.3, viscous=8.0)
     log = run(any_engine, robot, 4000, commands=np.full((1, 1), np.nan))

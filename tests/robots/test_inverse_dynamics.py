@@ -25,7 +25,7 @@ from ee_dist.robots.inverse_dynamics import (
     weights,
 )
 from ee_dist.robots.linear_stage import linear_stage
-from ee_dist.robots.model import RobotError
+from ee_dist.robots.model import RobotError, Shape
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import State
@@ -87,6 +87,20 @@ def test_one_joint_rows_do_not_depend_on_their_batch() -> None:
     for job, log in zip(jobs, together, strict=True):
         assert np.array_equal(OneJointEngine().rollout([job])[0].sensors, log.sensors)
     assert not fits(quadruped())
+
+
+def test_one_joint_knows_no_floor_that_its_body_could_touch() -> None:
+    hinge = servo_pendulum()
+    joint = hinge.joints[0]
+    ball = Shape("sphere", (0.1,), (0.0, 0.0, -0.3))
+    for robot in (hinge, hinge.with_joint(joint.name, kind="slide", axis=(0.0, 0.0, 1.0), lower=-0.3, upper=0.3)):
+        shaped = robot.with_part(joint.child, shapes=(ball,)).with_joint(joint.name, position_m=(0.0, 0.0, 0.0))
+        shaped = replace(shaped, start_position_m=(0.0, 0.0, 0.3))
+        high = replace(shaped, start_position_m=(0.0, 0.0, 1.0))
+        assert fits(shaped)
+        assert not fits(shaped.with_world(has_floor=True))
+        assert fits(high.with_world(has_floor=True))
+        assert fits(robot.with_part(joint.child, shapes=()).with_world(has_floor=True))
 
 
 def test_an_encoder_mounted_turned() -> None:

@@ -8,6 +8,7 @@ between uses; anything else needs another world.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,6 +22,8 @@ from ee_dist.trials.log import State
 FLOOR_GROUP, ROBOT_GROUP = 1, 2
 SOLVER_ITERATIONS = 10
 """A fixed number: stopping at a residual would let the robots of a world decide each other's precision."""
+NO_TOP_SPEED = 1e9
+"""rad/s: a limit that no joint meets. Bullet's own is 100 rad/s, which a wheel or a rotor may pass."""
 
 _JOINTS = {"hinge": p.JOINT_REVOLUTE, "slide": p.JOINT_PRISMATIC, "fixed": p.JOINT_FIXED}
 
@@ -65,7 +68,7 @@ class World:
             p.setCollisionFilterGroupMask(self.floor, -1, FLOOR_GROUP, ROBOT_GROUP, physicsClientId=c)
             p.changeDynamics(self.floor, -1, lateralFriction=1.0, physicsClientId=c)
         joints = {j.child: j for j in robot.present_joints}
-        self.order = [q.name for q in robot.present_parts if q.name in joints]
+        self.order = _depth_first(robot)
         link = {name: i for i, name in enumerate(self.order)}
         link[robot.root.name] = -1
         self.link_of_part = link
@@ -121,6 +124,9 @@ class World:
                 p.changeDynamics(
                     body, k, contactStiffness=stiffness, contactDamping=0.02 * stiffness, physicsClientId=c
                 )
+        if any(math.isinf(replace(joint, freedom=1.0).ends[1]) for joint, _ in self.joint_links):
+            # It is one number for all joints of a robot. Where all have stops it stays: any other could change a last bit.
+            p.changeDynamics(body, -1, maxJointVelocity=NO_TOP_SPEED, physicsClientId=c)
         driven = set(robot.motor_names)
         for joint, k in self.joint_links:
             # Bullet's own motors are off: torques are ours.
@@ -200,6 +206,18 @@ class World:
 
     def close(self) -> None:
         p.disconnect(self.client)
+
+
+def _depth_first(robot: Robot) -> list[str]:
+    """Names of the carried parts in the order in which Bullet numbers links, whatever the order in which they are given."""
+    carried = {j.child: j.parent for j in robot.present_joints}
+    order: list[str] = []
+    waiting = [robot.root.name]
+    while waiting:
+        name = waiting.pop()
+        order.append(name)
+        waiting += [q.name for q in reversed(robot.present_parts) if carried.get(q.name) == name]
+    return order[1:]
 
 
 def _with_rotor(robot: Robot, part: Part) -> Part:
