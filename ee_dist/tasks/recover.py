@@ -70,6 +70,12 @@ class Options:
         one_of("task.gaits", self.gaits, GAITS)
 
 
+LIMITED = (
+    "The models know none of the limits of hardware.range_share, hardware.speed and hardware.acceleration: where a controller "
+    "asks for more, what it gets instead looks like a fault of the robot, and a gait goes less far than predicted."
+)
+
+
 def run(config: Config, options: Options, out: Path) -> None:
     """Write recovery.mcap, recovery.rrd and summary.json into ``out`` and print the result."""
     console, watch = terminal(), Stopwatch()
@@ -109,6 +115,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     }
     console.print(f"Scenario {scenario.label}: {scenario.title}. Seed {config.seed}, budget {config.budget.name}, "
                   f"{config.engine.name}.", highlight=False)  # fmt: skip
+    if body and config.hardware.limits().moves:
+        console.print(LIMITED, highlight=False)
     path = out / "recovery.mcap"
     digest = ResultDigest()
     beliefs, gaits, measured = Beliefs(), Gaits(robot, hidden), Measured()

@@ -85,6 +85,11 @@ class Limits:
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name}={getattr(self, name)}: must be above 0")
 
+    @property
+    def moves(self) -> bool:
+        """Whether a body may be told something else than its controller asked for."""
+        return self.range_share < 1.0 or math.isfinite(self.speed) or math.isfinite(self.acceleration)
+
 
 class Limiter:
     """Commands of one trial, brought within the limits before they are sent. What is no number is never sent.

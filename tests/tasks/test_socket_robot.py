@@ -296,3 +296,14 @@ def test_a_robot_that_goes_nowhere_is_refused_before_its_first_trial(cli, robot)
     assert outcome.status == 2
     (line,) = outcome.err.strip().splitlines()
     assert "stands on no floor or on a fixed base" in line
+
+
+@pytest.mark.parametrize("limits", [{"range_share": 0.9}, {"speed": 2.0}, {"acceleration": 50.0}])
+def test_limits_that_no_model_knows_are_told_before_the_search(cli, tiny, tmp_path, limits):
+    assert Limits(**limits).moves and not Limits(torque=2.0).moves
+    (name, value), out = next(iter(limits.items())), tmp_path / "run"
+    with plugged_in() as robot:
+        said = cli(
+            *tiny, *FAST, f"hardware.address={robot.address}", f"hardware.{name}={value}", f"hydra.run.dir={out}"
+        )
+    assert "The models know none of the limits" in " ".join(said.out.split())
