@@ -58,8 +58,8 @@ USED_BY = {
     "repair": (("recover",), ""),
 }
 """Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
-LONGEST_NAME = 200
-"""Characters of the folder name of a job of a sweep; file systems take 255 bytes."""
+LONGEST_NAME = 255
+"""Characters of the folder name of a job of a sweep, as many as file systems take."""
 _OPENS = re.compile(r"^\+{0,2}(measured|log)=(?!null$)")
 _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench.task"}
 """Modules of verbs that do not have the name of the verb: the workbench stands above all tasks, which it runs."""
