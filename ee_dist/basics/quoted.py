@@ -15,8 +15,12 @@ _short.maxstring = _short.maxother = _short.maxlong = LONGEST
 
 def quoted(value: Any) -> str:
     """Like ``repr``, with the middle left out of what is long; takes no longer for a value of megabytes."""
-    text = " ".join(_short.repr(value).split())
-    return short(text, LONGEST)
+    return one_line(_short.repr(value))
+
+
+def one_line(text: str, longest: int = LONGEST) -> str:
+    """A text that may hold line breaks, as one short line."""
+    return short(" ".join(text.split()), longest)
 
 
 def short(text: str, longest: int = 300) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from google.protobuf.message import DecodeError
 
-from ee_dist.basics.quoted import short
+from ee_dist.basics.quoted import one_line
 from ee_dist.recording import codec, schemas, topics
 from ee_dist.recording.contents import Contents, damage, read_contents
 from ee_dist.recording.errors import RecordingError
@@ -83,7 +83,7 @@ def _read(path: Path) -> tuple[Contents, str, dict[str, str], dict[str, str]]:
         raise RecordingError(f"{path}: cut off before anything was recorded")
     if version not in (topics.FIRST_FORMAT, topics.FORMAT):
         raise RecordingError(
-            f"{path}: recorded in format {short(' '.join(version.split()), 80)}; this version reads formats "
+            f"{path}: recorded in format {one_line(version)}; this version reads formats "
             f"{topics.FIRST_FORMAT} and {topics.FORMAT}"
         )
     return contents, version, merged.get(topics.RUN_RECORD, {}), merged.get(topics.STATUS_RECORD, {})

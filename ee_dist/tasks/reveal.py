@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ee_dist.basics.quoted import short
+from ee_dist.basics.quoted import one_line
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.effects.groups import members_of
@@ -83,9 +83,7 @@ def score(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -
             raise ConfigError(
                 f"task.explained: its summary is not as task={task} writes it; it was changed, or is of another version"
             ) from None
-    raise ConfigError(
-        f"task.explained: a summary of task={short(' '.join(task.split()), 80)}; expected one of explain or improve"
-    )
+    raise ConfigError(f"task.explained: a summary of task={one_line(task)}; expected one of explain or improve")
 
 
 def places(terms: Sequence[tuple[str, str]], robot: Robot | None) -> Places:

@@ -88,6 +88,10 @@ def _driven(log: SensorLog) -> bool:
     return bool(np.isfinite(log.commands).all(axis=1).any())
 
 
+def _all_driven(measured: Measurements) -> bool:
+    return all(_driven(t.log) for t in measured.trials)
+
+
 def _nothing_commanded(measured: Measurements, by: str) -> str:
     silent = next(t.name for t in measured.trials if not _driven(t.log))
     return (
@@ -105,7 +109,7 @@ def way_of(measured: Measurements, by: str) -> Way:
     """The way asked for; for ``auto`` that of a calibration, else what the channels allow and tell most by. Raises ConfigError
     for one that cannot be."""
     known_way(by)
-    driven = all(_driven(t.log) for t in measured.trials)
+    driven = _all_driven(measured)
     if by == AUTO and measured.calibrated_by:
         return _possible(WAYS[measured.calibrated_by], measured)
     if by == AUTO:
@@ -139,8 +143,8 @@ def _weak(measured: Measurements) -> str:
 
 def _possible(way: Way, measured: Measurements) -> Way:
     """The way itself. Raises ConfigError where it cannot be."""
-    by, driven = way.name, all(_driven(t.log) for t in measured.trials)
-    if way.commanded and measured.trials and not driven:
+    by = way.name
+    if way.commanded and not _all_driven(measured):
         raise ConfigError(_nothing_commanded(measured, by))
     if measured.robot.free_base and not way.moves:
         raise ConfigError(f"task.by={by}: {measured.robot.name} moves about; use task.by=open_loop")

@@ -52,7 +52,7 @@ def family(
             if kind == "rest":
                 still = Excitation(kind, limits.seconds, limits.amplitude, 0, fixture)
                 # To come to rest in the middle may be too fast a way for a robot that stands elsewhere.
-                if fastest(robot, still) <= limits.speed * (1 + 1e-9):
+                if _keeps(robot, still, limits):
                     found.append(still)
                 continue
             for k in range(draws):
@@ -72,8 +72,12 @@ def largest(robot: Robot, wanted: Excitation, limits: Limits) -> float:
     peak = fastest(robot, replace(wanted, amplitude=most))
     most = _short(most * min(1.0, limits.speed / peak)) if peak else most
     # The way from where it stands to the middle may be too fast by itself.
-    kept = most >= LEAST and fastest(robot, replace(wanted, amplitude=most)) <= limits.speed * (1 + 1e-9)
+    kept = most >= LEAST and _keeps(robot, replace(wanted, amplitude=most), limits)
     return most if kept else 0.0
+
+
+def _keeps(robot: Robot, excitation: Excitation, limits: Limits) -> bool:
+    return fastest(robot, excitation) <= limits.speed * (1 + 1e-9)
 
 
 def fastest(robot: Robot, excitation: Excitation) -> float:

@@ -4,11 +4,11 @@ little of either, and what a description has a little wrong in one of them is mu
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ee_dist.discrepancy.ways.force_balance.motion import Motion
+from ee_dist.discrepancy.ways.force_balance.weight import without_weight
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -21,7 +21,7 @@ def left_to_give(models: Sequence[Robot], motions: Sequence[Motion], size: Array
     and inertia needed, each for itself: 1 where they do not cancel, or there is nothing to cancel."""
     both = weight = inertia = 0.0
     for model, motion in zip(models, motions, strict=True):
-        floating = replace(model, world=replace(model.world, gravity_m_s2=0.0))
+        floating = without_weight(model)
         needed, without = (motion.needed(m)[1] / size for m in (model, floating))
         both = both + np.sum(needed**2, axis=0)
         weight, inertia = weight + np.sum((needed - without) ** 2, axis=0), inertia + np.sum(without**2, axis=0)

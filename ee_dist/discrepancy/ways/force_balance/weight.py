@@ -18,6 +18,10 @@ MOSTLY = 0.5
 """and of what it leaves over with its weight that it may leave at most without."""
 
 
+def without_weight(model: Robot) -> Robot:
+    return replace(model, world=replace(model.world, gravity_m_s2=0.0))
+
+
 def weightless(models: Sequence[Robot], balances: Sequence[Balance], scale: Array) -> str:
     """A sentence where the torques are those of the model without its weight; empty where they carry it, or it has none to
     speak of. Friction that every description may lack, dry and viscous, is fitted at each joint before."""
@@ -25,7 +29,7 @@ def weightless(models: Sequence[Robot], balances: Sequence[Balance], scale: Arra
         return ""
     parts = []
     for model, balance in zip(models, balances, strict=True):
-        floating = replace(model, world=replace(model.world, gravity_m_s2=0.0))
+        floating = without_weight(model)
         found, without = balance(model), balance(floating)
         if found is None or without is None:
             return ""
