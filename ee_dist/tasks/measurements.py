@@ -72,7 +72,9 @@ def load(config: Config) -> Measurements:
                 continue
             # What an import says about a trial (a gain, a payload) comes on top of how it was held.
             setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
-            trials.append(MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup))
+            trials.append(
+                MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup, _whether_held(run))
+            )
     if not trials:
         raise LogError(_too_short(*short[0]))
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
@@ -102,6 +104,12 @@ def load(config: Config) -> Measurements:
         by,
         tuple(remarks),
     )
+
+
+def _whether_held(run: RunRecord) -> bool | None:
+    """Drives of our own simulations do not hold their commands; of others it is to be found out."""
+    real = run.metadata.get("task") == "import" or (run.metadata.get("task") == "trial" and "seal" not in run.metadata)
+    return None if real else False
 
 
 def with_known_noise(measured: Measurements) -> Robot:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
@@ -24,14 +24,27 @@ from ee_dist.trials.log import SensorLog
 
 @dataclass(frozen=True)
 class Way:
-    """``make`` builds the problem; ``why`` is what speaks for it; ``moves``: whether it can follow a body that moves about;
+    """``build`` makes the problem; ``why`` is what speaks for it; ``moves``: whether it can follow a body that moves about;
     ``commanded``: whether it needs to know what the drives were told."""
 
     name: str
     why: str
-    make: Callable[[Measurements, Config], Problem]
+    build: Callable[[Measurements, Config], Problem]
     moves: bool = False
     commanded: bool = True
+
+    def make(self, measured: Measurements, config: Config) -> Problem:
+        """The problem. Where nobody knows whether drives held their commands from row to row, the reading of the log with which
+        the robot as it is described leaves less: drives of a robot do, those of somebody's simulation may not."""
+        if not self.commanded or all(t.held is not None for t in measured.trials):
+            return self.build(measured, config)
+        readings = [self.build(_as_held(measured, held), config) for held in (False, True)]
+        return min(readings, key=lambda problem: error(problem.residuals([()])[0]))
+
+
+def _as_held(measured: Measurements, held: bool) -> Measurements:
+    trials = [t if t.held is not None else replace(t, held=held) for t in measured.trials]
+    return replace(measured, trials=tuple(trials))
 
 
 def open_loop(measured: Measurements, config: Config) -> OpenLoop:

@@ -51,8 +51,10 @@ class Sight:
     """Measurements under one way of comparing, weighed by one model. Not for several threads at once."""
 
     def __init__(self, measured: Measurements, config: Config, way: Way) -> None:
-        self.measured, self.config, self.way = measured, config, way
+        self.config, self.way = config, way
         self.problem: Problem = way.make(measured, config)
+        # How the logs are read is settled once.
+        self.measured = replace(measured, trials=self.problem.measured)
         self._single: dict[int, Problem] = {}
 
     def weighed(self, terms: Hypothesis) -> Sight:

@@ -137,7 +137,7 @@ class FreeRun(Problem):
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
         chosen = [i for i, p in enumerate(self.pieces) if trials is None or p.trial in set(trials)]
-        models = {k: [apply(self.setups[k], h) for h in hypotheses] for k in {self.pieces[i].trial for i in chosen}}
+        models = {k: [self._simulated(k, h) for h in hypotheses] for k in {self.pieces[i].trial for i in chosen}}
         # Rollouts of one length with the same inputs share a batch, so all run as long as the longest.
         steps, switched = max(len(p.log) for p in self.pieces), any(p.enabled is not None for p in self.pieces)
         jobs = [
@@ -154,6 +154,9 @@ class FreeRun(Problem):
                 value = np.sign(gap) * np.sqrt(np.abs(gap) * (self.weight[self.slices[i].start] / self.noise))
             out[:, self.slices[i]] = np.where(np.isfinite(value), value, np.inf).reshape(len(hypotheses), -1)
         return out
+
+    def _simulated(self, trial: int, hypothesis: Hypothesis) -> Robot:
+        return self.measured[trial].simulated(apply(self.setups[trial], hypothesis))
 
     def noise_floor(self) -> tuple[float, str]:
         return 1.0, "estimated: second differences of the measured positions"
@@ -199,7 +202,7 @@ class FreeRun(Problem):
         first = {p.trial: p for p in reversed(self.pieces)}
         jobs = []
         for k, p in sorted(first.items()):
-            rollout = p.rollout(apply(self.setups[k], hypothesis), len(p.log), False)
+            rollout = p.rollout(self._simulated(k, hypothesis), len(p.log), False)
             jobs.append(Job(replace(rollout, pose=True), Whole()))
         return list(self.evaluator.evaluate(jobs))
 
@@ -267,7 +270,7 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
             f"{1 / robot.time_step_s:g} Hz"
         )
     speeds = speeds_of(log, robot)
-    commands, enabled = released(log.commands)
+    commands, enabled = released(trial.obeyed(log.commands))
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
     found = []
     for first in range(0, len(log), length):

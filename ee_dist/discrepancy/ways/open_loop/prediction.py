@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released, start_of
+from ee_dist.discrepancy.steps import centred
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands, Controllers, Network, command_scaling
 from ee_dist.engines.sensing import SensingPath
@@ -67,29 +68,39 @@ class Digest:
 
 @dataclass(frozen=True)
 class ToDigest:
-    """The reduction that makes one, of the ``rows`` in which the measured sensors were read; of all where it is None."""
+    """The reduction that makes one, of the ``rows`` in which the measured sensors were read; of all where it is None. Of
+    channels that are ``early`` see ``centred``."""
 
     block: int
     window: int
     rows: tuple[int, ...] | None = None
+    early: tuple[int, ...] = ()
 
     @property
     def key(self) -> str:
         read = "" if self.rows is None else f":{hashlib.sha256(repr(self.rows).encode()).hexdigest()}"
-        return f"digest:{self.block}:{self.window}{read}"
+        return f"digest:{self.block}:{self.window}{read}{_of_early(self.early)}"
 
     def __call__(self, log: SensorLog) -> Digest:
-        return digest(of_rows(log.sensors, self.rows), self.block, self.window)
+        return digest(of_rows(centred(log.sensors, self.early), self.rows), self.block, self.window)
 
 
 @dataclass(frozen=True)
 class ToSensors:
     """The reduction that keeps the channels (T, S)."""
 
-    key: str = "sensors"
+    early: tuple[int, ...] = ()
+
+    @property
+    def key(self) -> str:
+        return f"sensors{_of_early(self.early)}"
 
     def __call__(self, log: SensorLog) -> Array:
-        return np.array(log.sensors)
+        return centred(np.array(log.sensors), self.early)
+
+
+def _of_early(columns: Sequence[int]) -> str:
+    return f":early{tuple(columns)}" if columns else ""
 
 
 def rows_read(log: SensorLog) -> tuple[int, ...] | None:
@@ -130,7 +141,7 @@ def wired_commands(trial: MeasuredTrial, model: Robot) -> Commands:
     if isinstance(trial.driver, Network):
         return Commands(trial.log.commands)
     planned = trial.driver.values if isinstance(trial.driver, Commands) else trial.log.commands
-    return Commands(np.ascontiguousarray(planned[: len(trial.log)][:, list(model.wiring.source)]))
+    return Commands(np.ascontiguousarray(trial.obeyed(planned[: len(trial.log)])[:, list(model.wiring.source)]))
 
 
 def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) -> Rollout:
@@ -138,7 +149,7 @@ def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) ->
     commands, enabled = released(wired_commands(trial, model).values)
     start = start_of(trial.log, model)
     return Rollout(
-        bare or clean(model),
+        trial.simulated(bare or clean(model)),
         Commands(commands),
         len(trial.log),
         start=start,
@@ -167,7 +178,9 @@ class Predictor:
         for k, model in pairs:
             if id(model) not in bare:
                 bare[id(model)] = clean(model)
-            reduction = ToSensors() if changed[id(model)] else ToDigest(self.block, self.window, self.rows[k])
+            early = self.trials[k].early(self.base)
+            whole = bool(changed[id(model)])
+            reduction = ToSensors(early) if whole else ToDigest(self.block, self.window, self.rows[k], early)
             jobs.append(Job(rollout_of(self.trials[k], model, bare[id(model)]), reduction))
         found = self.evaluator.evaluate(jobs)
         out: list[Digest] = list(found)

@@ -126,7 +126,7 @@ class OpenLoop(Problem):
         pairs = [(k, m) for k in range(len(self.measured)) for m in self._held(models, k)]
         found = self.predictor.digests(pairs)
         self.repeating = repeating(self.robot, zip(self._data, found[:: len(models)], strict=True), self.window)
-        tiny = (0.25 * self.scale.scale) ** 2
+        self._undeclared = self._rougher(found[:: len(models)])
         self.deviation: list[Array] = []
         self.grain_deviation: list[Array] = []
         for k in range(len(self.measured)):
@@ -137,13 +137,35 @@ class OpenLoop(Problem):
             grain = np.zeros_like(base.rough, dtype=float)
             if others and base.finite:
                 spread = np.mean([(d.means.astype(float) - base.means) ** 2 for d in others], axis=0)
-                grain = np.mean([np.log((d.rough + tiny) / (base.rough + tiny)) ** 2 for d in others], axis=0)
+                grain = np.mean([np.log(self._rough(d) / self._rough(base)) ** 2 for d in others], axis=0)
             self.deviation.append(np.sqrt(noise + _held_up(spread)))
             self.grain_deviation.append(np.sqrt(2 * 1.95 / self.window + 0.01 + self._known(k)[1] + _held_up(grain)))
 
         quiet = np.array([s.kind != "touch" for s in self.robot.sensors])
         alone = self.scale.scale**2 / self.block
         self._trust = tuple(float(1.0 / np.mean((d**2 / alone)[:, quiet])) for d in self.deviation)
+
+    @property
+    def _tiny(self) -> Array:
+        return (0.25 * self.scale.scale) ** 2
+
+    def _rough(self, predicted: Digest) -> Array:
+        """(windows, S) of a prediction, with the noise that no description declares."""
+        return np.asarray(predicted.rough + self._undeclared + self._tiny)
+
+    def _rougher(self, predicted: Sequence[Digest]) -> Array:
+        """(S,) variance of noise where none is declared: by how much channels are rougher than the model's, and no more than
+        others of their kind, so that a sensor that is noisier than they are stands out."""
+        kinds = np.array([s.kind for s in self.robot.sensors])
+        if any(s.noise for s in self.robot.sensors) or not all(p.finite for p in predicted):
+            return np.zeros(len(kinds))
+        more = np.concatenate([d.rough.astype(float) - p.rough for d, p in zip(self._data, predicted, strict=True)])
+        own = np.clip(np.median(more, axis=0), 0.0, self.scale.noise**2) if len(more) else np.zeros(len(kinds))
+        usual = {
+            kind: np.median(own[kinds == kind]) if (kinds == kind).sum() > 2 else own[kinds == kind].min()
+            for kind in kinds
+        }
+        return np.minimum(own, [usual[kind] for kind in kinds])
 
     def shows(self, effect: str, target: str) -> bool:
         """Where most sensors repeat readings, that one does so too says nothing."""
@@ -278,8 +300,7 @@ class OpenLoop(Problem):
         if not predicted.finite:
             return np.full(measured.means.size + 2 * measured.rough.size, np.inf)
         shape = (measured.means.astype(float) - predicted.means) / self.deviation[trial]
-        tiny = (0.25 * self.scale.scale) ** 2
-        grain = np.log((measured.rough + tiny) / (predicted.rough + tiny)) / self.grain_deviation[trial]
+        grain = np.log((measured.rough + self._tiny) / self._rough(predicted)) / self.grain_deviation[trial]
         compared = np.array([x.kind not in self.repeating for x in self.robot.sensors])
         texture = np.stack([grain, frozen(measured, predicted, self.window) * compared], axis=1)
         return np.concatenate([soften(shape).ravel(), soften(texture).ravel()])
@@ -349,7 +370,8 @@ class OpenLoop(Problem):
         model = apply(self.robot, hypothesis)
         models = [apply(model, t.setup) for t in self.measured]
         rollouts = [rollout_of(t, m) for t, m in zip(self.measured, models, strict=True)]
-        true = self.evaluator.evaluate([Job(r, ToSensors()) for r in rollouts])
+        jobs = [Job(r, ToSensors(t.early(self.robot))) for t, r in zip(self.measured, rollouts, strict=True)]
+        true = self.evaluator.evaluate(jobs)
         return [report(m, v) for m, v in zip(models, true, strict=True)]
 
 

@@ -1,0 +1,55 @@
+"""What steps make of a robot that lives in continuous time, and what makes up for it.
+
+Engines take a force at the start of a step, then speed, then position. That is a leapfrog (Hairer, Lubich and Wanner, Acta
+Numerica 2003): a force counts from half a step before its row to half a step after, and the speed that a step begins with is
+that of half a step ago. Of what is as fast as a few steps that is an error as large as a late sensor or a heavier rotor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ee_dist.engines.drive import stiff_joints
+from ee_dist.robots.model import Drive, Robot
+from ee_dist.trials.log import Array
+
+SPEEDS = ("velocity", "speed_x", "turn_rate")
+"""Kinds of sensors that read a speed."""
+
+
+def held(commands: Array) -> Array:
+    """Commands (T, M) that hold from their row to the next, as the steps of a simulation are to take them: the mean of the one
+    before and this one. Taken as they are they come half a step early."""
+    before = np.concatenate([commands[:1], commands[:-1]])
+    both = np.isfinite(before) & np.isfinite(commands)
+    return np.where(both, (np.nan_to_num(before) + np.nan_to_num(commands)) / 2, commands)
+
+
+def centred(values: Array, columns: Sequence[int]) -> Array:
+    """Channels (T, S) of a simulation, those ``columns`` that are speeds brought from half a step before their row to it."""
+    if not columns:
+        return values
+    out, speeds = np.array(values), values[:, list(columns)]
+    out[:-1, list(columns)] = (speeds[:-1] + speeds[1:]) / 2
+    return out
+
+
+def between_steps(robot: Robot) -> Robot:
+    """The robot whose steps follow what this one does in continuous time. Damping by the speed of half a step ago pushes where
+    it should resist, as if half a step's damping were missing from the inertia: it is put back on the rotor. Damping that
+    an engine takes at the end of a step is as much too much."""
+    ends = stiff_joints(robot)
+    drives = [_made_up(d, robot.time_step_s / 2, bool(end)) for d, end in zip(robot.drives, ends, strict=True)]
+    return replace(robot, drives=tuple(drives))
+
+
+def _made_up(drive: Drive, half_s: float, at_end: bool) -> Drive:
+    controller = {"position": drive.kd, "speed": drive.kp}.get(drive.command, 0.0)
+    voltage = drive.command in ("position", "speed") and np.isfinite(drive.speed_limit)
+    active = (controller + (drive.torque_limit / drive.speed_limit if voltage else 0.0)) * drive.strength
+    begin, end = (0.0, active) if at_end else (active, 0.0)
+    end += drive.viscous + drive.back_emf * drive.strength
+    return replace(drive, rotor_inertia=max(0.0, drive.rotor_inertia + half_s * (begin - end)))
