@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.effects.laws import text_of_law
 from ee_dist.engines.drivers import Driver
 from ee_dist.trials.log import Array, SensorLog, State
 
@@ -48,6 +49,9 @@ class Rollout:
         parts = [self.model.digest, self.driver.key, str(self.steps), str(seed), str(self.pose)]
         for a in (self.supply_v, self.enabled, self.external, *_arrays(self.start)):
             parts.append("-" if a is None else hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest())
+        # A robot names its laws. What a law of the user's own does is in their file, which may change between two runs.
+        laws = {law.name for law in getattr(self.model, "laws", ())}
+        parts.extend(text for name in sorted(laws) if (text := text_of_law(name)))
         return "|".join(parts)
 
 
