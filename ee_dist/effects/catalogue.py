@@ -310,7 +310,8 @@ def apply(robot: Model, hypothesis: Iterable[Term]) -> Model:
         allowed = entry.targets(robot)
         places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
         if not places:
-            near = nearest(t.target, allowed) or allowed
+            shared = entry.shared(robot) if isinstance(robot, Robot) else ()
+            near = nearest(t.target, [*allowed, *shared]) or allowed
             raise EffectError(
                 f"{t.effect} cannot act on {quoted(t.target)} of {robot.name}; it can act on: {listed(near)}"
             )
