@@ -178,11 +178,11 @@ class Shim:
         most_gear = GEAR_LIMIT * d["torque_limit"]
         external = np.clip(torque - self.native * speed - motor + load, -most_gear, most_gear)
         through = np.abs(motor - external)
-        fading = np.exp(-np.abs(speed) / d["stribeck_speed"])
+        fading, of_load = (np.exp(-np.abs(speed) / d[n]) for n in ("stribeck_speed", "stribeck_load_speed"))
         backward = np.maximum(d["load_friction"] + d["backdrive_friction"], 0.0)
         limit = d["coulomb"] + d["brake"] + d["stribeck"] * fading
         limit = limit + np.abs(d["load_friction"] * motor - backward * external)
-        limit = limit + d["quadratic_friction"] * through**2 + d["stribeck_load"] * fading * through
+        limit = limit + d["quadratic_friction"] * through**2 + d["stribeck_load"] * of_load * through
         up, down = (np.maximum(limit + side * d["friction_asymmetry"], 0.0) for side in (1.0, -1.0))
         viscous = d["viscous"] + d["back_emf"] * d["strength"] * enabled
         steepest = viscous + np.abs(d["viscous_asymmetry"])
