@@ -76,12 +76,16 @@ class Truth:
 class Bodies(Protocol):
     """B bodies in an engine, all at their start. The only part of a rollout that an engine writes itself."""
 
+    gives: bool
+    """Whether the engine takes ``give`` (see ``step``)."""
+
     def read(self, touch: bool, pose: bool, twist: bool) -> Truth: ...
 
     def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
         """Advance by one time step under joint torques (B, M) and a force (B, 3) on the root part, floor frame.
 
-        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step, in an engine that can do that.
+        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step, in an engine that can do that;
+        others are not asked to.
         """
 
     def close(self) -> None:

@@ -42,8 +42,10 @@ STOP_SHARE = 0.5
 class DrivePath:
     """State and arithmetic of the drives of B robots with M motors each."""
 
-    def __init__(self, robots: Sequence[Robot], time_step_s: float) -> None:
-        self.dt = time_step_s
+    def __init__(self, robots: Sequence[Robot], time_step_s: float, gives: bool = True) -> None:
+        """``gives``: whether the engine takes steep damping at the end of its step. Friction that counts on it where it is
+        not so takes what the damping did for a load, rubs with it, and drives the joint."""
+        self.dt, self.gives = time_step_s, gives
         shape = (len(robots), len(robots[0].drives))
         names = list(DRIVE_NUMBERS)
         rows = per_robot(robots, lambda r: np.array([[getattr(d, n) for n in names] for d in r.drives], dtype=float))
@@ -106,7 +108,9 @@ class DrivePath:
             self.friction = Friction(self.p, self.uses, steady, self.dt)
 
     def _stiff(self, robots: Sequence[Robot], shape: tuple[int, int]) -> NDArray[np.bool_] | None:
-        """Joints (B, M) whose controller is too steep for an explicit step; None where there are none."""
+        """Joints (B, M) whose controller is too steep for an explicit step; None where there are none, or it is all the same."""
+        if not self.gives:
+            return None
         stiff = np.array(per_robot(robots, stiff_joints), dtype=bool).reshape(shape)
         return stiff if stiff.any() else None
 
