@@ -71,6 +71,8 @@ class DrivePath:
         self.uses_sag = bool(np.any(self.sag != 0))
         limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
         self.all_torque = np.maximum(np.where(limited, p["torque_limit"], 0.0).sum(axis=1, keepdims=True), 1e-300)
+        self.draws = self.present & (p["strength"] > 0)
+        """Motors (B, M) that take current: not one that broke off with its part, nor one that is dead."""
         self.last_active = np.zeros(shape)
         self.current = np.zeros(shape)
         """Torque (B, M) that the current of each motor stands for in the last step, by its nominal constant: before a weak motor,
@@ -209,7 +211,8 @@ class DrivePath:
             closed = np.ascontiguousarray(np.broadcast_to(enabled, shape))
         left = self.one
         if self.uses_sag:
-            load = np.abs(self.last_active).sum(axis=1, keepdims=True) / self.all_torque
+            drawn = np.where(self.draws, np.abs(self.last_active), 0.0)
+            load = drawn.sum(axis=1, keepdims=True) / self.all_torque
             left = np.ascontiguousarray(np.broadcast_to(1.0 - np.clip(self.sag * load, 0.0, 0.95), shape))
         active = np.empty(shape)
         sloped = self.transmission is not None or self.stiff is not None

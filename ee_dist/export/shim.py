@@ -125,7 +125,10 @@ class Shim:
             scale = np.where(nominal > 0, supply_v / np.where(nominal > 0, nominal, 1.0), 1.0)
         given = np.clip(asked, -d["torque_limit"], d["torque_limit"]) * scale * enabled
         limited = np.isfinite(d["torque_limit"]) & (self.kinds != "none")
-        load = np.abs(self.last_active).sum() / max(np.where(limited, d["torque_limit"], 0.0).sum(), 1e-300)
+        draws = self.present & (d["strength"] > 0)
+        load = np.where(draws, np.abs(self.last_active), 0.0).sum() / max(
+            np.where(limited, d["torque_limit"], 0.0).sum(), 1e-300
+        )
         left = 1.0 - min(max(self.sag * load, 0.0), 0.95)
         self.last_active = given
         voltage = np.isfinite(d["speed_limit"]) & (by_position | by_speed)
