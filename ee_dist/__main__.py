@@ -156,7 +156,8 @@ def resumed(out: Path, config: Any, options: Any, overwrite: bool) -> bool:
         return True
     inside = set(held(out)) - {SETTINGS}
     if "summary.json" in inside and not can_go_on(out) and not overwrite:
-        raise ConfigError(f"resume={shown(out)}: the run there is finished, and had other settings")
+        texts = f", or other texts of {', '.join(config.plugins)}" if config.plugins else ""
+        raise ConfigError(f"resume={shown(out)}: the run there is finished, and had other settings{texts}")
     if HydraConfig.get().mode != RunMode.MULTIRUN and not (out / SETTINGS).is_dir():
         raise ConfigError(f"resume={shown(out)}: no run was begun there; name the folder of a run that was stopped")
     if inside and not can_go_on(out) and not overwrite:

@@ -47,7 +47,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(autouse=True)
 def own_catalogue() -> Iterator[None]:
     """Leaves the catalogue as it was: an effect that one test's plugin registers is a candidate in no other test."""
-    registries: tuple[dict, ...] = (catalogue._registry, catalogue._plugins, laws.LAWS)
+    registries: tuple[dict, ...] = (catalogue._registry, catalogue._plugins, laws.LAWS, laws.TEXTS)
     kept = [dict(registry) for registry in registries]
     yield
     for registry, before in zip(registries, kept, strict=True):

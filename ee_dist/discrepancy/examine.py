@@ -28,7 +28,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, slopes_at
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.catalogue import Hypothesis
-from ee_dist.effects.groups import ALL_JOINTS
+from ee_dist.effects.groups import WHOLE
 from ee_dist.trials.log import Array
 
 CALM = 0.8
@@ -116,7 +116,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
         if k < AT_LEAST or energy - f.energy >= WORTH_JUDGING * (energy - quick[0].energy)
     ]
     starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
-    has = {t.effect for t in (*search.fixed, *current.hypothesis) if t.target == ALL_JOINTS}
+    has = {t.effect for t in (*search.fixed, *current.hypothesis) if t.target in WHOLE}
     starts += _families(screened, starts, least, has)
     guessed = assumed_drives(now.among(busy), pool, [t.name for t in (*search.fixed, *current.hypothesis)])
     starts += [guessed] if guessed is not None else []
@@ -252,7 +252,7 @@ def _families(
     together."""
     out: list[tuple[float, Proposal, Array]] = []
     by_effect: dict[str, list[Screened]] = {}
-    whole = has | {s.candidate.effect.name for s in screened if s.candidate.target == ALL_JOINTS}
+    whole = has | {s.candidate.effect.name for s in screened if s.candidate.target in WHOLE}
     for s in screened:
         if s.candidate.effect.name in whole and s.candidate.target in _joints(screened, s.candidate.effect.name):
             by_effect.setdefault(s.candidate.effect.name, []).append(s)
@@ -282,7 +282,7 @@ def _joints(screened: Sequence[Screened], effect: str) -> set[str]:
     return {
         s.candidate.target
         for s in screened
-        if s.candidate.effect.name == effect and s.candidate.target != ALL_JOINTS and "+" not in s.candidate.target
+        if s.candidate.effect.name == effect and s.candidate.target not in WHOLE and "+" not in s.candidate.target
     }
 
 

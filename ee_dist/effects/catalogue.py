@@ -27,7 +27,7 @@ from typing import Any, TypeVar
 from ee_dist.basics.names import did_you_mean, listed, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.groups import common, members_of, shared_targets
-from ee_dist.effects.laws import LAWS
+from ee_dist.effects.laws import LAWS, TEXTS
 from ee_dist.effects.scales import Range, Ranges
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.system import System
@@ -310,7 +310,8 @@ def apply(robot: Model, hypothesis: Iterable[Term]) -> Model:
         allowed = entry.targets(robot)
         places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
         if not places:
-            near = nearest(t.target, allowed) or allowed
+            shared = entry.shared(robot) if isinstance(robot, Robot) else ()
+            near = nearest(t.target, [*allowed, *shared]) or allowed
             raise EffectError(
                 f"{t.effect} cannot act on {quoted(t.target)} of {robot.name}; it can act on: {listed(near)}"
             )
@@ -336,15 +337,17 @@ def _kind(of: type) -> str:
 _plugins: dict[str, str] = {}
 
 
-def load_plugin(path: str | Path) -> None:
-    """Run a user's file that registers effects of their own; again only if it has changed.
+def load_plugin(path: str | Path, text: str = "") -> None:
+    """Run a user's file that registers effects of their own; again only if it has changed. ``text``: the digest it must have.
 
-    Raises EffectError where it cannot be read, fails or registers nothing; the catalogue is then as it was.
+    Raises EffectError where it cannot be read, fails, registers nothing or has another text; the catalogue is then as it was.
     """
     file = Path(path).resolve()
     if not file.is_file():
         raise EffectError(f"no such file of effects: {path}")
     content = hashlib.sha256(file.read_bytes()).hexdigest()
+    if text and content != text:
+        raise EffectError(f"plugins={path}: its text is not the one that the run began with; begin the run anew")
     if _plugins.get(str(file)) == content:
         return
     # Two files may share a name; the module's name tells them apart and is the same in every process.
@@ -352,12 +355,13 @@ def load_plugin(path: str | Path) -> None:
     spec = importlib.util.spec_from_file_location(name, file)
     if spec is None or spec.loader is None:
         raise EffectError(f"not a Python file: {path}")
-    before, laws = dict(_registry), dict(LAWS)
+    before, laws, texts = dict(_registry), dict(LAWS), dict(TEXTS)
     for registry in (_registry, LAWS):
         for key in [k for k, v in registry.items() if getattr(v, "transform", v).__module__ == name]:
             del registry[key]
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+    TEXTS[name] = content
     try:
         spec.loader.exec_module(module)
         if not any(e.transform.__module__ == name for e in _registry.values()):
@@ -367,6 +371,8 @@ def load_plugin(path: str | Path) -> None:
         _registry.update(before)
         LAWS.clear()
         LAWS.update(laws)
+        TEXTS.clear()
+        TEXTS.update(texts)
         said = f"{error}" if isinstance(error, EffectError) else f"{type(error).__name__}: {error}"
         if isinstance(error, SystemExit):
             said = f"sys.exit({error.code!r}) was called; a file of effects only defines them"
@@ -377,6 +383,19 @@ def load_plugin(path: str | Path) -> None:
 def loaded_plugins() -> tuple[str, ...]:
     """Absolute paths of the files loaded so far, in order: what a worker process must load to know the same effects."""
     return tuple(_plugins)
+
+
+def text_of_plugin(path: str | Path) -> str:
+    """Digest of a user's file as it was loaded last; of one that was not loaded, as it is now.
+
+    Of the file alone: what it imports from others is not in it. Raises EffectError where there is none.
+    """
+    file = Path(path).resolve()
+    if str(file) in _plugins:
+        return _plugins[str(file)]
+    if not file.is_file():
+        raise EffectError(f"no such file of effects: {path}")
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def _line_of(error: BaseException, file: Path) -> str:

@@ -90,6 +90,15 @@ def coulomb_friction(robot: Robot, target: str, values: Mapping[str, float]) -> 
 _SPEED = Parameter("speed_rad_s", "rad/s", 1e-6, math.inf, 0.1, "speed at which the excess has fallen to 37 %", 0.01)
 
 
+def _sticking(drive: Drive, what: str, speed: str, more: float, fades: float) -> Drive:
+    """The drive with more of ``what``, which fades within a ``speed`` of its own. A drive has one of each kind: two of them (all
+    joints share one, and one joint has another) become one that is as large at rest and takes as much over all speeds."""
+    has, within = getattr(drive, what), getattr(drive, speed)
+    if has and within != fades:
+        fades = (has * within + more * fades) / (has + more)
+    return replace(drive, **{what: has + more, speed: fades})
+
+
 def _stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
     speed = scales.speed(robot, target)
     top = DRY_SHARE * scales.torque(robot, target)
@@ -112,11 +121,9 @@ def _stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
 def stribeck_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     if values["torque_nm"] == 0:
         return robot
-
-    def sticking(drive: Drive) -> Drive:
-        return replace(drive, stribeck=drive.stribeck + values["torque_nm"], stribeck_speed=values["speed_rad_s"])
-
-    return robot.map_drive(target, sticking)
+    return robot.map_drive(
+        target, lambda d: _sticking(d, "stribeck", "stribeck_speed", values["torque_nm"], values["speed_rad_s"])
+    )
 
 
 @effect(
@@ -196,11 +203,9 @@ def _load_stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
 def load_stribeck_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     if values["share"] == 0:
         return robot
-
-    def sticking(drive: Drive) -> Drive:
-        return replace(drive, stribeck_load=drive.stribeck_load + values["share"], stribeck_speed=values["speed_rad_s"])
-
-    return robot.map_drive(target, sticking)
+    return robot.map_drive(
+        target, lambda d: _sticking(d, "stribeck_load", "stribeck_load_speed", values["share"], values["speed_rad_s"])
+    )
 
 
 def _asymmetry_range(robot: Robot, target: str) -> dict[str, Range]:

@@ -9,24 +9,32 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from ee_dist.effects.targets import powered
 from ee_dist.robots.model import Drive, Robot
 from ee_dist.robots.system import System
 
 ALL_JOINTS = "all_joints"
+"""All that have friction, stops or a spring: those with a drive, be it a passive one."""
+DRIVEN_JOINTS = "driven_joints"
+"""Those that a motor moves, where that is not all: what is of motors and controllers is shared by these."""
+WHOLE = (ALL_JOINTS, DRIVEN_JOINTS)
 JOIN = "+"
 _SETTINGS = tuple(f for f in Drive.__dataclass_fields__ if f != "joint")
 
 
 def groups(robot: System) -> dict[str, tuple[str, ...]]:
-    """Names of groups and their members (two or more): all driven joints, joints of equal drives where these differ (named
-    by their members, ``a+b+c``), all parts, all sensors of a kind. A system that is no robot has none."""
+    """Names of groups and their members (two or more): all joints with a drive, those of them that a motor moves, joints of
+    equal drives where these differ (named by their members, ``a+b+c``), all parts, all sensors of a kind. A system that is no
+    robot has none."""
     if not isinstance(robot, Robot):
         return {}
     found: dict[str, tuple[str, ...]] = {}
-    joints = robot.motor_names
+    joints, driven = robot.motor_names, powered(robot)
     if len(joints) > 1:
         found[ALL_JOINTS] = joints
-        found |= {JOIN.join(names): names for names in like_joints(robot) if len(names) < len(joints)}
+        if 1 < len(driven) < len(joints):
+            found[DRIVEN_JOINTS] = driven
+        found |= {JOIN.join(names): names for names in like_joints(robot) if names not in (joints, driven)}
     parts = tuple(p.name for p in robot.parts[0 if robot.free_base else 1 :])
     if len(parts) > 1:
         found["all_parts"] = parts

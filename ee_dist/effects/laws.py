@@ -36,6 +36,10 @@ LAWS: dict[str, LawFunction] = {}
 """Drive laws by name: each returns the torque (R,) to add at its joints."""
 
 
+TEXTS: dict[str, str] = {}
+"""Digest of a user's file by the name of the module that it became: its laws are what that text says."""
+
+
 class LawError(KeyError):
     """A drive law that is not registered, or a name that is taken."""
 
@@ -53,6 +57,11 @@ def drive_law(name: str) -> Callable[[LawFunction], LawFunction]:
         return function
 
     return register
+
+
+def text_of_law(name: str) -> str:
+    """Digest of the user's file that a drive law is from; empty for one of ours, which the version of the package tells."""
+    return TEXTS.get(LAWS[name].__module__, "") if name in LAWS else ""
 
 
 def find_law(name: str) -> LawFunction:

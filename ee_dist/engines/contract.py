@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.effects.laws import text_of_law
 from ee_dist.engines.drivers import Driver
 from ee_dist.trials.log import Array, SensorLog, State
 
@@ -48,6 +49,9 @@ class Rollout:
         parts = [self.model.digest, self.driver.key, str(self.steps), str(seed), str(self.pose)]
         for a in (self.supply_v, self.enabled, self.external, *_arrays(self.start)):
             parts.append("-" if a is None else hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest())
+        # A robot names its laws. What a law of the user's own does is in their file, which may change between two runs.
+        laws = {law.name for law in getattr(self.model, "laws", ())}
+        parts.extend(text for name in sorted(laws) if (text := text_of_law(name)))
         return "|".join(parts)
 
 
@@ -72,12 +76,16 @@ class Truth:
 class Bodies(Protocol):
     """B bodies in an engine, all at their start. The only part of a rollout that an engine writes itself."""
 
+    gives: bool
+    """Whether the engine takes ``give`` (see ``step``)."""
+
     def read(self, touch: bool, pose: bool, twist: bool) -> Truth: ...
 
     def step(self, torques: Array, force: Array | None, give: Array | None = None) -> None:
         """Advance by one time step under joint torques (B, M) and a force (B, 3) on the root part, floor frame.
 
-        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step, in an engine that can do that.
+        ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step, in an engine that can do that;
+        others are not asked to.
         """
 
     def close(self) -> None:

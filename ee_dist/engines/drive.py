@@ -42,8 +42,10 @@ STOP_SHARE = 0.5
 class DrivePath:
     """State and arithmetic of the drives of B robots with M motors each."""
 
-    def __init__(self, robots: Sequence[Robot], time_step_s: float) -> None:
-        self.dt = time_step_s
+    def __init__(self, robots: Sequence[Robot], time_step_s: float, gives: bool = True) -> None:
+        """``gives``: whether the engine takes steep damping at the end of its step. Friction that counts on it where it is
+        not so takes what the damping did for a load, rubs with it, and drives the joint."""
+        self.dt, self.gives = time_step_s, gives
         shape = (len(robots), len(robots[0].drives))
         names = list(DRIVE_NUMBERS)
         rows = per_robot(robots, lambda r: np.array([[getattr(d, n) for n in names] for d in r.drives], dtype=float))
@@ -69,6 +71,8 @@ class DrivePath:
         self.uses_sag = bool(np.any(self.sag != 0))
         limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
         self.all_torque = np.maximum(np.where(limited, p["torque_limit"], 0.0).sum(axis=1, keepdims=True), 1e-300)
+        self.draws = self.present & (p["strength"] > 0)
+        """Motors (B, M) that take current: not one that broke off with its part, nor one that is dead."""
         self.last_active = np.zeros(shape)
         self.current = np.zeros(shape)
         """Torque (B, M) that the current of each motor stands for in the last step, by its nominal constant: before a weak motor,
@@ -106,7 +110,9 @@ class DrivePath:
             self.friction = Friction(self.p, self.uses, steady, self.dt)
 
     def _stiff(self, robots: Sequence[Robot], shape: tuple[int, int]) -> NDArray[np.bool_] | None:
-        """Joints (B, M) whose controller is too steep for an explicit step; None where there are none."""
+        """Joints (B, M) whose controller is too steep for an explicit step; None where there are none, or it is all the same."""
+        if not self.gives:
+            return None
         stiff = np.array(per_robot(robots, stiff_joints), dtype=bool).reshape(shape)
         return stiff if stiff.any() else None
 
@@ -205,7 +211,8 @@ class DrivePath:
             closed = np.ascontiguousarray(np.broadcast_to(enabled, shape))
         left = self.one
         if self.uses_sag:
-            load = np.abs(self.last_active).sum(axis=1, keepdims=True) / self.all_torque
+            drawn = np.where(self.draws, np.abs(self.last_active), 0.0)
+            load = drawn.sum(axis=1, keepdims=True) / self.all_torque
             left = np.ascontiguousarray(np.broadcast_to(1.0 - np.clip(self.sag * load, 0.0, 0.95), shape))
         active = np.empty(shape)
         sloped = self.transmission is not None or self.stiff is not None

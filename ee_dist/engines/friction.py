@@ -12,7 +12,8 @@ inertia assumed; ``steady_inertia`` assumes one below the lightest. An impact is
 counts only as far as friction could need it, so that a wrong one cannot push a moving joint along.
 
     dry limit = coulomb + brake + |km*tm - ke*te| + kq*(tm - te)^2
-                + (stribeck + ks*|tm - te|) * exp(-|speed| / stribeck_speed) +- asymmetry
+                + stribeck * exp(-|speed| / stribeck_speed)
+                + ks*|tm - te| * exp(-|speed| / stribeck_load_speed) +- asymmetry
 
 with tm the motor's torque and te the external torque on the joint, so that |tm - te| goes through the gear; km is
 load_friction and ke = km + backdrive_friction (Duclusaud et al. 2025, "Extended Friction Models for the Physics
@@ -76,14 +77,13 @@ class Friction:
         """
         p, uses, shape = self.p, self.uses, torque.shape
         none, one = (np.full(shape, v) for v in (0.0, 1.0)) if shape != self.none.shape else (self.none, self.one)
-        fading = none
-        if uses["stribeck"] or uses["stribeck_load"]:
-            # NumPy's own exponential: a compiled one may differ in its last bit.
-            fading = np.exp(-np.abs(speed) / p["stribeck_speed"])
+        # NumPy's own exponential: a compiled one may differ in its last bit.
+        fading = np.exp(-np.abs(speed) / p["stribeck_speed"]) if uses["stribeck"] else none
+        of_load = np.exp(-np.abs(speed) / p["stribeck_load_speed"]) if uses["stribeck_load"] else none
         last_speed, last_torque, last_give = self.last or (none, none, None)
         found = np.empty(shape)
         _rub(
-            self.table, self.per_step, self.rubbing, self.loaded, torque, motor, speed, fading,
+            self.table, self.per_step, self.rubbing, self.loaded, torque, motor, speed, fading, of_load,
             one if enabled is None else np.ascontiguousarray(np.broadcast_to(enabled, shape)),
             none if give is None else give, last_speed, last_torque, none if last_give is None else last_give,
             self.last is not None, found,
@@ -112,6 +112,7 @@ def _rub(
     motor: Array,
     speed: Array,
     fading: Array,
+    of_load: Array,
     enabled: Array,
     give: Array,
     last_speed: Array,
@@ -120,9 +121,9 @@ def _rub(
     begun: bool,
     found: Array,
 ) -> None:
-    """Write to ``found`` (B, M) the torque less friction. ``table`` is (len(RUBBING), B, M), ``fading`` the share of Stribeck
-    friction that the speed leaves; others (B, M) as in ``Friction.__call__``. What belongs to the robots (``table``,
-    ``per_step``, ``rubbing``) may have a single row for all."""
+    """Write to ``found`` (B, M) the torque less friction. ``table`` is (len(RUBBING), B, M), ``fading`` and ``of_load`` the
+    shares of Stribeck friction, plain and by load, that the speed leaves; others (B, M) as in ``Friction.__call__``. What
+    belongs to the robots (``table``, ``per_step``, ``rubbing``) may have a single row for all."""
     one = table.shape[1] == 1
     for i in range(found.shape[0]):
         r = 0 if one else i
@@ -142,7 +143,7 @@ def _rub(
                 limit = limit + abs(driving * motor[i, j] - backdriving * external)
                 through = abs(motor[i, j] - external)
                 limit = limit + quadratic * (through * through)
-                limit = limit + stribeck_load * fading[i, j] * through
+                limit = limit + stribeck_load * of_load[i, j] * through
             up, down = max(limit + sided, 0.0), max(limit - sided, 0.0)
             viscous = viscous + electric * enabled[i, j]
             steepest = viscous + abs(viscous_sided)

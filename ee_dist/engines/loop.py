@@ -50,7 +50,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     first, steps, pose = robots[0], rollouts[0].steps, rollouts[0].pose
     dt = first.time_step_s
     kinds = {s.kind for s in first.sensors}
-    drive = DrivePath(robots, dt)
+    drive = DrivePath(robots, dt, bodies.gives)
     sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
     scales = per_robot(robots, scaling)
     control = Controllers(robots, [r.driver for r in rollouts], per_robot(robots, command_scaling), steps)

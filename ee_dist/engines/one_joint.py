@@ -55,6 +55,8 @@ class OneJointEngine:
 class OneJointBodies:
     """Implements ``ee_dist.engines.contract.Bodies``."""
 
+    gives = True
+
     def __init__(self, batch: Sequence[Rollout]) -> None:
         count = len(batch)
         self.dt = batch[0].model.time_step_s

@@ -148,6 +148,7 @@ def needs_shim(robot: Robot, to: str) -> bool:
 
 _WITH_DEFAULT = frozenset(f.name for f in fields(Drive) if isinstance(f.default, float)) - {
     "stribeck_speed",
+    "stribeck_load_speed",
     "supply_nominal_v",
 }
 

@@ -125,7 +125,10 @@ class Shim:
             scale = np.where(nominal > 0, supply_v / np.where(nominal > 0, nominal, 1.0), 1.0)
         given = np.clip(asked, -d["torque_limit"], d["torque_limit"]) * scale * enabled
         limited = np.isfinite(d["torque_limit"]) & (self.kinds != "none")
-        load = np.abs(self.last_active).sum() / max(np.where(limited, d["torque_limit"], 0.0).sum(), 1e-300)
+        draws = self.present & (d["strength"] > 0)
+        load = np.where(draws, np.abs(self.last_active), 0.0).sum() / max(
+            np.where(limited, d["torque_limit"], 0.0).sum(), 1e-300
+        )
         left = 1.0 - min(max(self.sag * load, 0.0), 0.95)
         self.last_active = given
         voltage = np.isfinite(d["speed_limit"]) & (by_position | by_speed)
@@ -178,11 +181,11 @@ class Shim:
         most_gear = GEAR_LIMIT * d["torque_limit"]
         external = np.clip(torque - self.native * speed - motor + load, -most_gear, most_gear)
         through = np.abs(motor - external)
-        fading = np.exp(-np.abs(speed) / d["stribeck_speed"])
+        fading, of_load = (np.exp(-np.abs(speed) / d[n]) for n in ("stribeck_speed", "stribeck_load_speed"))
         backward = np.maximum(d["load_friction"] + d["backdrive_friction"], 0.0)
         limit = d["coulomb"] + d["brake"] + d["stribeck"] * fading
         limit = limit + np.abs(d["load_friction"] * motor - backward * external)
-        limit = limit + d["quadratic_friction"] * through**2 + d["stribeck_load"] * fading * through
+        limit = limit + d["quadratic_friction"] * through**2 + d["stribeck_load"] * of_load * through
         up, down = (np.maximum(limit + side * d["friction_asymmetry"], 0.0) for side in (1.0, -1.0))
         viscous = d["viscous"] + d["back_emf"] * d["strength"] * enabled
         steepest = viscous + np.abs(d["viscous_asymmetry"])

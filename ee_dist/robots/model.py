@@ -147,7 +147,10 @@ class Drive:
     coulomb: float = 0.0  # N.m
     stribeck: float = 0.0  # N.m on top at rest, gone as exp(-|speed| / stribeck_speed)
     stribeck_speed: float = 0.1
-    stribeck_load: float = 0.0  # the same as a share of the torque through the gear
+    stribeck_load: float = (
+        0.0  # the same as a share of the torque through the gear, gone as exp(-|speed| / stribeck_load_speed)
+    )
+    stribeck_load_speed: float = 0.0  # where it is not told, that of the other
     load_friction: float = 0.0  # dry friction as a share of the torque through the gear, motor less external
     backdrive_friction: float = 0.0  # by how much that share is larger for the external torque
     quadratic_friction: float = 0.0  # 1/(N.m), times the square of the torque through the gear
@@ -159,6 +162,11 @@ class Drive:
     spring: float = 0.0  # N.m/rad towards spring_rest (rad)
     spring_rest: float = 0.0
     brake: float = 0.0  # N.m of dry friction of a brake
+
+    def __post_init__(self) -> None:
+        # Descriptions from when there was one speed for both keep their meaning.
+        if self.stribeck_load_speed == 0.0:
+            object.__setattr__(self, "stribeck_load_speed", self.stribeck_speed)
 
 
 DRIVE_NUMBERS = tuple(f.name for f in fields(Drive) if f.name not in ("joint", "command"))

@@ -25,6 +25,7 @@ DRIVE: dict[str, Bounds] = dict.fromkeys(DRIVE_NUMBERS, AT_LEAST_0) | {
     "back_emf": ANY,
     "stribeck_speed": (1e-12, HUGE),
     "stribeck_load": (0.0, 10.0),
+    "stribeck_load_speed": (0.0, HUGE),
     "load_friction": (0.0, 10.0),
     "backdrive_friction": (-10.0, 10.0),
     "friction_asymmetry": ANY,

@@ -15,7 +15,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from ee_dist.basics.files import write_whole
-from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.effects.catalogue import Hypothesis, text_of_plugin
 from ee_dist.tasks.config import Config
 
 FORMAT = 1
@@ -35,11 +35,13 @@ def config_yaml(config: Config, options: Any) -> str:
 
 
 def config_digest(config: Config, options: Any) -> str:
-    """Of the settings that decide the result: not of where and how it is computed."""
+    """Of the settings that decide the result: not of where and how it is computed. Of the user's own effects it is their text."""
     tree = OmegaConf.create(config_yaml(config, options))
     assert isinstance(tree, DictConfig)
     for key in ("evaluator", "ray", "plugins"):
         tree.pop(key, None)
+    if config.plugins:
+        tree.plugins = [text_of_plugin(path) for path in config.plugins]
     if tree.noise is None:
         tree.noise = 0.0
     elif tree.noise == 0.0 and tree.task.name == "trial":  # where it takes the place of task.noise

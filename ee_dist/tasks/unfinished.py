@@ -17,6 +17,7 @@ import yaml
 from ee_dist.basics.files import write_whole
 from ee_dist.basics.quoted import quoted, short
 from ee_dist.basics.uncut import keeping, trial_on_hardware
+from ee_dist.effects.catalogue import text_of_plugin
 from ee_dist.evaluation.installed import installed
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import Journal, JournaledEvaluator
@@ -43,6 +44,7 @@ class Unfinished:
         self.folder = out / FOLDER
         self.settings = config_yaml(config, options)
         self.digest = config_digest(config, options)
+        self.plugins = {str(path): text_of_plugin(path) for path in config.plugins}
         self._journal: Journal | None = None
 
     def journal(self) -> Journal:
@@ -64,6 +66,7 @@ class Unfinished:
             settings = plain_of(text)
             if not isinstance(settings, dict):
                 raise TypeError("its settings are none")
+            texts = dict(found.get("plugins", {}))
         except FileNotFoundError:
             return  # killed before it began
         except (OSError, UntrustedError, KeyError, TypeError, ValueError) as error:
@@ -74,6 +77,12 @@ class Unfinished:
                     f"resume={shown(self.folder.parent)}: it was begun with {name} {short(str(theirs), 40)}, here is "
                     f"{installed().get(name)}: its results would be of two kinds; install that version to go on"
                 )
+        other = [path for path, text in self.plugins.items() if text not in texts.values()]
+        if digest != self.digest and other and settings.get("plugins"):
+            raise ConfigError(
+                f"resume={shown(self.folder.parent)}: {short(other[0], 200)} is not as it was when that run began, and its "
+                "results would be of two kinds; put the file back as it was, or leave out resume= and begin anew"
+            )
         if digest != self.digest:
             changed = _changed(settings, yaml.safe_load(self.settings))
             raise ConfigError(
@@ -85,6 +94,8 @@ class Unfinished:
         self.folder.mkdir(exist_ok=True)
         if not (self.folder / _RUN).exists():
             content = {"digest": self.digest, "settings": self.settings, "versions": installed()}
+            if self.plugins:
+                content["plugins"] = self.plugins
             write_whole(self.folder / _RUN, json.dumps(content, indent=1))
 
     def forget(self) -> None:

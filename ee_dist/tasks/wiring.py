@@ -7,7 +7,7 @@ import gc
 import os
 from dataclasses import dataclass, replace
 
-from ee_dist.effects.catalogue import load_plugin
+from ee_dist.effects.catalogue import load_plugin, text_of_plugin
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator
@@ -32,15 +32,16 @@ LARGE = 1024
 
 @dataclass(frozen=True)
 class EngineMaker:
-    """Makes an engine in whatever process it is called; picklable. Loads the user's own effects there first."""
+    """Makes an engine in whatever process it is called; picklable. Loads the user's own effects there first: ``plugins`` are
+    files and the digests of their texts, of which no other will do."""
 
     name: str
     threads: int = 1
-    plugins: tuple[str, ...] = ()
+    plugins: tuple[tuple[str, str], ...] = ()
 
     def __call__(self) -> Engine:
-        for path in self.plugins:
-            load_plugin(path)
+        for path, text in self.plugins:
+            load_plugin(path, text)
         # An engine is imported where it is used: a run with one does not wait for the other.
         if self.name == ONE_JOINT:
             from ee_dist.engines.one_joint import OneJointEngine
@@ -63,7 +64,8 @@ def engine_maker(config: Config, alone: bool, name: str = "") -> EngineMaker:
     """``alone``: whether the engine has the machine for itself, or shares its cores with other workers. ``name``: another
     engine than the one of the settings."""
     threads = config.engine.threads or ((os.cpu_count() or 1) if alone else 1)
-    return EngineMaker(name or config.engine.name, threads, tuple(os.path.abspath(p) for p in config.plugins))
+    plugins = tuple((os.path.abspath(p), text_of_plugin(p)) for p in config.plugins)
+    return EngineMaker(name or config.engine.name, threads, plugins)
 
 
 def build_robot(config: Config) -> Robot:

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 from effect_robots import ARM_M, MASS_KG, Bench, G, block, lever, slider
 
-from ee_dist.effects import CATALOGUE, term
+from ee_dist.effects import CATALOGUE, apply, term
 from ee_dist.effects.catalogue import Term
+from ee_dist.engines.drive import DrivePath
+from ee_dist.export.plan import parameters
+from ee_dist.export.shim import Shim
 from ee_dist.robots.model import CONTINUOUS_M, Robot
+from ee_dist.robots.quadruped import quadruped
 
 HOLD_NM = MASS_KG * G * ARM_M
 PULL_N = 10.0
@@ -56,6 +60,33 @@ def test_supply_sag_takes_its_share_at_full_torque_and_half_at_half(bench: Bench
     half = bench.run(slider(kp=0.5, torque_limit=PULL_N), sag, steps=100, command=10.0)
     assert half.torques is not None
     assert half.torques[5:50, 0] == pytest.approx(0.8 * 0.5 * PULL_N, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("fault", "draws"),
+    [
+        (term("part_lost", "lower_front_left"), False),
+        (term("motor_weak", "knee_front_left", loss=1.0), False),
+        (term("motor_weak", "knee_front_left", loss=0.5), True),
+    ],
+)
+def test_only_motors_that_are_there_and_alive_load_the_supply(fault: Term, draws: bool) -> None:
+    robot = quadruped()
+    knee, still, late = robot.motor_names.index("knee_front_left"), np.zeros((1, 8)), np.full((1, 8), 9.0)
+    alone = still.copy()
+    alone[0, knee] = 9.0
+    found = {}
+    for share in (0.0, 0.8):
+        model = apply(robot, (fault, term("supply_sag", "supply", share=share)))
+        path, shim = DrivePath([model], model.time_step_s), Shim(parameters(model))
+        path.step(0.0, alone, still, still)
+        shim.torque(0.0, alone[0], still[0], still[0])
+        dt = model.time_step_s
+        found[share] = path.step(dt, late, still, still)[0], shim.torque(dt, late[0], still[0], still[0])
+    others = np.arange(8) != knee
+    for sagging, full in zip(found[0.8], found[0.0], strict=True):
+        # One of eight gave its most the step before.
+        assert sagging[others] == pytest.approx((0.9 if draws else 1.0) * full[others])
 
 
 def test_command_gain_scales_where_the_joint_goes(bench: Bench) -> None:

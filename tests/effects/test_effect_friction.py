@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from effect_robots import ARM_M, MASS_KG, Bench, G, lever, slider
 
-from ee_dist.effects import term
+from ee_dist.effects import Term, apply, term
 from ee_dist.trials.log import Array
 
 PULL_N = 10.0
@@ -112,6 +112,53 @@ def test_load_stribeck_friction_fades_with_speed(bench: Bench) -> None:
         now = float(log.channel("velocity")[10])
         expected = PULL_N * (1 - 0.5 * math.exp(-now / 0.2)) / MASS_KG
         assert acceleration(log.channel("velocity")[10:], steps=1) == pytest.approx(expected, rel=0.02)
+
+
+def test_stribeck_friction_of_both_kinds_fades_each_at_its_own_speed(bench: Bench) -> None:
+    robot = slider(kp=1e4, torque_limit=PULL_N)
+    plain = term("stribeck_friction", "joint", torque_nm=0.2 * PULL_N, speed_rad_s=0.05)
+    loaded = term("load_stribeck_friction", "joint", share=0.4, speed_rad_s=0.6)
+    for terms in ((plain, loaded), (loaded, plain)):
+        for speed in (0.05, 0.6):
+            log = bench.run(robot, *terms, steps=12, speed=speed, command=9.0)
+            now = float(log.channel("velocity")[10])
+            rubs = 0.2 * math.exp(-now / 0.05) + 0.4 * math.exp(-now / 0.6)
+            assert acceleration(log.channel("velocity")[10:], steps=1) == pytest.approx(
+                PULL_N * (1 - rubs) / MASS_KG, rel=0.02
+            )
+
+
+@pytest.mark.parametrize(
+    ("name", "much", "field"),
+    [("stribeck_friction", "torque_nm", "stribeck"), ("load_stribeck_friction", "share", "stribeck_load")],
+)
+def test_two_of_a_kind_take_as_much_at_rest_and_over_all_speeds(name: str, much: str, field: str) -> None:
+    """The second one's speed was that of both, however small it was: a jump at neutral, and another one in another order."""
+
+    def drive(*terms: Term) -> tuple[float, float]:
+        (d,) = apply(slider(), terms).drives
+        return getattr(d, field), getattr(d, f"{field}_speed")
+
+    wide, narrow = (term(name, "joint", **{much: v, "speed_rad_s": s}) for v, s in ((0.3, 0.4), (0.1, 0.02)))
+    for both in (drive(wide, narrow), drive(narrow, wide)):
+        assert both == pytest.approx((0.4, (0.3 * 0.4 + 0.1 * 0.02) / 0.4))
+    hardly = term(name, "joint", **{much: 1e-9, "speed_rad_s": 0.02})
+    assert drive(wide, hardly) == pytest.approx(drive(wide))
+    assert drive(wide, wide) == (0.6, 0.4)
+
+
+def test_a_description_with_one_speed_for_both_kinds_keeps_its_meaning() -> None:
+    d = slider(stribeck_load=0.2, stribeck_speed=0.3).drives[0]
+    assert d.stribeck_load_speed == 0.3
+    assert (
+        apply(
+            slider(stribeck_load=0.2, stribeck_speed=0.3),
+            [term("stribeck_friction", "joint", torque_nm=1.0, speed_rad_s=0.01)],
+        )
+        .drives[0]
+        .stribeck_load_speed
+        == 0.3
+    )
 
 
 @pytest.mark.parametrize(("dry", "up", "down"), [(2.0, 5.0, 1.0), (-2.0, 1.0, 5.0), (4.0, 7.0, 0.0)])

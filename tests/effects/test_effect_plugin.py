@@ -14,15 +14,21 @@ import pytest
 from effect_robots import MASS_KG, Bench, slider
 
 from ee_dist.effects import CATALOGUE, EffectError, apply, load_plugin, loaded_plugins, term
+from ee_dist.effects.catalogue import text_of_plugin
 from ee_dist.effects.laws import LAWS, LawError, drive_law, find_law
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.evaluation.cache import CachedEvaluator
+from ee_dist.evaluation.jobs import Job, Whole
+from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.model import Law
 from ee_dist.robots.quadruped import quadruped
+from ee_dist.tasks.wiring import EngineMaker
 
 ROOT = Path(__file__).parents[2]
 BLOCKS = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs" / "own_effect.md").read_text(), re.MULTILINE | re.DOTALL)
+HOLD = Commands(np.full((1, 1), 0.05))
 WORKER = """
 import pickle, sys
 from ee_dist.effects import load_plugin
@@ -99,6 +105,26 @@ def test_a_file_is_read_once_and_again_when_it_has_changed(example: Path) -> Non
     assert "cogging" not in CATALOGUE
     assert "cogging" not in LAWS
     assert loaded_plugins().count(str(example)) == 1
+
+
+def test_a_law_with_another_text_is_another_rollout(example: Path) -> None:
+    """A robot names its laws: without their text a cache gave what the law had been."""
+    asked = [Job(Rollout(apply(slider(), (term("cogging", "joint", torque_nm=6.0),)), HOLD, 20), Whole())]
+    plain = Rollout(slider(), HOLD, 20).key
+    make = EngineMaker("mujoco", 1, ((str(example), text_of_plugin(example)),))
+    evaluator = CachedEvaluator(SerialEvaluator(make(), 8))
+    (before,) = evaluator.evaluate(asked)
+    example.write_text(BLOCKS[0].replace("return -joint", "return joint"))
+    with pytest.raises(EffectError, match=r"cogging\.py: its text is not the one that the run began with"):
+        make()
+    load_plugin(example)
+    (after,) = evaluator.evaluate(asked)
+    assert before.channel("velocity")[-1] == pytest.approx(-after.channel("velocity")[-1], rel=1e-3)
+    assert evaluator.counts.simulated == 2
+    assert Rollout(slider(), HOLD, 20).key == plain
+    example.write_text(BLOCKS[0])
+    load_plugin(example)
+    assert evaluator.evaluate(asked)[0] is before
 
 
 @pytest.mark.parametrize(

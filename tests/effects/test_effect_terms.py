@@ -11,9 +11,11 @@ from effect_robots import slider
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ee_dist.discrepancy.search.candidates import candidates
 from ee_dist.effects import CATALOGUE, EffectError, Parameter, Term, apply, effect, term
 from ee_dist.effects.catalogue import find, from_dict
 from ee_dist.effects.described import check_written
+from ee_dist.effects.groups import groups
 from ee_dist.effects.targets import motors
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped import quadruped
@@ -114,6 +116,26 @@ def test_a_joint_may_have_less_of_what_all_of_them_share() -> None:
     assert drives["hip_front_right"] == 0.2
     with pytest.raises(EffectError, match="cannot be taken off"):
         check_written(QUADRUPED, (less, shared))
+
+
+def test_joints_share_what_is_of_motors_where_one_of_them_has_none() -> None:
+    """What acts on motors had no group at all on a robot with a passive joint."""
+    robot = QUADRUPED.with_drive("knee_rear_right", command="none", kp=0.0, kd=0.0)
+    driven = tuple(j for j in QUADRUPED.motor_names if j != "knee_rear_right")
+    weak = apply(robot, (term("motor_weak", "driven_joints", loss=0.5),))
+    assert [d.joint for d in weak.drives if d.strength == 0.5] == list(driven)
+    assert find("motor_weak").shared(robot) == find("command_delay").shared(robot) == ("driven_joints",)
+    # A bearing has friction with and without a motor.
+    assert find("coulomb_friction").shared(robot) == ("all_joints", "driven_joints")
+    assert "coulomb_friction@driven_joints" in {c.name for c in candidates(robot)}
+    with pytest.raises(
+        EffectError, match="motor_weak cannot act on 'all_joints' of quadruped; it can act on: driven_joints"
+    ):
+        apply(robot, (term("motor_weak", "all_joints", loss=0.5),))
+    for untouched in (QUADRUPED, robot.with_drive("hip_front_left", command="torque")):
+        names = groups(untouched)
+        assert len(set(names.values())) == len(names), "one group has two names"
+    assert "driven_joints" not in groups(QUADRUPED)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])

@@ -62,8 +62,8 @@ def test_friction(robots: int, motors: int, loaded: bool, begun: bool, seed: int
     table[friction.RUBBING.index("friction_asymmetry")] -= 0.2
     rubbing = rng.random(shape) < 0.7
     torque, motor, speed, last_speed, last_torque = rng.normal(size=(5, *shape))
-    fading, enabled, give, last_give = rng.uniform(0, 1, (4, *shape))
-    arrays = [torque, motor, speed, fading, enabled, give, last_speed, last_torque, last_give]
+    fading, of_load, enabled, give, last_give = rng.uniform(0, 1, (5, *shape))
+    arrays = [torque, motor, speed, fading, of_load, enabled, give, last_speed, last_torque, last_give]
     assert_same_bits(friction._rub, [table, np.full(shape, 2.0), rubbing, loaded, *arrays, begun, np.empty(shape)])
 
 

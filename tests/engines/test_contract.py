@@ -108,6 +108,20 @@ def test_torque_turns_and_force_slides_a_joint(engine: Engine, rotor: float) -> 
         assert position[-1] == pytest.approx(0.5 * 0.04 / (inertia + rotor) * 0.4**2, rel=0.006)
 
 
+@pytest.mark.parametrize(
+    ("axis", "tilt_rad", "pull"), [((0.0, 0.0, 1.0), 0.0, -G), ((1.0, 0.0, 0.0), 0.3, G * np.sin(0.3))]
+)
+def test_the_rotor_of_a_slide_is_inertia_and_no_weight(
+    engine: Engine, axis: tuple[float, float, float], tilt_rad: float, pull: float
+) -> None:
+    robot = one_joint("slide", axis, rotor_inertia=3 * MASS_KG).with_world(tilt_y_rad=tilt_rad)
+    speed = run(engine, robot, 101).channel("velocity")
+    assert speed[-1] == pytest.approx(pull / 4 * 100 * robot.time_step_s, rel=1e-6)
+    # Held by a spring it sags by the weight of the part alone.
+    held = run(engine, robot.with_drive("joint", spring=1000.0, viscous=180.0), 3001).channel("position")
+    assert held[-1] == pytest.approx(pull * MASS_KG / 1000.0, rel=1e-3)
+
+
 def test_coulomb_friction_stops_a_slide_where_the_formula_says_and_never_reverses_it(engine: Engine) -> None:
     robot = one_joint("slide", (1.0, 0.0, 0.0)).map_drive("joint", lambda d: replace(d, coulomb=5.0))
     log = run(engine, robot, 400, at([0.0], [0.5]))

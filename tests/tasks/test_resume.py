@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ee_dist.effects import catalogue, laws
 from ee_dist.evaluation.jobs import Counts
 from ee_dist.evaluation.journal import MAGIC, Journal, JournaledEvaluator
 from ee_dist.evaluation.physical import PhysicalRobot
@@ -17,6 +19,11 @@ from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.tasks.wiring import close_evaluators
 
 FAST = ("+scenario=8", "evaluator=serial", "engine=mujoco", "budget.compensating_trials=1", "budget.polish=1")
+(OWN_EFFECT, _) = re.findall(
+    r"^```python\n(.*?)^```$",
+    (Path(__file__).parents[2] / "docs" / "own_effect.md").read_text(),
+    re.MULTILINE | re.DOTALL,
+)
 
 
 @pytest.fixture
@@ -93,6 +100,34 @@ def test_what_cannot_be_resumed_is_said_in_one_line(cli, tiny, tmp_path, stoppin
     assert "it was begun with mujoco 0.1, here is" in cli(*tiny, *FAST, f"resume={out}").err
     (out / "unfinished" / "run.json").write_text("[" * 9)
     assert "is damaged" in cli(*tiny, *FAST, f"resume={out}").err
+
+
+def test_a_run_does_not_go_on_with_another_text_of_an_effect_of_ones_own(cli, tiny, tmp_path, stopping):
+    out, file = tmp_path / "run", tmp_path / "cogging.py"
+    text = OWN_EFFECT
+    file.write_text(text)
+    ask = (*tiny, *FAST, f"plugins=[{file}]")
+    stopping(2)
+    assert cli(*ask, f"hydra.run.dir={out}").status == 1
+    stopping()
+    file.write_text(text.replace("TEETH = 12", "TEETH = 14"))
+    outcome = cli(*ask, f"resume={out}")
+    assert outcome.status == 2
+    (line,) = outcome.err.strip().splitlines()
+    assert f"{file} is not as it was when that run began" in line
+    assert "put the file back as it was" in line
+    # Another place is no other text.
+    moved = tmp_path / "moved.py"
+    moved.write_text(text)
+    file.unlink()
+    for registry in (catalogue._registry, laws.LAWS):  # what a new process would not have
+        del registry["cogging"]
+    ask = (*tiny, *FAST, f"plugins=[{moved}]")
+    assert cli(*ask, f"resume={out}").status == 0
+    moved.write_text(text.replace("TEETH = 12", "TEETH = 14"))
+    outcome = cli(*ask, f"resume={out}")
+    assert outcome.status == 2
+    assert f"or other texts of {moved}" in outcome.err
 
 
 @pytest.mark.slow

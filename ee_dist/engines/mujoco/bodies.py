@@ -133,6 +133,8 @@ class Group:
 class MuJoCoBodies:
     """The bodies of one batch. Implements ``ee_dist.engines.contract.Bodies``."""
 
+    gives = True
+
     def __init__(self, placed: Sequence[tuple[list[int], Group]], batch: Sequence[Rollout]) -> None:
         self.count, self.motors = len(batch), len(batch[0].model.drives)
         self.touches = sum(s.kind == "touch" for s in batch[0].model.sensors)

@@ -112,6 +112,8 @@ class PyBulletEngine:
 class BulletBodies:
     """The bodies of one batch. Implements ``ee_dist.engines.contract.Bodies``; worlds go back after the batch."""
 
+    gives = False
+
     def __init__(self, engine: PyBulletEngine, placed: list[tuple[World, list[int]]], batch: Sequence[Rollout]) -> None:
         self.engine = engine
         self.worlds = [world for world, _ in placed]
@@ -120,6 +122,8 @@ class BulletBodies:
         self.reading: Reading = PublicReading(placed, motors) if found is None else NativeReading(found, placed, motors)
         self.robots: list[tuple[int, int, int, list[int], list[int] | None]] = []
         """Row, client, body and links of each robot, and the motors of those links where some joint is lost."""
+        self.lifted: list[tuple[int, int, int, tuple[float, ...]]] = []
+        """Client, body and link of each rotor that a slide moves, and the force that takes its weight."""
         self.shifted: list[tuple[int, tuple[tuple[float, ...], tuple[float, ...]]]] = []
         """Rows whose root's own frame is not that of its centre of mass, and its pose in that."""
         for world, rows in placed:
@@ -127,6 +131,9 @@ class BulletBodies:
             some = None if len(links) == motors else [k for k, link in enumerate(world.links) if link >= 0]
             for row, body in zip(rows, world.bodies, strict=True):
                 self.robots.append((row, world.client, body, links, some))
+                up = [-g for g in gravity_vector(batch[row].model)]
+                for link, mass in world.slid_rotors if any(up) else ():
+                    self.lifted.append((world.client, body, link, tuple(mass * u for u in up)))
                 root = batch[row].model.root
                 shift = _inverse(root.com_m, world.frames[root.name][1])
                 if shift is not None:
@@ -156,6 +163,9 @@ class BulletBodies:
             if force is not None and force[row].any():
                 position, _ = p.getBasePositionAndOrientation(body, physicsClientId=client)
                 p.applyExternalForce(body, -1, force[row].tolist(), position, p.WORLD_FRAME, physicsClientId=client)
+        for client, body, link, lift in self.lifted:
+            centre = p.getLinkState(body, link, physicsClientId=client)[0]
+            p.applyExternalForce(body, link, lift, centre, p.WORLD_FRAME, physicsClientId=client)
         for world in self.worlds:
             simulate(world.client)
 

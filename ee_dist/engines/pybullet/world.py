@@ -74,6 +74,11 @@ class World:
         self.link_of_part = link
         by_name = {j.name: link[j.child] for j in robot.present_joints}
         self.links = [by_name.get(d.joint, -1) for d in robot.drives]
+        slides = {j.name for j in robot.present_joints if j.kind == "slide"}
+        self.slid_rotors = [
+            (by_name[d.joint], d.rotor_inertia) for d in robot.drives if d.joint in slides and d.rotor_inertia > 0
+        ]
+        """Link and kg of each rotor that a slide moves: inertia, and no weight."""
         self.joint_links = [(j, link[j.child]) for j in robot.present_joints if j.kind != "fixed"]
         movable = [k for k in sorted(link.values()) if k >= 0 and joints[self.order[k]].kind != "fixed"]
         self.freedoms = len(movable)
@@ -223,7 +228,8 @@ def _depth_first(robot: Robot) -> list[str]:
 def _with_rotor(robot: Robot, part: Part) -> Part:
     """Bullet knows no rotor inertia: it is given to the part that the joint moves, about the joint's axis.
 
-    Unlike a true rotor's, it also resists when the parent turns; for a slide it adds to the mass, and so to the weight.
+    Unlike a true rotor's, it also resists when the parent moves. For a slide it adds to the mass, whose weight is taken off again
+    (``slid_rotors``).
     """
     for joint in robot.joints:
         if joint.child != part.name:

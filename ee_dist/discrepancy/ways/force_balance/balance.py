@@ -25,6 +25,7 @@ SEEN = (
     "spring_rest",
     "offset_torque",
     "stribeck_speed",
+    "stribeck_load_speed",
     "rotor_inertia",
     "torque_limit",
     *RUBBING,

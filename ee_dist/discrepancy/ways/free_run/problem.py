@@ -6,6 +6,8 @@ do with it, and the strictest test: an error once made goes on. It suits robots 
 
 A residual value is sign(e) * sqrt(|e|), so that squares add up to absolute errors: the mean square is the mean absolute
 position error. A stick that lasts too long moves a joint far away for a while; squares of that would outweigh the rest.
+
+Joints that turn and joints that slide have nothing in common but their noise: each unit is counted by its own.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog, State
+from ee_dist.trials.noise import channel_range
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ RESTART_S = 0.5
 """Length of windows that start anew from the measured state."""
 MEAN_ABSOLUTE, MEDIAN_ABSOLUTE = math.sqrt(2 / math.pi), 0.6745
 """Of normal noise with a standard deviation of 1."""
+FINEST = 2.0**-20
+"""Share of a joint's range that the finest encoders tell apart: one at rest reads the same all the time, and has noise."""
 BLOCKS = 6
 """Segments that a record run through in one go is cut into."""
 
@@ -87,14 +92,16 @@ class FreeRun(Problem):
         # What is predicted is the motion: noise of its sensors would count against every model.
         self.setups = [noiseless(apply(robot, t.setup)) for t in trials]
         self.pieces = [p for k, t in enumerate(trials) for p in _pieces(k, t, robot, windows_s, every)]
-        self.noise = max(float(np.mean([_noise(p, columns) for p in self.pieces])), 1e-9)
+        by_unit = _noise_by_unit(self.pieces, robot, columns)
+        self.noise = np.array([by_unit[robot.sensors[k].unit] for k in columns])
+        """(C,) mean absolute error that noise alone would leave, in the unit of each channel."""
         self._lay_out(BLOCKS if windows_s is None else 1)
-        self.unit = robot.sensors[columns[0]].unit
-        self.natural_unit = self.unit
+        self.units = tuple(by_unit)
+        self.natural_unit = self.units[0] if len(by_unit) == 1 else "times the noise"
         how = "free runs of the whole record" if windows_s is None else f"windows of {windows_s:g} s"
         self.error_definition = (
             f"square root of the mean absolute position error over {how}, every trial counting the same, in units of the "
-            f"noise of the readings ({self.noise:.2g} {self.unit})"
+            f"noise of the readings ({', '.join(f'{noise:.2g} {unit}' for unit, noise in by_unit.items())})"
         )
 
     def _lay_out(self, blocks: int) -> None:
@@ -169,15 +176,22 @@ class FreeRun(Problem):
         return float(self.weight[self.trial_of == trial].max(initial=0.0)) or 1.0
 
     def natural(self, value: float) -> float:
-        """Mean absolute position error, rad or m."""
-        return value**2 * self.noise
+        """Mean absolute position error, rad or m; of joints of both kinds times that of noise alone."""
+        return value**2 * (float(self.noise[0]) if len(self.units) == 1 else 1.0)
 
     def told(self, error: float) -> str:
         value = self.natural(error)
-        return f"{1e3 * value:.3g} {'mrad' if self.unit == 'rad' else 'mm'}"
+        return _told(value, self.units[0]) if len(self.units) == 1 else f"{value:.3g} {self.natural_unit}"
+
+    def told_by_unit(self, residual: Array) -> str:
+        """The mean absolute position error of a residual (n,), of joints of each kind in their own unit."""
+        off, unit_of = np.abs(self.raw(residual)), np.array(self.layout.units)[self.channel_of]
+        # Every trial counts the same, as it does in the error.
+        return " and ".join(_told(float(np.average(off[m], weights=self.weight[m])), u)
+                            for u in self.units for m in [unit_of == u])  # fmt: skip
 
     def raw(self, residual: Array) -> Array:
-        return np.asarray(np.sign(residual) * residual**2 * self.noise / self.weight)
+        return np.asarray(np.sign(residual) * residual**2 * self.noise[self.channel_of] / self.weight)
 
     def series(self, hypothesis: Hypothesis) -> list[Series]:
         """Every stretch, as far as residuals were taken."""
@@ -192,10 +206,11 @@ class FreeRun(Problem):
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         again = FreeRun(self.measured, self.robot, self.evaluator, self.every, RESTART_S)
-        return [
-            f"Re-started from the measured state every {RESTART_S:g} s: "
-            f"{again.told(error(again.residuals([hypothesis])[0]))}."
-        ]
+        left, anew = f"Re-started from the measured state every {RESTART_S:g} s", again.residuals([hypothesis])[0]
+        if len(self.units) == 1:
+            return [f"{left}: {again.told(error(anew))}."]
+        whole = self.told_by_unit(self.residuals([hypothesis])[0])
+        return [f"Mean absolute position error: {whole}.", f"{left}: {again.told_by_unit(anew)}."]
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         """Of the first stretch of each trial, which is the whole trial where it is run through."""
@@ -207,9 +222,9 @@ class FreeRun(Problem):
         return list(self.evaluator.evaluate(jobs))
 
     def mean_absolute(self, hypothesis: Hypothesis) -> Array:
-        """(trials,) mean absolute position error of each trial, rad or m."""
-        off = np.abs(self.raw(self.residuals([hypothesis])[0]))
-        return np.bincount(self.trial_of, weights=off) / np.bincount(self.trial_of)
+        """(trials,) mean absolute position error of each trial, in ``natural_unit``."""
+        residual = self.residuals([hypothesis])[0]
+        return np.array([self.natural(self.trial_error(residual, k)) for k in range(len(self.measured))])
 
 
 def noiseless(robot: Robot) -> Robot:
@@ -293,6 +308,22 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
             )
         )
     return found
+
+
+def _noise_by_unit(pieces: Sequence[Piece], robot: Robot, columns: Sequence[int]) -> dict[str, float]:
+    """``_noise`` of all channels of a unit, by unit."""
+    units = dict.fromkeys(robot.sensors[k].unit for k in columns)
+    found = {}
+    for unit in units:
+        own = [k for k in columns if robot.sensors[k].unit == unit]
+        # Of one unit it is a scale and no more. Beside another it decides which of them counts.
+        least = FINEST * np.mean([channel_range(robot, robot.sensors[k]) for k in own]) if len(units) > 1 else 0.0
+        found[unit] = max(float(np.mean([_noise(p, own) for p in pieces])), float(least), 1e-9)
+    return found
+
+
+def _told(value: float, unit: str) -> str:
+    return f"{1e3 * value:.3g} {'mrad' if unit == 'rad' else 'mm'}"
 
 
 def _noise(piece: Piece, columns: Sequence[int]) -> float:
