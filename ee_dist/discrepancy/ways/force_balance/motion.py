@@ -93,7 +93,7 @@ class Motion:
         shape, pull, masses = geometry(robot), gravity(robot), parameters(robot)
         if shape not in self.known:
             found = regressor(robot, self.position, self.speed, self.acceleration)
-            while len(self.known) >= max(2, ROOM // found.nbytes):
+            while len(self.known) >= max(2, ROOM // max(found.nbytes, 1)):
                 self.known.pop(next(iter(self.known)))
             self.known[shape] = Moved(found, pull)
         # The one asked for last goes last: what most hypotheses share stays.
