@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ee_dist.discrepancy.evidence.left import may_be_noise
 from ee_dist.discrepancy.measured_trial import released
 from ee_dist.discrepancy.problem import Index, Problem, error
 from ee_dist.engines.drivers import Commands
@@ -51,7 +52,7 @@ class RegimeReport:
 class Comparison:
     """Everything compare says. ``heat``: (segments, channels) root mean square, of values whose floor is ``heat_floor``;
     ``trial_errors`` by trial; ``parted_s``: by trial, when the first three values in a row of a channel stood out, None
-    where none did."""
+    where none did; ``unsure``: channels in which what is left may be noise or not."""
 
     error: float
     noise_floor: float
@@ -62,6 +63,7 @@ class Comparison:
     parted_s: dict[str, float | None]
     heat: Array
     trial_errors: list[float]
+    unsure: list[str] = field(default_factory=list)
 
 
 def compare(problem: Problem, residual: Array) -> Comparison:
@@ -78,6 +80,7 @@ def compare(problem: Problem, residual: Array) -> Comparison:
         {name: _parted(problem, residual, k) for k, name in enumerate(names)},
         heat(problem, residual),
         [problem.trial_error(residual, k) for k in range(len(problem.trials))],
+        may_be_noise(problem, residual),
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ee_dist.discrepancy.assumed import assumed_drives
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
-from ee_dist.discrepancy.evidence.judge import NEAR, Judged, judge, least_energy, ranked
+from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, no_more_than_noise, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
@@ -149,7 +149,7 @@ def _judged(
     found: list[Judged] = []
     if not (far and cuts):
         found = under(search, current, starts, windows(problem), base, tried, leading)
-        if not cuts or (found[0].earned and float(found[0].held.sum()) <= NEAR**2 * float(problem.floor.sum())):
+        if not cuts or (found[0].earned and no_more_than_noise(problem, float(found[0].held.sum()))):
             return found
         found = []
     for cut in cuts:

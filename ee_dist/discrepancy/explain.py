@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.evidence.judge import Judged
-from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.evidence.left import Leftover, may_be_noise
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import Candidate, known, on_top_of, values_of
@@ -30,7 +30,7 @@ the share of held-out energy at which the model as it was, with one effect on to
 class Explanation:
     """The outcome. ``baseline_error`` is that of the model as it is; ``refitted_error`` with its own values fitted anew
     (the same, where it has none, they are known, or they stayed ``as_it_was``); ``base`` (n,) the residual of the model
-    ``before``, refitted or as it was."""
+    ``before``, refitted or as it was; ``unsure``: channels in which what is left may be noise or not."""
 
     verdict: str
     baseline_error: float
@@ -41,6 +41,7 @@ class Explanation:
     fixed: Hypothesis
     examined: Examined
     as_it_was: bool = False
+    unsure: list[str] = field(default_factory=list)
 
     @property
     def candidates(self) -> list[Judged]:
@@ -125,8 +126,9 @@ def explain(
         found, fixed, model = kept, before, before
     verdict = EFFECT if found.best is not None else (UNEXPLAINED if found.left else NOTHING_MISSING)
     floor, source = problem.noise_floor()
+    unsure = may_be_noise(problem, found.base if found.best is None else found.best.residual)
     return Explanation(
-        verdict, error(as_it_is), error(found.base), floor, source, model, fixed, found, kept is not None
+        verdict, error(as_it_is), error(found.base), floor, source, model, fixed, found, kept is not None, unsure
     )
 
 

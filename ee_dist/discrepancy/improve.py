@@ -16,8 +16,8 @@ from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import everywhere, stands_out
 from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
-from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, least_energy
-from ee_dist.discrepancy.evidence.left import Leftover, leftovers
+from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, least_energy, no_more_than_noise
+from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_be_noise
 from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
@@ -43,8 +43,6 @@ EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
 RETURNS = 2
 """How often an effect may have been dropped and yet be looked at again: what came later may be dropped in turn."""
-SETTLED = 1.3
-"""Error over the noise floor up to which no more than noise is left where no curve stands out."""
 MOST = 24
 """Effects that are added at most unless told otherwise."""
 NO_MORE = "no further effect earns its place: {why}"
@@ -222,7 +220,7 @@ def _asked(search: Search, current: Current, c: Candidate) -> Judged:
     for each in (cut, *travelling(search.problem)):
         held.append(cross_fit(search, [(model, fit.u)], each)[0])
     problem = search.problem
-    near = float((held[0].residual ** 2).sum()) <= NEAR**2 * float(problem.floor.sum())
+    near = no_more_than_noise(problem, float((held[0].residual ** 2).sum()))
     chosen = held[0] if near or len(held) == 1 else held[1]
     without = search.on(current.hypothesis).base()
     if current.parts:
@@ -318,7 +316,20 @@ def _finish(
     share = (before**2 - max(after, floor) ** 2) / above if above > 0 else 0.0
     verdict = _verdict(len(ladder) > 1 or bool(current.parts), left, after, floor)
     return Improvement(
-        verdict, share, ladder, terms, told, base, residual, floor, source, left, stopped, last, worth=worth
+        verdict,
+        share,
+        ladder,
+        terms,
+        told,
+        base,
+        residual,
+        floor,
+        source,
+        left,
+        stopped,
+        last,
+        worth=worth,
+        unsure=may_be_noise(problem, residual),
     )
 
 

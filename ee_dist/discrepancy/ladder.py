@@ -39,7 +39,7 @@ class Improvement:
     ``better_not_explained``, ``unexplained`` (nothing could be added) or ``nothing_missing``; ``explained``: the share of the
     squared error above the noise that the model takes off held-out data; ``worth``: what goes with each effect. ``last``: what
     was tried on top of it. ``odd``: of a calibration, the joints whose values stand out from those of like joints (see
-    calibrated_away.py)."""
+    calibrated_away.py). ``unsure``: channels in which what is left may be noise or not."""
 
     verdict: str
     explained: float
@@ -55,6 +55,7 @@ class Improvement:
     last: Examined | None = None
     odd: list[OddOne] = field(default_factory=list)
     worth: Worth | None = None
+    unsure: list[str] = field(default_factory=list)
 
     def ties(self, step: int) -> list[str]:
         """What the measurements do not tell from the effect that step ``step`` (from 1) of ``effect=auto`` added."""

@@ -210,6 +210,11 @@ class Problem(ABC):
     def floor(self) -> Array:
         return self.layout.floor
 
+    @property
+    def sure(self) -> Array:
+        """(n,) what of the floor is noise beyond doubt; less, where the floor is only known to be no higher."""
+        return self.floor
+
     @cached_property
     def trial_of(self) -> Index:
         """(n,) the trial of each residual value."""

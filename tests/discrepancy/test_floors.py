@@ -2,27 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+import scipy
 from way_samples import Sample, evaluator_for, measure, sines, two_joint_arm
 
+from ee_dist.discrepancy.accounts.of_compare import compare_account
+from ee_dist.discrepancy.accounts.of_explain import explain_account
+from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.compare import by_trial, compare, heat
+from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
 from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, explain
+from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.ways.force_balance.noise import roughness_of_noise
+from ee_dist.discrepancy.ways.force_balance.places import Way, share_of_no_place
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.inverse_dynamics import parameters, regressor
 from ee_dist.robots.servo_pendulum import servo_pendulum
-from ee_dist.trials.log import SensorLog
+from ee_dist.trials.log import Array, SensorLog
 from ee_dist.trials.noise import with_noise
 
+Force = Callable[[Array, Array, Array], Array]
+"""(T, 2) torque of times (T,), positions and speeds (T, 2)."""
 
-def balanced_arm(noise_nm: tuple[float, float]) -> ForceBalance:
-    """Two motions of an arm whose torques are those of its model, but for white noise."""
+
+def balanced_arm(noise_nm: tuple[float, float], more: Force | None = None) -> ForceBalance:
+    """Two motions of an arm whose torques are those of its model, but for white noise, and what is ``more``."""
     robot = two_joint_arm()
     t = np.arange(0.0, 12.0, robot.time_step_s)
     trials = []
@@ -37,6 +51,7 @@ def balanced_arm(noise_nm: tuple[float, float]) -> ForceBalance:
         v = np.gradient(q, robot.time_step_s, axis=0)
         a = np.gradient(v, robot.time_step_s, axis=0)
         torque = regressor(robot, q, v, a) @ parameters(robot) + a * [d.rotor_inertia for d in robot.drives]
+        torque += 0.0 if more is None else more(t, q, v)
         torque += np.random.default_rng([3, k]).normal(size=torque.shape) * noise_nm
         of = {"position": q, "velocity": v}
         place = {name: j for j, name in enumerate(robot.motor_names)}
@@ -58,6 +73,65 @@ def test_forces_that_differ_by_noise_alone_are_noise_whichever_drive_has_more_of
     for k in range(2):
         mine = problem.channel_of == k
         assert (residual[mine] ** 2).mean() == pytest.approx(problem.floor[mine].mean(), rel=0.35)
+
+
+def still(t: Array, q: Array, v: Array) -> Array:
+    return np.zeros_like(q)
+
+
+def teeth(t: Array, q: Array, v: Array) -> Array:
+    """Cogging of the elbow, ten times the noise: at full pace some ten teeth a second."""
+    return np.array([0.0, 0.3]) * np.sin(48.0 * q)
+
+
+def buzz(t: Array, q: Array, v: Array) -> Array:
+    """Something at the elbow that no place shows again."""
+    return np.array([0.0, 0.3]) * np.sin(2 * np.pi * 9.0 * t)[:, None]
+
+
+def test_a_force_that_every_pass_of_a_place_shows_again_is_no_noise() -> None:
+    clean, problem = (balanced_arm((0.03, 0.03), force) for force in (still, teeth))
+    noise = [p.own_noise * p.noise_share * p.size for p in (clean, problem)]
+    assert (noise[1] < 2.5 * noise[0]).all(), "it was 18 times as much"
+    found = explain(problem, pool_of(problem))
+    assert found.verdict == UNEXPLAINED and {g.channel for g in found.left} == {"elbow"}
+
+
+def test_a_quick_force_that_may_be_noise_is_not_said_to_be_nothing() -> None:
+    problem = balanced_arm((0.03, 0.03), buzz)
+    found = explain(problem, pool_of(problem))
+    account = explain_account(problem, found, None)
+    assert found.verdict == NOTHING_MISSING and found.unsure == ["elbow"]
+    assert account.headline.startswith("Nothing is left beyond what may be noise") and not account.good
+    assert "upper bound" in found.floor_source
+    agrees = compare_account(problem, compare(problem, found.base), [])
+    assert agrees.headline.endswith("beyond what may be noise.") and not agrees.good
+    added = improve(problem, [])
+    told = improve_account(problem, added)
+    assert "beyond what may be noise" in told.headline and not told.good
+
+
+def test_a_floor_that_may_be_a_force_makes_no_evidence_weaker() -> None:
+    dry = [balanced_arm((0.03, 0.03), lambda t, q, v, f=f: 0.3 * np.sign(v) + f(t, q, v)) for f in (still, buzz)]
+    pool = [c for c in pool_of(dry[0]) if c.name == "coulomb_friction@all_joints"]
+    held_out = [explain(p, pool).best.held_out for p in dry]  # type: ignore[union-attr]
+    assert held_out == [WINDOWS, MOTIONS]
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.9])
+def test_noise_stays_noise_where_the_places_are_passed_again_and_again(alike: float) -> None:
+    def noise(t: Array, q: Array, v: Array) -> Array:
+        return np.asarray(
+            scipy.signal.lfilter([0.05], [1.0, -alike], np.random.default_rng(7).normal(size=q.shape), axis=0)
+        )
+
+    problem = balanced_arm((0.0, 0.0), noise)
+    every = problem.processing.keep_every
+    left = [b(m) for b, m in zip(problem.balances, problem.models, strict=True)]
+    ways = [Way(m.position[:, 1], m.speed[:, 1], x[0][:, 1]) for m, x in zip(problem.motions, left, strict=True) if x]
+    assert share_of_no_place(ways, every, problem.robot.time_step_s) > 0.85
+    # White noise is noise beyond doubt; noise that is slower than the readings may be a quick force.
+    assert (problem.sure < problem.floor).all() == (alike > 0)
 
 
 @pytest.mark.parametrize("every", [1, 2, 5, 10])

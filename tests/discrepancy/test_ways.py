@@ -157,3 +157,8 @@ def test_windows_of_a_trial_are_one_curve_that_breaks_off_between_them() -> None
             o.improved is not None and len(o.improved) == len(o.times_s) and o.times_s[0] == 0 and o.times_s[-1] > 2.5
         )
         assert np.isnan(thinned(o, 60).predicted).sum() == 5
+
+
+def test_a_robot_that_has_lost_all_that_moves_needs_no_force() -> None:
+    balance = problem("pendulum", "force_balance")
+    assert np.isfinite(balance.residuals([(term("part_lost", "arm"),)])).all()

@@ -23,7 +23,9 @@ from ee_dist.tasks.improve import effects_of
 from ee_dist.tasks.results.tables import typed
 
 
-def account(tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "") -> Account:
+def account(
+    tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = ()
+) -> Account:
     best = SimpleNamespace(
         terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
         explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""),
@@ -39,6 +41,7 @@ def account(tied: list[str], explained: float = 1.0, ahead: object = None, plann
         floor_source="told",
         tried=9,
         as_it_was=False,
+        unsure=unsure,
     )
     problem = SimpleNamespace(
         robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts="", trials=("a",)
@@ -111,7 +114,8 @@ def test_what_a_candidate_has_is_what_the_next_command_asks_for() -> None:
 
 def compared(error: float, left: list[Leftover]) -> Account:
     found = SimpleNamespace(
-        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={}, channels=[SimpleNamespace(name="a_b")]
+        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={}, channels=[SimpleNamespace(name="a_b")],
+        unsure=[],
     )  # fmt: skip
     problem = SimpleNamespace(
         robot=servo_pendulum(),
@@ -150,6 +154,14 @@ def test_small_errors_keep_their_digits(error_m: float, said: str) -> None:
     assert FreeRun.told(problem, error_m) == said  # type: ignore[arg-type]
 
 
+def test_what_may_be_noise_is_no_proof_that_nothing_is_left() -> None:
+    told_of = account([], unsure=("knee_left", "hip"))
+    assert told_of.headline.endswith("Nothing else is left beyond what may be noise.") and not told_of.good
+    assert told_of.sure.endswith("; the noise floor is only an upper bound at knee left, hip.")
+    assert told_of.advice.startswith("To tell, repeat the motion at a third of its pace")
+    assert account([]).good and "beyond" not in " ".join(account([]).words)
+
+
 def test_units_are_told_once_and_as_they_are_on_a_slide() -> None:
     stage = linear_stage()
     assert told(term("zero_offset", "carriage", offset_rad=0.07), stage) == "zero offset at carriage (offset 0.07 m)"
@@ -170,7 +182,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     ):
         found = SimpleNamespace(
             ladder=[start, rung], left=[], verdict=verdict, explained=share, parameters=[], terms=rung.added, stopped="so",
-            noise_floor=1.0, floor_source="told", last=None, odd=[], worth=None,
+            noise_floor=1.0, floor_source="told", last=None, odd=[], worth=None, unsure=[],
         )  # fmt: skip
         account = improve_account(problem, found)  # type: ignore[arg-type]
         assert account.headline.endswith(said) or said in account.headline

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ee_dist.discrepancy.evidence.left import Leftover
-from ee_dist.discrepancy.improve import SETTLED
+from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed, plain
 
@@ -22,6 +21,7 @@ SPREAD = (
     "compared."
 )
 NOTHING_ELSE = "Nothing else is left above the noise."
+BEYOND = "Nothing else is left beyond what may be noise."
 CONTENT = (
     "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
 )
@@ -72,6 +72,24 @@ def beside_floor(error: float, floor: float, left: bool) -> list[str]:
     if error <= 1.03 * floor or left:
         return []
     return [GRANTED if error <= SETTLED * floor else SPREAD]
+
+
+def unsure_of(places: Sequence[str]) -> str:
+    """Behind how sure a finding is: where the floor is only an upper bound, if it is anywhere."""
+    return f"; the noise floor is only an upper bound at {_listed_places(places)}" if places else ""
+
+
+def slower(places: Sequence[str]) -> str:
+    """What to do where a force that changes quickly may pass for noise."""
+    return (
+        "To tell, repeat the motion at a third of its pace: a force that changes quickly along the way, and may pass for noise "
+        f"at {_listed_places(places)}, then changes slowly, and noise does not."
+    )
+
+
+def _listed_places(places: Sequence[str]) -> str:
+    more = f" and {len(places) - FEW} more" if len(places) > FEW else ""
+    return ", ".join(map(plain, places[:FEW])) + more
 
 
 def counted(number: int, what: str) -> str:

@@ -13,6 +13,7 @@ from ee_dist.discrepancy.accounts.account import (
     curves_of,
     error_name,
     left_text,
+    slower,
 )
 from ee_dist.discrepancy.assumed import assumed_text
 from ee_dist.discrepancy.compare import Comparison
@@ -35,7 +36,8 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     if left:
         lines.append(left_text(left, False))
     if ratio < CLOSE and not left:
-        head = "The model agrees with the measurements: nothing is left above the noise."
+        what = "beyond what may be noise" if found.unsure else "above the noise"
+        head = f"The model agrees with the measurements: nothing is left {what}."
     else:
         # The largest error, or, where the errors are all small, the place that noise explains least.
         place = left[0].channel if left and ratio < CLOSE else found.channels[0].name if found.channels else ""
@@ -55,7 +57,9 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     )
     sure += f"; the noise floor is {found.floor_source}."
     settled = ratio < CLOSE and not left
-    return Account(head, error, sure, (*lines, *problem.notes), settled, advised(problem, CONTENT if settled else ""))
+    advice = "" if not settled else slower(found.unsure) if found.unsure else CONTENT
+    good = settled and not found.unsure
+    return Account(head, error, sure, (*lines, *problem.notes), good, advised(problem, advice))
 
 
 def _times(ratio: float) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.accounts.account import (
+    BEYOND,
     CONTENT,
     NOTHING_ELSE,
     STUCK,
@@ -20,14 +21,16 @@ from ee_dist.discrepancy.accounts.account import (
     error_name,
     left_text,
     listed_few,
+    slower,
     tie_text,
     unexplained_rest,
+    unsure_of,
     was_or_were,
 )
 from ee_dist.discrepancy.assumed import GUESSED, LABEL
 from ee_dist.discrepancy.evidence.judge import LUCK, Judged
+from ee_dist.discrepancy.evidence.left import SETTLED
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
-from ee_dist.discrepancy.improve import SETTLED
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import is_less, percent, placed, plain, told_all
@@ -47,6 +50,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     error = f"{error_name(problem)}: model {problem.told(found.baseline_error)}"
     error += f", noise floor {problem.told(found.noise_floor)}."
     last, advice = found.baseline_error, ""
+    unsure = [] if found.left else found.unsure
     if found.refitted_error != found.baseline_error:
         lines.append(f"Its own values fitted anew leave {problem.told(found.refitted_error)}.")
         last = found.refitted_error
@@ -57,10 +61,12 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
     if found.verdict == NOTHING_MISSING:
         by_luck = all(c.why_not == LUCK for c in found.candidates)
         worth = "takes more off the residual than luck" if by_luck else "earns its place"
-        head = f"Nothing is missing: no candidate {worth}, and no channel stands out."
+        nothing = "Nothing is left beyond what may be noise" if unsure else "Nothing is missing"
+        head = f"{nothing}: no candidate {worth}, and no channel stands out."
         gains = "gains more than luck" if by_luck else "earns its place"
-        sure = f"How sure: {counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried, and none {gains}."
-        advice = CONTENT
+        sure = f"How sure: {counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried, and none {gains}"
+        sure += f"{unsure_of(unsure)}."
+        advice = slower(unsure) if unsure else CONTENT
     elif found.verdict == EFFECT and best is not None:
         entry, last = CATALOGUE[best.terms[0].effect], best.error_heldout
         # Those that were judged are the most promising: where all of them are tied there may be more.
@@ -68,10 +74,12 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         less = is_less(best.terms)
         head = f"{'Too much' if less else 'Missing'}{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best, more)}."
         nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
+        nothing = BEYOND if unsure else nothing
         head += " More than noise is left with it." if found.left else f" {nothing}"
         error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
         sure = f"How sure: it takes off {confidence(best)}{unexplained_rest(best.explained, not found.left)}"
-        sure += f"; {_rivals(found.tried, best.tied_with, more)}."
+        sure += f"; {_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}."
+        advice = slower(unsure) if unsure else ""
         guessed = best.proposal.label == LABEL
         lines.append(GUESSED if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""
@@ -101,7 +109,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
             f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
             f"(predicted distance {ahead.separation:.0f} standard deviations)."
         )
-    good = found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)
+    good = (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)) and not unsure
     tied = found.verdict == EFFECT and best is not None and best.tied_with
     return Account(
         head,

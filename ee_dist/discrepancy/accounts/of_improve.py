@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ee_dist.discrepancy.accounts.account import (
+    BEYOND,
     CONTENT,
     NOTHING_ELSE,
     STUCK,
@@ -19,8 +20,10 @@ from ee_dist.discrepancy.accounts.account import (
     error_name,
     left_text,
     listed_few,
+    slower,
     tie_text,
     unexplained_rest,
+    unsure_of,
     was_or_were,
 )
 from ee_dist.discrepancy.calibrated_away import OddOne
@@ -35,6 +38,7 @@ from ee_dist.discrepancy.words import much, named, percent, phrase, placed, plai
 from ee_dist.effects.catalogue import Hypothesis, Term
 from ee_dist.robots.model import Robot
 
+NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
 NAMED = 3
 """Effects that a headline names."""
 
@@ -63,28 +67,32 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     if worse:
         lines.append(worse_text(problem, worse))
     settled = found.verdict in (EXPLAINED, NOTHING_MISSING)
+    unsure = found.unsure if settled else []
     lines += beside_floor(last.error_heldout, found.noise_floor, not settled)
     if found.left:
         lines.append(left_text(found.left, bool(steps)))
     error = before_and_after(problem, first.error_heldout, last.error_heldout, found.noise_floor, last.held_out)
     share = f"{percent(max(0.0, min(found.explained, 1.0)))} of what is above the noise is accounted for"
     if len(found.ladder) == 1:
-        head = f"Nothing was added: {found.stopped}."
+        head = f"Nothing was added: {NOTHING_BEYOND if unsure else found.stopped}."
         error = f"{error_name(problem)}: model {problem.told(last.error_heldout)}, noise floor "
         error += f"{problem.told(found.noise_floor)}."
         tried = found.last.tried if found.last else 0
-        sure = f"How sure: {counted(tried, 'explanation')} {was_or_were(tried)} tried, and none earns its place."
+        sure = f"How sure: {counted(tried, 'explanation')} {was_or_were(tried)} tried, and none earns its place"
+        sure += f"{unsure_of(unsure)}."
     else:
         what = _listed([s.text for s in parts]) if parts else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {last.held_out}"
-        head += f" {NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
+        head += f" {BEYOND if unsure else NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {last.held_out}{unexplained_rest(found.explained, settled)}"
-        sure += f"{_ranges(found, [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1], robot)}{_told_from(ties)}."
+        sure += f"{_ranges(found, [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1], robot)}{_told_from(ties)}"
+        sure += f"{unsure_of(unsure)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
+    advice = slower(unsure) if unsure else advice
     tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
-    good = settled and not warnings
+    good = settled and not warnings and not unsure
     more = (*lines, *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
 

@@ -32,7 +32,8 @@ WORTH = 0.1
 Where a model is wrong in ways that no effect describes (another simulator, resampled records), some effect always takes a
 little of it, surely and wrongly."""
 NEAR = 1.1
-"""Error over the noise floor up to which windows of the same motions are evidence enough: no more than noise is left."""
+"""Error, over what is noise beyond doubt, up to which windows of the same motions are evidence enough: no more than noise is
+left. A floor that is only an upper bound makes no evidence weaker."""
 ALONE = 0.3
 """The same where a single motion is all the evidence, but for what a robot's description leaves open (friction, rotors and gains
 of the drives). Windows of one motion share what a model gets wrong in it, and something always takes part of that: on a real arm
@@ -158,10 +159,15 @@ def _worth(problem: Problem, cut: Cut, proposal: Proposal, held: Array) -> float
     """Share of what is above the noise that a proposal must take off; nothing where no more than noise is left with it."""
     if cut.name != WINDOWS:
         return WORTH
-    if float(held.sum()) <= NEAR**2 * float(problem.floor.sum()) or travelling(problem):
+    if no_more_than_noise(problem, float(held.sum())) or travelling(problem):
         return 0.0
     expected = all(c.effect.everywhere and c.effect.family == "drive" for c in proposal.parts)
     return WORTH if expected else ALONE
+
+
+def no_more_than_noise(problem: Problem, energy: float) -> bool:
+    """Whether the energy of a held-out residual is that of noise, beyond doubt."""
+    return energy <= NEAR**2 * float(problem.sure.sum())
 
 
 def _vague(problem: Problem, found: HeldOut, proposal: Proposal) -> bool:

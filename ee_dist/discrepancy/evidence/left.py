@@ -18,6 +18,8 @@ VARIES = 1.0
 EVENT = 170.0
 """Energy of a few values that come a row early or late, at a contact or a reversal: a model good to the noise still misses
 some. It is granted where the scale of a channel is wider than its noise."""
+SETTLED = 1.3
+"""Error over the noise floor up to which no more than noise is left where no curve stands out."""
 MANY = 1000
 """Standard deviations beyond which a number says no more."""
 
@@ -83,6 +85,17 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
                 repeated = problem.trials.count(trial) > 1
                 found.append(Leftover(trial, problem.channels[c], float(z), excess, trend, k, repeated))
     return sorted(found, key=lambda g: -g.z)
+
+
+def may_be_noise(problem: Problem, residual: Array) -> list[str]:
+    """Channels in which more is left than is noise beyond doubt, and no more than may be: the floor is only an upper bound there.
+    Those in which it is furthest off come first."""
+    count = len(problem.channels)
+    energy, floor, sure = (
+        np.bincount(problem.channel_of, weights=w, minlength=count) for w in (residual**2, problem.floor, problem.sure)
+    )
+    unsure = np.flatnonzero((sure < floor) & (energy > SETTLED**2 * sure))
+    return [problem.channels[c] for c in sorted(unsure, key=lambda c: float(sure[c] / floor[c]))]
 
 
 def _rarity(total: float, each: float, count: float) -> float:

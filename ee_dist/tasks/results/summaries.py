@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,12 +22,14 @@ from ee_dist.tasks.summary import hypothesis_list
 
 def common(problem: Problem, account: Account, floor: float, source: str, model: Hypothesis) -> dict[str, Any]:
     """What all three say."""
+    whole, sure = (float(energy.sum()) for energy in (problem.floor, problem.sure))
     return {
         "way": problem.way,
         "error_definition": problem.error_definition,
         "natural": {"name": problem.natural_name, "unit": problem.natural_unit},
         "noise_floor": floor,
         "noise_floor_natural": problem.natural(floor),
+        "noise_floor_sure": floor * math.sqrt(sure / whole) if whole else floor,
         "noise_floor_source": source,
         "model_terms": hypothesis_list(model),
         "headline": account.headline,

@@ -93,7 +93,7 @@ class Motion:
         shape, pull, masses = geometry(robot), gravity(robot), parameters(robot)
         if shape not in self.known:
             found = regressor(robot, self.position, self.speed, self.acceleration)
-            while len(self.known) >= max(2, ROOM // found.nbytes):
+            while len(self.known) >= max(2, ROOM // max(found.nbytes, 1)):
                 self.known.pop(next(iter(self.known)))
             self.known[shape] = Moved(found, pull)
         # The one asked for last goes last: what most hypotheses share stays.
@@ -157,10 +157,15 @@ def motor_torques(log: SensorLog, robot: Robot) -> Array | None:
     A sensor shows the step before its reading. Differences of positions are of both steps about a row: so is the mean of a
     reading and the next.
     """
-    if log.torques is not None:
-        return log.torques
-    read = _channels(log, robot, MOTOR_TORQUE)
-    return None if read is None else np.concatenate([(read[:-1] + read[1:]) / 2, read[-1:]])
+    read = torque_readings(log, robot)
+    if log.torques is not None or read is None:
+        return read
+    return np.concatenate([(read[:-1] + read[1:]) / 2, read[-1:]])
+
+
+def torque_readings(log: SensorLog, robot: Robot) -> Array | None:
+    """(T, M) the same as it was read, row by row; None without."""
+    return _channels(log, robot, MOTOR_TORQUE) if log.torques is None else log.torques
 
 
 def positions_of(log: SensorLog, robot: Robot) -> Array | None:

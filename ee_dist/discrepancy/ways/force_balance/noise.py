@@ -51,9 +51,9 @@ def with_energy(left: Array, more: Array) -> Array:
 
 
 @lru_cache
-def roughness_of_noise(every: int) -> float:
-    """Mean square of the second differences of white noise of which every n-th row is kept, over 6 times its variance: 1 where
-    all are kept. The filter before it leaves neighbours alike, and less rough than white noise is."""
+def _kept(every: int) -> tuple[float, float, float]:
+    """Of white noise of variance 1 of which every n-th row is kept: its variance, and products of neighbours and of those next to
+    them."""
     around = 200 * every
     found = np.zeros(3)
     for phase in range(every):
@@ -61,7 +61,19 @@ def roughness_of_noise(every: int) -> float:
         pulse[around + phase] = 1.0
         answer = decimated(pulse, every)[:, 0]
         found += [answer @ answer, answer[1:] @ answer[:-1], answer[2:] @ answer[:-2]]
-    return float((6.0 * found[0] - 8.0 * found[1] + 2.0 * found[2]) / (6.0 * found[0]))
+    return float(found[0]), float(found[1]), float(found[2])
+
+
+def roughness_of_noise(every: int) -> float:
+    """Mean square of the second differences of white noise of which every n-th row is kept, over 6 times its variance: 1 where
+    all are kept. The filter before it leaves neighbours alike, and less rough than white noise is."""
+    own, next_, second = _kept(every)
+    return (6.0 * own - 8.0 * next_ + 2.0 * second) / (6.0 * own)
+
+
+def share_of_noise(every: int) -> float:
+    """Share of the variance of white noise that is left of it where every n-th row is kept."""
+    return _kept(every)[0]
 
 
 class MotionNoise:

@@ -21,11 +21,11 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read
 from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.discrepancy.ways.force_balance.balance import Balance
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED, left_to_give
+from ee_dist.discrepancy.ways.force_balance.floor import floor_of
 from ee_dist.discrepancy.ways.force_balance.motion import Processing
-from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, roughness_of_noise, with_energy
+from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
-from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.model import Robot
@@ -65,12 +65,15 @@ class ForceBalance(Problem):
         forces = [decimated(m.torque, self.processing.keep_every) for m in self.motions]
         self.let_through = ready.noise.first
         """(M,): variance of the force that noise of the positions makes, with the base model."""
-        shares = np.maximum(self._noise(forces), LEAST_NOISE**2)
+        told = floor_of(trials, self.models, ready, self.balances)
+        shares = np.maximum(told.most, LEAST_NOISE**2)
         # One share for all drives, so that the sum of squares is the relative error of all of them; a drive's own floor tells
         # how much less or more than that its noise is.
         self.noise_share = float(np.sqrt(np.mean(shares)))
         self.own_noise = np.sqrt(shares) / self.noise_share
         """(M,): standard deviation of a drive's noise in units of that share."""
+        self.sure_noise = np.sqrt(np.maximum(told.sure, LEAST_NOISE**2)) / self.noise_share
+        """(M,): the same of what is noise beyond doubt; the rest may be a force that changes quickly."""
         self.scale = self.size * self.noise_share
         self._lay_out(forces)
         p, smooth = self.processing, self.processing.filter_for(float(np.median(np.diff(trials[0].log.times_s))))
@@ -79,21 +82,6 @@ class ForceBalance(Problem):
             f"({self.noise_share:.2%} of its root mean square); positions through a {smooth}, central differences, "
             f"forces decimated by {p.keep_every}"
         )
-
-    def _noise(self, forces: Sequence[Array]) -> Array:
-        """(M,) variance of the noise of the force left over, as a share of the mean square of the force: from second differences.
-        What a model accounts for is no noise, so the least of what the model as it is leaves over, and of what the measured
-        force shows and noise of the positions adds to it."""
-        both = [balance(model) for model, balance in zip(self.models, self.balances, strict=True)]
-        left = [None if b is None else b[1] for b in both]
-        rough = roughness_of_noise(self.processing.keep_every)
-        found = []
-        for series, more in ((forces, self.let_through), (left, 0.0)):
-            whole = [s for s in series if s is not None]
-            if len(whole) == len(series):
-                parts = [np.median(roughness(s / self.size), axis=0) / 0.455 / rough for s in whole]
-                found.append(np.mean(parts, axis=0) + more / self.size**2)
-        return np.asarray(np.min(found, axis=0))
 
     def natural(self, error: float) -> float:
         """Root mean square of the force left over, as a share of that of the measured force."""
@@ -208,5 +196,16 @@ class ForceBalance(Problem):
             )
         return lines
 
+    @property
+    def sure(self) -> Array:
+        return np.tile(self.sure_noise**2, len(self.floor) // len(self.channels))
+
     def noise_floor(self) -> tuple[float, str]:
-        return 1.0, "estimated: second differences of the force"
+        source = "estimated: second differences of the force"
+        worst = int(np.argmax(self.own_noise / self.sure_noise))
+        most, least = (100 * self.natural(float(n[worst])) for n in (self.own_noise, self.sure_noise))
+        if most > least:
+            source += (
+                f", an upper bound: of {most:.2g} % at {self.channels[worst]} only {least:.2g} % are noise beyond doubt"
+            )
+        return 1.0, source
