@@ -26,7 +26,7 @@ from ee_dist.tasks.results.tables import typed
 def account(tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "") -> Account:
     best = SimpleNamespace(
         terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
-        explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""),
+        explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""), guess=False,
     )  # fmt: skip
     found = SimpleNamespace(
         candidates=[],
