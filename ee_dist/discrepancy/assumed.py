@@ -19,7 +19,8 @@ from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
-from ee_dist.effects.groups import JOIN, groups
+from ee_dist.effects.groups import name_of
+from ee_dist.effects.targets import uneven_rotors
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of
 from ee_dist.trials.log import Array
@@ -43,11 +44,13 @@ GUESSED = (
     "them into it, or keep this model."
 )
 """What is said of them in the place of an effect's physics."""
+GUESS = "The description only guessed at what it changes: write the value found into it, or keep this model."
+"""What is said of one number that puts right what was assumed."""
 
 
 def assumed_text(robot: Robot) -> list[str]:
     """A line for people where a description only assumed what its controllers do."""
-    count = len(robot.assumed_joints("kp"))
+    count = len({j for j, f in robot.assumed if f != "command"})
     names = listed(dict.fromkeys(f for _, f in robot.assumed if f != "command"))
     drives = "1 drive" if count == 1 else f"{count} drives"
     return [f"The description only assumed {names} of {drives}: explain and improve look there first."] if count else []
@@ -62,7 +65,7 @@ def assumed_drives(
     joints, names = robot.assumed_joints("kp"), {c.effect.name for c in pool}
     if not joints or TOGETHER[0] not in names:
         return None
-    parts = tuple(c for name in TOGETHER if name in names for c in _at(robot, name, joints))
+    parts = tuple(c for name in TOGETHER if name in names for c in _at(robot, _by_factor(robot, name, joints), joints))
     if len(parts) < 2 or {c.name for c in parts} & set(taken):
         return None
     model = Model(parts)
@@ -77,8 +80,11 @@ def assumed_drives(
 
 
 def puts_right(robot: Robot, c: Candidate) -> bool:
-    """Whether it is one of these effects, at joints whose gains were assumed."""
-    return c.effect.name in TOGETHER and {*(c.members(robot) or (c.target,))} <= {*robot.assumed_joints("kp")}
+    """Whether it is one of these effects, at joints whose gains were assumed; or one value for all of whatever was assumed."""
+    at = {*(c.members(robot) or (c.target,))}
+    return c.target == c.effect.guessed(robot) != "" or (
+        c.effect.name in TOGETHER and at <= {*robot.assumed_joints("kp")}
+    )
 
 
 def beside(robot: Robot, parts: Sequence[Candidate], terms: Hypothesis, others: Sequence[Candidate]) -> list[Candidate]:
@@ -97,11 +103,16 @@ def _bounded(c: Candidate) -> Candidate:
     return replace(c, bounds=tuple((max(low, LEAST), min(high, MOST)) for low, high in c.bounds))
 
 
+def _by_factor(robot: Robot, effect: str, joints: Sequence[str]) -> str:
+    """The effect, or, of rotors that were guessed from the size of each motor, the one that they share: by that guess."""
+    guessed = uneven_rotors(robot) if effect == "rotor_inertia" else ()
+    return "rotor_factor" if {*joints} <= {*guessed} else effect
+
+
 def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:
     """The effect at these joints with one set of values, under the name of their group if they have one."""
-    named = {members: name for name, members in groups(robot).items()}
     try:
-        return [candidate(robot, effect, named.get(tuple(joints), JOIN.join(joints)))]
+        return [candidate(robot, effect, name_of(robot, tuple(joints)))]
     except EffectError:
         return []
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import TypeVar
 
 import numpy as np
 
@@ -39,6 +40,7 @@ WORTH_JUDGING = 0.4
 """Share of what the best quick fit takes off that another must take off to be judged beside it, unless it is among the first
 AT_LEAST."""
 AT_LEAST = 4
+Looked = TypeVar("Looked", Screened, Scanned)
 FAMILIES_TRIED = 4
 """Effects whose members at all joints, each with a value of its own, are tried together."""
 
@@ -106,14 +108,18 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     refit, busy = Refit(leading), busiest(problem, base, calm)
     screened = screen(now.among(busy), pool, effort.shares, refit)
     least = least_energy(len(pool))
-    promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)[: effort.first]
-    scanned = sorted(scan(now.among(busy), promising, refit), key=lambda s: s.energy)[: effort.second]
+    promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)
+    promising = _first(promising, effort.first)
+    scanned = sorted(scan(now.among(busy), promising, refit), key=lambda s: s.energy)
+    scanned = _first(scanned, effort.second)
     quick = sorted(_quick(search.among(calm), current, scanned, effort.starts, leading), key=lambda f: f.energy)
     energy = float((base[np.isin(problem.trial_of, calm)] ** 2).sum())
     quick = [
         f
-        for k, f in enumerate(quick[: effort.final])
-        if k < AT_LEAST or energy - f.energy >= WORTH_JUDGING * (energy - quick[0].energy)
+        for k, f in enumerate(quick)
+        if f.model.parts[-1].guess
+        or k < min(AT_LEAST, effort.final)
+        or (k < effort.final and energy - f.energy >= WORTH_JUDGING * (energy - quick[0].energy))
     ]
     starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
     has = {t.effect for t in (*search.fixed, *current.hypothesis) if t.target in WHOLE}
@@ -156,6 +162,11 @@ def _judged(
         again = under(search, current, starts, cut, base, tried, leading)
         found = strictest(found, again) if found else again
     return found
+
+
+def _first(found: Sequence[Looked], count: int) -> list[Looked]:
+    """The first ``count``, and whatever puts right what was only assumed: nobody has to believe in that."""
+    return [s for k, s in enumerate(found) if k < count or s.candidate.guess]
 
 
 def _floor_of(problem: Problem, trials: Sequence[int]) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -302,15 +303,17 @@ def _finish(
 ) -> Improvement:
     problem = search.problem
     floor, source = problem.noise_floor()
-    residual, terms, told, worth = base, search.fixed, [], None
+    terms: Hypothesis = search.fixed
+    told: list[ParameterReport] = []
+    worth, left = None, leftovers(problem, base)
+    residual = base
     if current.parts:
         start = [(Model(current.parts), current.u)]
         fit: Fit = fit_all(search, start, None, (*WIDTHS[2:], 0.006))[0]
         residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
-        told, worth = parameters(problem, fit), worth_of(problem, fit, base)
-        if search.fixed:
-            told = [ParameterReport(p.term + len(search.fixed), p.name, p.value, p.low, p.high, p.flag) for p in told]
-    left = leftovers(problem, residual)
+        left = leftovers(problem, residual)
+        told = [replace(p, term=p.term + len(search.fixed)) for p in parameters(problem, fit, left)]
+        worth = worth_of(problem, fit, base)
     before, after = ladder[0].error_heldout, ladder[-1].error_heldout
     above = before**2 - floor**2
     share = (before**2 - max(after, floor) ** 2) / above if above > 0 else 0.0

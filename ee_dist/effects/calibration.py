@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ee_dist.effects import scales
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import Parameter, effect, find
 from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import (
+    Assumed,
     bolted_motors,
     damped_drives,
     is_adjustable,
@@ -22,6 +23,8 @@ from ee_dist.effects.targets import (
     motors_with_speed_limit,
     position_drives,
     powered,
+    uneven_rotors,
+    with_rotors,
 )
 from ee_dist.robots.model import Drive, Quat, Robot
 
@@ -123,6 +126,7 @@ def _gains(robot: Robot, target: str) -> dict[str, Range]:
     ranges=_gains,
     worth_proposing=is_adjustable,
     everywhere=True,
+    guesses=Assumed("kp"),
 )
 def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, kp=d.kp * values["factor"]))
@@ -154,9 +158,35 @@ def _damping(robot: Robot, target: str) -> dict[str, Range]:
     "the drive is released.",
     worth_proposing=is_adjustable,
     ranges=_damping,
+    guesses=Assumed("kd"),
 )
 def speed_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: replace(d, kd=d.kd * values["factor"]))
+
+
+def _heavier(robot: Robot, target: str) -> dict[str, Range]:
+    """As far as ``rotor_inertia`` goes."""
+    rotor = scales.drive_of(robot, target).rotor_inertia
+    less, more = find("rotor_inertia").bounds(robot, target)["added_kg_m2"]
+    return {"factor": ((rotor + less) / rotor, (rotor + more) / rotor)}
+
+
+@effect(
+    "rotor_factor",
+    family="drive",
+    targets=with_rotors,
+    parameters=(
+        Parameter("factor", "1", 0.01, 1000.0, 1.0, "factor on the described rotor inertia", 0.02, by_ratio=True),
+    ),
+    physics="The rotors behind the gears are heavier or lighter than described, all by one factor: who guessed at them from the "
+    "size of the motors was off by it at all of them.",
+    signature="Residual torque in proportion to the joint's acceleration and to the described rotor, at all joints alike.",
+    searchable=False,
+    ranges=_heavier,
+    guesses=uneven_rotors,
+)
+def rotor_factor(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    return robot.map_drive(target, lambda d: replace(d, rotor_inertia=d.rotor_inertia * values["factor"]))
 
 
 def _gears(robot: Robot, target: str) -> dict[str, Range]:

@@ -26,7 +26,7 @@ from typing import Any, TypeVar
 
 from ee_dist.basics.names import did_you_mean, listed, nearest
 from ee_dist.basics.quoted import quoted
-from ee_dist.effects.groups import common, members_of, shared_targets
+from ee_dist.effects.groups import common, members_of, name_of, shared_targets
 from ee_dist.effects.laws import LAWS, TEXTS
 from ee_dist.effects.scales import Range, Ranges
 from ee_dist.robots.model import Robot, RobotError
@@ -102,6 +102,9 @@ class Effect:
     """Whether a little of it is in every real robot, at each of its targets."""
     of: type = Robot
     """The kind of system that it changes; on others it has no targets."""
+    guesses: Callable[[Robot], tuple[str, ...]] | None = None
+    """The joints at which a description only assumed what it changes: ``explain`` asks for it first there, with one set of values
+    for all of them, whether or not it proposes it elsewhere."""
 
     def shared(self, robot: Robot) -> tuple[str, ...]:
         """Groups of joints or sensors that it can act on with one set of values (see groups.py). What is wrong with a part is
@@ -114,6 +117,11 @@ class Effect:
         """The targets at which ``explain`` proposes it by itself: all or none."""
         sought = self.searchable and (self.worth_proposing is None or self.worth_proposing(robot))
         return self.targets(robot) if sought else ()
+
+    def guessed(self, robot: System) -> str:
+        """The joints, or the group, at which a description only assumed what it changes; empty where it assumed nothing."""
+        joints = () if self.guesses is None or not isinstance(robot, Robot) else self.guesses(robot)
+        return name_of(robot, tuple(j for j in joints if j in self.targets(robot)))
 
     @property
     def main(self) -> Parameter:
@@ -209,6 +217,7 @@ def effect(
     worth_proposing: Callable[[Robot], bool] | None = None,
     everywhere: bool = False,
     of: type = Robot,
+    guesses: Callable[[Robot], tuple[str, ...]] | None = None,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
@@ -238,6 +247,7 @@ def effect(
             worth_proposing,
             everywhere,
             of,
+            guesses,
         )
         return transform
 

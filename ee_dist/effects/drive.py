@@ -12,6 +12,7 @@ from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.described import with_more
 from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import (
+    Assumed,
     motors,
     motors_with_speed_limit,
     motors_with_torque_limit,
@@ -49,6 +50,7 @@ def motor_weak(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     "cap it works as modelled. With the voltage, the speed without load falls by the same share.",
     signature="Nothing while little torque is asked; then torque is flat at the cap and the joint falls behind.",
     reference=MOTORS,
+    guesses=Assumed("torque_limit"),
 )
 def torque_limit(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     left = 1.0 - values["loss"]
@@ -214,6 +216,7 @@ def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     reference="Featherstone 2008, Rigid Body Dynamics Algorithms, section 9.6",
     ranges=_rotors,
     everywhere=True,
+    guesses=Assumed("rotor_inertia"),
 )
 def rotor_inertia(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return with_more(robot, target, "rotor_inertia", values["added_kg_m2"])

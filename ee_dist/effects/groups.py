@@ -68,6 +68,12 @@ def _alike(one: Drive, other: Drive, within: float) -> bool:
     return True
 
 
+def name_of(robot: System, members: tuple[str, ...]) -> str:
+    """A place or several as one target: the name of their group if they have one; empty for none."""
+    named = {of: name for name, of in groups(robot).items()}
+    return named.get(members, JOIN.join(members))
+
+
 def members_of(robot: System, target: str, allowed: tuple[str, ...]) -> tuple[str, ...]:
     """The members of a group, or of any list ``a+b+c``, if an effect can act on each of them; empty otherwise."""
     found = tuple(target.split(JOIN)) if JOIN in target else groups(robot).get(target, ())

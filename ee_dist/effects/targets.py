@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from ee_dist.robots.model import Robot
 
@@ -35,6 +36,27 @@ def powered(robot: Robot) -> tuple[str, ...]:
 def bolted_motors(robot: Robot) -> tuple[str, ...]:
     """Joints that a motor moves, of a robot whose forces can be balanced."""
     return () if robot.free_base else powered(robot)
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """Joints of whose drive a description only assumed the field of that name; as data, so that effects can be sent."""
+
+    field: str
+
+    def __call__(self, robot: Robot) -> tuple[str, ...]:
+        return robot.assumed_joints(self.field)
+
+
+def with_rotors(robot: Robot) -> tuple[str, ...]:
+    """Joints whose drive is described with a rotor."""
+    return tuple(d.joint for d in robot.drives if d.rotor_inertia > 0)
+
+
+def uneven_rotors(robot: Robot) -> tuple[str, ...]:
+    """Joints whose rotors were assumed, if these differ: where all are alike as much more at each says the same as a factor."""
+    joints = robot.assumed_joints("rotor_inertia")
+    return joints if len({d.rotor_inertia for d in robot.drives if d.joint in joints}) > 1 else ()
 
 
 def position_drives(robot: Robot) -> tuple[str, ...]:

@@ -57,7 +57,10 @@ USED_BY = {
     "metric": (("recover",), ""),
     "repair": (("recover",), ""),
     "budget": (("recover", "online"), ""),
-    "noise": (("recover", "trial"), "the others go by the noise that the description's sensors declare, or estimate it"),
+    "noise": (
+        ("recover", "trial"),
+        "the others go by the noise that the description's sensors declare, or estimate it",
+    ),
 }
 """Settings that some verbs would pass over in silence: the verbs that have them, and what the others go by."""
 LONGEST_NAME = 255

@@ -126,5 +126,5 @@ def _reported(robot: Robot, entry: Entry, index: int, term: Term, reports: Seque
         term=term,
         origin=FIT,
         intervals=tuple((r.name, r.low, r.high) for r in own),
-        flags=tuple(f"{quantity(term, r.name, robot)}: {r.flag}" for r in own if r.flag),
+        flags=tuple(f"{quantity(term, r.name, robot)}: {r.note}" for r in own if r.note),
     )

@@ -8,21 +8,24 @@ from functools import cache
 
 import numpy as np
 import pytest
+from linear_problem import ROBOT as LINEAR
+from linear_problem import Linear
 from way_samples import Sample, measure, problem_by, samples
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
-from ee_dist.discrepancy.assumed import GUESSED, LABEL, assumed_drives, puts_right
+from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL, assumed_drives, puts_right
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.everywhere import instead, taken_apart
-from ee_dist.discrepancy.examine import Current, examine
+from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.effects.catalogue import apply, term
+from ee_dist.effects.catalogue import Hypothesis, apply, term
 from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
 
 STIFFER, DRIER = 6.0, (0.3, 0.2)
 
@@ -120,6 +123,88 @@ def test_a_gain_is_looked_for_farther_off_where_it_was_assumed() -> None:
     known, open_ = (candidate(r, "position_gain", "elbow") for r in (robot, guessed(robot)))
     assert known.bounds == ((0.2, 5.0),)
     assert open_.bounds[0][0] < 0.05
+
+
+def rotors(twice: bool = True, marked: bool = True) -> Problem:
+    """A small arm with motors of two sizes, described with rotors half as heavy as they are, because somebody guessed at them."""
+    sample = samples()["arm"]
+    true = replace(sample.robot, drives=tuple(
+        replace(d, rotor_inertia=r) for d, r in zip(sample.robot.drives, (0.06, 0.02), strict=True)
+    ))  # fmt: skip
+    drives = tuple(replace(d, rotor_inertia=d.rotor_inertia / (2.0 if twice else 1.0)) for d in true.drives)
+    assumed = tuple((d.joint, "rotor_inertia") for d in drives) if marked else ()
+    measured = measure(replace(sample, robot=true), ())
+    return problem_by("open_loop", measured, replace(true, drives=drives, assumed=assumed))
+
+
+def test_guessed_rotors_are_off_by_one_number_before_any_sound_motor_is_blamed() -> None:
+    problem = rotors()
+    pool = candidates(problem.robot, only=["motor_weak", "rotor_inertia", "rotor_factor", "command_delay", "part_mass"])
+    assert [c.name for c in pool if c.guess] == ["rotor_factor@all_joints", "rotor_inertia@all_joints"]
+    found = explain(problem, pool)
+    assert found.best is not None and found.best.name == "rotor_factor@all_joints"
+    assert dict(found.best.terms[0].values)["factor"] == pytest.approx(2.0, rel=0.1)
+    assert "rotor_inertia@each of 2 joints" in found.best.tied_with
+    assert GUESS in explain_account(problem, found, None).lines
+    said = compare_account(problem, compare(problem, problem.residuals([()])[0]), []).lines
+    assert "The description only assumed rotor_inertia of 2 drives: explain and improve look there first." in said
+
+
+def test_a_factor_on_rotors_is_proposed_only_where_unequal_ones_were_guessed() -> None:
+    names = {c.effect.name for c in candidates(rotors(marked=False).robot)}
+    assert "rotor_inertia" in names and "rotor_factor" not in names
+    even = replace(rotors().robot, drives=tuple(replace(d, rotor_inertia=0.01) for d in rotors().robot.drives))
+    guesses = [c.name for c in candidates(even) if c.guess]
+    assert guesses == ["rotor_inertia@all_joints"], "as much more at each is the same"
+    one = replace(rotors().robot, assumed=(("elbow", "rotor_inertia"), ("elbow", "kp")))
+    assert [c.name for c in candidates(one) if c.guess] == ["position_gain@elbow", "rotor_inertia@elbow"]
+
+
+def test_guessed_rotors_beside_guessed_gains_are_off_by_a_factor_too() -> None:
+    problem = rotors()
+    robot = replace(problem.robot, assumed=(*problem.robot.assumed, *((j, "kp") for j in problem.robot.motor_names)))
+    problem.robot = robot
+    proposal, u = assumed_drives(Search(problem), candidates(robot)) or pytest.fail("nothing was proposed")
+    found = {t.effect: dict(t.values) for t in Model(proposal.parts).hypothesis(u)}
+    assert "rotor_inertia" not in found and found["rotor_factor"]["factor"] == pytest.approx(2.0, rel=0.1)
+    assert puts_right(robot, candidate(robot, "rotor_factor", "all_joints"))
+
+
+JOINTS = LINEAR.motor_names
+
+
+def linear(hidden: Hypothesis, twins: bool = False) -> Linear:
+    """Its first joint's rotor was assumed; of ``twins`` a weak motor there leaves the same mark."""
+
+    class Guessed(Linear):
+        def shift(self, hypothesis: Hypothesis) -> Array:
+            same = term("motor_weak", JOINTS[0], loss=0.4)
+            return super().shift(tuple(same if twins and t.target == JOINTS[0] else t for t in hypothesis))
+
+    problem = Guessed(hidden)
+    problem.robot = replace(LINEAR, assumed=((JOINTS[0], "rotor_inertia"),))
+    return problem
+
+
+def test_of_what_is_tied_a_guess_goes_before_a_sound_part() -> None:
+    problem = linear((term("motor_weak", JOINTS[0], loss=0.4),), twins=True)
+    pool = [candidate(problem.robot, "motor_weak", JOINTS[0]), candidate(problem.robot, "rotor_inertia", JOINTS[0])]
+    assert [c.guess for c in pool] == [False, True]
+    found = explain(problem, pool)
+    assert [c.name for c in found.tied] == [c.name for c in reversed(pool)]
+    unmarked = linear((term("motor_weak", JOINTS[0], loss=0.4),), twins=True)
+    unmarked.robot = LINEAR
+    found = explain(unmarked, [candidate(LINEAR, c.effect, c.target) for c in pool])
+    assert [c.name for c in found.tied] == [c.name for c in pool]
+
+
+def test_a_guess_is_judged_beside_whatever_promises_more() -> None:
+    hidden = (term("motor_weak", JOINTS[1], loss=0.4), term("rotor_inertia", JOINTS[0], added_kg_m2=0.1))
+    problem = linear(hidden)
+    pool = candidates(problem.robot, only=["motor_weak", "rotor_inertia"])
+    effort = Effort(first=1, second=1, starts=1, final=1)
+    judged = {c.name for c in explain(problem, pool, effort=effort).candidates}
+    assert judged == {f"motor_weak@{JOINTS[1]}", f"rotor_inertia@{JOINTS[0]}"}
 
 
 def test_a_robot_is_the_same_whatever_was_assumed_of_it() -> None:

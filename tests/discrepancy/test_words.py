@@ -28,7 +28,7 @@ def account(
 ) -> Account:
     best = SimpleNamespace(
         terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
-        explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""),
+        explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""), guess=False,
     )  # fmt: skip
     found = SimpleNamespace(
         candidates=[],

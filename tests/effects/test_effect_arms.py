@@ -143,6 +143,18 @@ def test_speed_gain_is_a_factor_on_the_damping_of_the_drive(bench: Bench) -> Non
         assert log.channel("velocity")[-1] == pytest.approx(math.exp(-3.0 * factor * 0.5 / MASS_KG), rel=0.01)
 
 
+def test_rotor_factor_is_a_factor_on_what_is_described_at_each_joint() -> None:
+    robot = arm().with_drive("shoulder", rotor_inertia=0.02).with_drive("elbow", rotor_inertia=0.006)
+    twice = apply(robot, [term("rotor_factor", "all_joints", factor=2.0)])
+    assert [d.rotor_inertia for d in twice.drives] == pytest.approx([0.04, 0.012])
+    assert apply(robot, [term("rotor_factor", "all_joints", factor=1.0)]) == robot
+    assert CATALOGUE["rotor_factor"].targets(robot.with_drive("elbow", rotor_inertia=0.0)) == ("shoulder",)
+    low, high = CATALOGUE["rotor_factor"].bounds(robot, "elbow")["factor"]
+    less, more = CATALOGUE["rotor_inertia"].bounds(robot, "elbow")["added_kg_m2"]
+    assert (0.006 * low, 0.006 * high) == pytest.approx((0.006 + less, 0.006 + more))
+    assert "rotor_factor" not in {name for name, effect in CATALOGUE.items() if effect.proposed(robot)}
+
+
 def test_gear_ratio_moves_less_and_pulls_more(bench: Bench) -> None:
     robot = slider(kp=400.0, kd=60.0, torque_limit=10.0)
     geared = term("gear_ratio", "joint", change=0.25)

@@ -27,7 +27,7 @@ from ee_dist.discrepancy.accounts.account import (
     unsure_of,
     was_or_were,
 )
-from ee_dist.discrepancy.assumed import GUESSED, LABEL
+from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
 from ee_dist.discrepancy.evidence.judge import LUCK, Judged
 from ee_dist.discrepancy.evidence.left import SETTLED
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
@@ -84,6 +84,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         lines.append(GUESSED if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""
         lines += [] if guessed else [f"Its mark in a residual: {entry.signature}{turned}"]
+        lines += [GUESS] if best.guess else []
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:

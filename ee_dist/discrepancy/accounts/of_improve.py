@@ -27,7 +27,7 @@ from ee_dist.discrepancy.accounts.account import (
     was_or_were,
 )
 from ee_dist.discrepancy.calibrated_away import OddOne
-from ee_dist.discrepancy.evidence.intervals import ParameterReport
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, WIDER, ParameterReport, called
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
@@ -63,6 +63,7 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     lines.append("The model: " + (phrase(found.terms, robot) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
+    lines += rest_text(found.terms, found.parameters)
     worse = worse_trials(problem, found)
     if worse:
         lines.append(worse_text(problem, worse))
@@ -140,7 +141,7 @@ def _ranges(found: Improvement, named_: Sequence[Term], robot: Robot) -> str:
         for name, values in told_of.items()
         if values
     ]
-    return f"; 95 % intervals: {'; '.join(out)}" if out else ""
+    return f"; {called(found.parameters)}: {'; '.join(out)}" if out else ""
 
 
 def _told_from(ties: Mapping[str, Sequence[str]]) -> str:
@@ -150,6 +151,20 @@ def _told_from(ties: Mapping[str, Sequence[str]]) -> str:
         return ""
     several = f"{len(others)} others ({listed_few(others)})"
     return f"; not told from {' or '.join(map(placed, others)) if len(others) <= TWINS else several}"
+
+
+def rest_text(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
+    """What an effect that nobody found may have to do with the values, where more than noise is left."""
+    doubted = [p for p in parameters if p.doubt]
+    if not doubted:
+        return []
+    text = f"Intervals are {WIDER}: an effect that is not in the model may have gone into the values."
+    # A value that is flagged is told already.
+    worst = [terms[p.term] for p in doubted if p.doubt == ALL_OF_IT and not p.flag]
+    names = [placed(mine[0].name) if len(mine) == 1 else f"{plain(effect)} at {len(mine)} places"
+             for effect in dict.fromkeys(t.effect for t in worst)
+             if (mine := [*dict.fromkeys(t for t in worst if t.effect == effect)])]  # fmt: skip
+    return [text + (f" It could be all of: {'; '.join(names)}." if names else "")]
 
 
 def flag_text(terms: Hypothesis, p: ParameterReport) -> str:

@@ -1,14 +1,17 @@
-"""How sure a fitted value is: by noise where only noise is left, by the spread between trials where more is left."""
+"""How sure a fitted value is: by noise where only noise is left, by the spread between trials where more is left, and by what
+is left itself where it stands out, for that may be an effect of nearly the same mark."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtri, stdtrit  # scipy.stats, which calls them, takes a second to load
 
-from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.problem import Mask, Problem
 from ee_dist.discrepancy.search.fitted import Fit
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
@@ -22,12 +25,14 @@ NOT_DETERMINED = "not determined by these data"
 BOUND = "at its bound: the range is too small, or the effect is another"
 NONE_LEFT = "at its bound: next to none is left of what was described"
 NEUTRAL = "not told from neutral"
+WIDER = "widened by what is left unexplained"
+ALL_OF_IT = "what is left unexplained could be all of it"
 
 
 @dataclass(frozen=True)
 class ParameterReport:
     """A fitted value of term number ``term`` with its 95 % interval, in the parameter's own unit; ``flag`` says what is
-    wrong with it, if anything."""
+    wrong with it, if anything, ``doubt`` what the rest that the model leaves has to do with it."""
 
     term: int
     name: str
@@ -35,28 +40,43 @@ class ParameterReport:
     low: float
     high: float
     flag: str
+    doubt: str = ""
+
+    @property
+    def note(self) -> str:
+        """Both."""
+        return "; ".join(filter(None, (self.flag, self.doubt)))
 
 
-def parameters(problem: Problem, fit: Fit) -> list[ParameterReport]:
-    """Every value of a fit, in the order of its terms."""
+def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = ()) -> list[ParameterReport]:
+    """Every value of a fit, in the order of its terms; ``left`` is what stands out of its residual."""
     half_u = half_widths(problem, fit)
+    wider = np.maximum(half_u, half_widths_by_rest(problem, fit, left))
     out, at = [], 0
     hypothesis: Hypothesis = fit.hypothesis
     for index, (c, term) in enumerate(zip(fit.model.parts, hypothesis, strict=True)):
-        u, s = fit.u[at : at + c.size], half_u[at : at + c.size]
+        u, s, w = (x[at : at + c.size] for x in (fit.u, half_u, wider))
         rooms = c.rooms(u)
         for k, (name, value) in enumerate(term.values):
-            half = float(s[k] * abs(rooms[k])) if np.isfinite(s[k]) else math.inf
+            room = abs(float(rooms[k]))
+            half = float(w[k]) * room if np.isfinite(w[k]) else math.inf
             flag = ""
-            if not np.isfinite(half) or half > max(abs(rooms[k]), 1e-12):
+            # By the data alone: what earned its place is told, though something else may have gone into its value.
+            if not np.isfinite(s[k]) or float(s[k]) * room > max(room, 1e-12):
                 flag = NOT_DETERMINED
             elif abs(u[k]) > AT_BOUND:
                 flag = NONE_LEFT if u[k] < 0 and c.effect.parameters[k].on_top else BOUND
             elif abs(u[k]) < s[k]:
                 flag = NEUTRAL
-            out.append(ParameterReport(index, name, value, value - half, value + half, flag))
+            doubt = "" if w[k] <= s[k] else ALL_OF_IT if abs(u[k]) < w[k] else WIDER
+            out.append(ParameterReport(index, name, value, value - half, value + half, flag, doubt))
         at += c.size
     return out
+
+
+def called(reports: Sequence[ParameterReport]) -> str:
+    """``95 % intervals``, and whether what is left unexplained has widened any of them."""
+    return f"{100 * LEVEL:.0f} % intervals" + (f", {WIDER}" if any(p.doubt for p in reports) else "")
 
 
 def half_widths(problem: Problem, fit: Fit, level: float = LEVEL) -> Array:
@@ -68,9 +88,7 @@ def half_widths(problem: Problem, fit: Fit, level: float = LEVEL) -> Array:
     """
     if not len(fit.u):
         return np.zeros(0)
-    normal = fit.slopes.T @ fit.slopes
-    weak = np.diag(normal) < 1e-9
-    inverse = np.linalg.pinv(normal + np.diag(np.where(weak, 1e-9, 0.0)))
+    inverse, weak = _inverse(fit)
     excess = max(1.0, fit.energy / max(1, int(fit.mask.sum()) - len(fit.u)))
     by_noise = np.sqrt(np.maximum(np.diag(inverse), 0.0) * excess) * ndtri(0.5 + level / 2)
     piece = problem.trial_of if len(problem.trials) >= FEW else problem.segment_of
@@ -83,3 +101,32 @@ def half_widths(problem: Problem, fit: Fit, level: float = LEVEL) -> Array:
     spread = inverse @ (scores.T @ scores) @ inverse * count / (count - 1)
     by_pieces = np.sqrt(np.maximum(np.diag(spread), 0.0)) * stdtrit(count - 1, 0.5 + level / 2)
     return np.where(weak, np.inf, np.maximum(by_noise, by_pieces))
+
+
+def half_widths_by_rest(problem: Problem, fit: Fit, left: Sequence[Leftover], level: float = LEVEL) -> Array:
+    """(P,) how far each u may be off because an effect that is not in the model has gone into it.
+
+    The fit has taken all of that effect that runs along its slopes, and what is left runs across them: its scores are zero, so
+    that no spread of theirs says anything. Its size does. What is missing leaves one pattern in a curve (a channel during a
+    trial), however many values that has; so each curve that stands out counts as one piece, which moves a value by as much as a
+    pattern of the size of its rest can (Cauchy and Schwarz). For a pattern that may run anywhere, along the slopes or across,
+    the ratio of the one to the other is Student's, with as many degrees of freedom as there are such curves (as many as would
+    count alike). Zero where nothing stands out."""
+    inverse, _ = _inverse(fit)
+    pulls = fit.slopes @ inverse
+    trial, channel = problem.trial_of[fit.mask], problem.channel_of[fit.mask]
+    places = {name: k for k, name in enumerate(problem.channels)}
+    moved = [
+        (pulls[(trial == g.index) & (channel == places[g.channel])] ** 2).sum(axis=0) * max(g.excess, 0.0) for g in left
+    ]
+    squares = np.array(moved).reshape(len(moved), len(fit.u))
+    total = squares.sum(axis=0)
+    pieces = np.divide(total**2, (squares**2).sum(axis=0), out=np.ones(len(fit.u)), where=total > 0)
+    return np.asarray(np.sqrt(total) * stdtrit(pieces, 0.5 + level / 2))
+
+
+def _inverse(fit: Fit) -> tuple[Array, Mask]:
+    """(P, P) covariance of the values for noise of one, and (P,) which of them the data say nothing about."""
+    normal = fit.slopes.T @ fit.slopes
+    weak = np.diag(normal) < 1e-9
+    return np.linalg.pinv(normal + np.diag(np.where(weak, 1e-9, 0.0))), weak

@@ -73,6 +73,11 @@ class Judged:
         return not self.why_not
 
     @property
+    def guess(self) -> bool:
+        """Whether it puts right no more than what a description only assumed."""
+        return all(c.guess for c in self.proposal.parts)
+
+    @property
     def held_out(self) -> str:
         """What was held out."""
         return self.outcome.cut.name
@@ -212,7 +217,8 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
         # Of explanations that data do not tell apart the one with the fewest numbers says the least that is not known.
         best = ordered[0]
         same = [best, *(j for j in ordered[1:] if j.name in best.tied_with)]
-        first = min(same, key=lambda j: (j.proposal.size, j.rank))
+        # Of as many, a number that was only assumed is blamed before parts that somebody vouched for.
+        first = min(same, key=lambda j: (j.proposal.size, not j.guess, j.rank))
         if first is not best:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])

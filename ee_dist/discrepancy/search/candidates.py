@@ -31,6 +31,8 @@ class Candidate:
     target: str
     bounds: tuple[tuple[float, float], ...]
     inert: tuple[int, ...] = ()
+    guess: bool = False
+    """Whether it puts right, with one set of values, all that a description only assumed of its kind."""
 
     @property
     def name(self) -> str:
@@ -127,7 +129,7 @@ def candidate(robot: Robot, effect: Effect | str, target: str) -> Candidate:
             u = (plain.upper if plain.upper[k] else plain.lower) * 0.5 * np.eye(plain.size)[k]
             if apply(robot, (plain.term(u),)) == robot:
                 inert.append(k)
-    return Candidate(entry, target, bounds, tuple(inert))
+    return Candidate(entry, target, bounds, tuple(inert), target != "" and target == entry.guessed(robot))
 
 
 def candidates(
@@ -138,7 +140,7 @@ def candidates(
     sharing: bool = True,
 ) -> list[Candidate]:
     """All searchable effects of some families at all their targets, in the order of the catalogue, and (``sharing``) on
-    groups of joints and sensors that share one set of values.
+    groups of joints and sensors that share one set of values; among these what puts right what was only assumed.
 
     ``without`` leaves out effects or places (``effect`` or ``effect@target``); ``only`` leaves out all others. Raises
     EffectError for a name that is neither.
@@ -157,6 +159,9 @@ def candidates(
         places = entry.proposed(robot)
         if sharing and places and entry.parameters and entry.family in SHAREABLE:
             places = (*places, *entry.shared(robot))
+        guess = entry.guessed(robot) if sharing else ""
+        if members_of(robot, guess, entry.targets(robot)) and guess not in places:
+            places = (*places, guess)
         for target in places:
             name = f"{entry.name}@{target}" if target else entry.name
             if name in banned or (wanted is not None and not {entry.name, name} & wanted):

@@ -34,7 +34,11 @@ TERMS = (
         "Above the noise",
         "The part of the squared error that is not noise. A candidate that takes off 100 % of it leaves noise alone.",
     ),
-    ("95 % interval", "Where the value would lie in 95 of 100 repetitions with other pieces of the same data."),
+    (
+        "95 % interval",
+        "Where the value would lie in 95 of 100 repetitions with other pieces of the same data. Where more than noise is left: "
+        "as wide as an effect of the size of the rest, missing in the model, could make it.",
+    ),
     (
         "Tie",
         "Two explanations that these measurements cannot tell apart: their errors differ by less than chance. Either may be the "

@@ -100,7 +100,7 @@ def values_section(kinds: Sequence[Kind]) -> Section | None:
     if not kinds:
         return None
     rows = [
-        [kind.effect, kind.quantity, place, f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}", kind.unit, p.flag]
+        [kind.effect, kind.quantity, place, f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}", kind.unit, p.note]
         for kind in kinds
         for place, p in kind.at
     ]

@@ -126,7 +126,14 @@ def of_improvement(problem: Problem, found: Improvement, account: Account, path:
         "ladder": [of_rung(problem, r) for r in found.ladder],
         "model": path,
         "parameters": [
-            {**terms[p.term], "name": p.name, "value": p.value, "interval": [p.low, p.high], "flag": p.flag}
+            {
+                **terms[p.term],
+                "name": p.name,
+                "value": p.value,
+                "interval": [p.low, p.high],
+                "flag": p.flag,
+                "doubt": p.doubt,
+            }
             for p in found.parameters
         ],
         "worth": [

@@ -13,6 +13,7 @@ from rich.table import Table
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import shown_gain
 from ee_dist.discrepancy.compare import Comparison
+from ee_dist.discrepancy.evidence.intervals import called
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
@@ -83,7 +84,9 @@ def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
     if kinds:
         at = [(k.name, "; ".join(f"{place} {within(p)}" for place, p in k.at)) for k in kinds]
         console.print(
-            _table("Its values, with 95 % intervals", (("effect", False), ("where, and how much", False)), at)
+            _table(
+                f"Its values, with {called(found.parameters)}", (("effect", False), ("where, and how much", False)), at
+            )
         )
 
 
