@@ -147,10 +147,8 @@ class Drive:
     coulomb: float = 0.0  # N.m
     stribeck: float = 0.0  # N.m on top at rest, gone as exp(-|speed| / stribeck_speed)
     stribeck_speed: float = 0.1
-    stribeck_load: float = (
-        0.0  # the same as a share of the torque through the gear, gone as exp(-|speed| / stribeck_load_speed)
-    )
-    stribeck_load_speed: float = 0.0  # where it is not told, that of the other
+    stribeck_load: float = 0.0  # the same as a share of the torque through the gear
+    stribeck_load_speed: float = 0.0  # of that share; where it is not told, stribeck_speed
     load_friction: float = 0.0  # dry friction as a share of the torque through the gear, motor less external
     backdrive_friction: float = 0.0  # by how much that share is larger for the external torque
     quadratic_friction: float = 0.0  # 1/(N.m), times the square of the torque through the gear
