@@ -74,8 +74,10 @@ class Judged:
 
     @property
     def guess(self) -> bool:
-        """Whether it puts right no more than what a description only assumed."""
-        return all(c.guess for c in self.proposal.parts)
+        """Whether it puts right no more than what a description only assumed; with what else such a drive has, if each is one
+        value for all of just these joints."""
+        parts = self.proposal.parts
+        return all(c.guess for c in parts) or (parts[0].guess and len({c.target for c in parts}) == 1)
 
     @property
     def held_out(self) -> str:
