@@ -3,6 +3,7 @@ knew may be."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -20,7 +21,7 @@ from ee_dist.discrepancy.everywhere import instead, taken_apart
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.problem import Problem, error
-from ee_dist.discrepancy.search.candidates import candidate, candidates
+from ee_dist.discrepancy.search.candidates import Proposal, candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import Hypothesis, apply, term
@@ -196,6 +197,18 @@ def test_of_what_is_tied_a_guess_goes_before_a_sound_part() -> None:
     unmarked.robot = LINEAR
     found = explain(unmarked, [candidate(LINEAR, c.effect, c.target) for c in pool])
     assert [c.name for c in found.tied] == [c.name for c in pool]
+
+
+def test_one_set_of_values_for_drives_that_were_guessed_at_is_a_guess_and_one_for_each_joint_is_not() -> None:
+    robot = guessed(samples()["arm"].robot)
+
+    def proposal(effects: Sequence[str], *targets: str) -> Proposal:
+        return Proposal(tuple(candidate(robot, e, t) for e in effects for t in targets))
+
+    assert proposal(["position_gain", "coulomb_friction"], "all_joints").guess
+    assert not proposal(["coulomb_friction", "position_gain"], "all_joints").guess
+    assert not proposal(["position_gain"], "shoulder", "elbow").guess
+    assert not proposal(["position_gain"], "all_joints", "elbow").guess
 
 
 def test_a_guess_is_judged_beside_whatever_promises_more() -> None:

@@ -84,7 +84,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         lines.append(GUESSED if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""
         lines += [] if guessed else [f"Its mark in a residual: {entry.signature}{turned}"]
-        lines += [GUESS] if best.guess and not guessed else []
+        lines += [GUESS] if best.proposal.guess and not guessed else []
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:

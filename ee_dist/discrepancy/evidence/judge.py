@@ -73,13 +73,6 @@ class Judged:
         return not self.why_not
 
     @property
-    def guess(self) -> bool:
-        """Whether it puts right no more than what a description only assumed; with what else such a drive has, if each is one
-        value for all of just these joints."""
-        parts = self.proposal.parts
-        return all(c.guess for c in parts) or (parts[0].guess and len({c.target for c in parts}) == 1)
-
-    @property
     def held_out(self) -> str:
         """What was held out."""
         return self.outcome.cut.name
@@ -220,7 +213,7 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
         best = ordered[0]
         same = [best, *(j for j in ordered[1:] if j.name in best.tied_with)]
         # Of as many, a number that was only assumed is blamed before parts that somebody vouched for.
-        first = min(same, key=lambda j: (j.proposal.size, not j.guess, j.rank))
+        first = min(same, key=lambda j: (j.proposal.size, not j.proposal.guess, j.rank))
         if first is not best:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])

@@ -227,6 +227,12 @@ class Proposal:
     def size(self) -> int:
         return sum(c.size for c in self.parts)
 
+    @property
+    def guess(self) -> bool:
+        """Whether it puts right no more than what a description only assumed; with what else such a drive has, if each is one
+        value for all of just these joints."""
+        return all(c.guess for c in self.parts) or (self.parts[0].guess and len({c.target for c in self.parts}) == 1)
+
 
 def values_of(parts: Sequence[Candidate], terms: Hypothesis) -> Array:
     """The u (P,) of terms of these candidates."""
