@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL, assumed_drives, puts_right
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.everywhere import instead, taken_apart
+from ee_dist.discrepancy.evidence import judge
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.problem import Problem, error
@@ -209,6 +211,24 @@ def test_one_set_of_values_for_drives_that_were_guessed_at_is_a_guess_and_one_fo
     assert not proposal(["coulomb_friction", "position_gain"], "all_joints").guess
     assert not proposal(["position_gain"], "shoulder", "elbow").guess
     assert not proposal(["position_gain"], "all_joints", "elbow").guess
+
+
+@pytest.mark.parametrize(("size", "first"), [(6, "guess"), (7, "each"), (4, "guess")])
+def test_a_guess_goes_before_as_many_numbers_that_it_is_tied_with(
+    monkeypatch: pytest.MonkeyPatch, size: int, first: str
+) -> None:
+    """Though not with what is best of all, which has more numbers and is tied with those."""
+
+    def judged(name: str, size: int, guess: bool, left: float) -> SimpleNamespace:
+        return SimpleNamespace(
+            name=name, proposal=SimpleNamespace(size=size, guess=guess), vague=False, earned=True, held=np.array([left])
+        )
+
+    found = [judged("most", 12, False, 1.0), judged("each", 6, False, 1.2), judged("guess", size, True, 1.3)]
+    monkeypatch.setattr(judge, "tied", lambda one, other: {one.name, other.name} != {"most", "guess"})
+    order = judge.ranked(found)  # type: ignore[arg-type]
+    assert order[0].name == first
+    assert set(order[0].tied_with) == {"most", "each", "guess"} - {first}
 
 
 def test_a_guess_is_judged_beside_whatever_promises_more() -> None:

@@ -28,7 +28,7 @@ def account(
 ) -> Account:
     best = SimpleNamespace(
         terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
-        explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label=""), guess=False,
+        explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label="", guess=False),
     )  # fmt: skip
     found = SimpleNamespace(
         candidates=[],
@@ -150,7 +150,7 @@ def test_times_the_floor_are_those_of_the_errors_that_are_told() -> None:
 
 @pytest.mark.parametrize(("error_m", "said"), [(3.2e-8, "3.2e-05 mm"), (4.1e-5, "0.041 mm"), (0.0123456, "12.3 mm")])
 def test_small_errors_keep_their_digits(error_m: float, said: str) -> None:
-    problem = SimpleNamespace(natural=lambda e: e, unit="m")
+    problem = SimpleNamespace(natural=lambda e: e, units=("m",))
     assert FreeRun.told(problem, error_m) == said  # type: ignore[arg-type]
 
 

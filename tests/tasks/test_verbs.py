@@ -128,7 +128,7 @@ def test_every_verb_by_every_way(cli, imported, by):
     improved = json.loads((found / "summary.json").read_text())
     headline, errors, sure = told_alike(found, said)
     assert headline.startswith("Added: coulomb friction at servo (torque 0.0") and "improved model" in errors
-    assert "95 % intervals: torque 0.0" in sure
+    assert "95 % intervals" in sure and ": torque 0.0" in sure
     assert [t["effect"] for t in improved["model_terms"]] == ["coulomb_friction"]
     assert improved["ladder"][-1]["error_heldout"] < 0.5 * improved["ladder"][0]["error_heldout"]
     low, high = improved["parameters"][0]["interval"]

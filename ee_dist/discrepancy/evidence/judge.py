@@ -213,7 +213,14 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
         best = ordered[0]
         same = [best, *(j for j in ordered[1:] if j.name in best.tied_with)]
         # Of as many, a number that was only assumed is blamed before parts that somebody vouched for.
-        first = min(same, key=lambda j: (j.proposal.size, not j.proposal.guess, j.rank))
+        first = min(same, key=_least_said)
+        # What was only guessed at is asked for before as many numbers that are tied with it, be these tied with a better one too.
+        asked = [
+            j
+            for j in ordered
+            if j.name in first.tied_with and j.proposal.guess and j.proposal.size <= first.proposal.size
+        ]
+        first = min((first, *asked), key=_least_said)
         if first is not best:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
@@ -223,6 +230,10 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
     for k, j in enumerate(ordered):
         j.rank = k + 1
     return ordered
+
+
+def _least_said(j: Judged) -> tuple[int, bool, int]:
+    return j.proposal.size, not j.proposal.guess, j.rank
 
 
 def _plainer(one: Judged, vague: Judged) -> bool:
