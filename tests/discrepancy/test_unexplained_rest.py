@@ -66,6 +66,16 @@ def test_intervals_hold_the_truth_though_something_else_is_missing() -> None:
     assert held == len(OTHERS)
 
 
+def test_an_interval_goes_no_farther_than_physics() -> None:
+    problem, found = pendulum(OTHERS[0])
+    c = candidate(problem.robot, "position_gain", "servo")
+    for share in (0.02, 0.5):
+        fit = fit_one(Search(problem), Model((c,)), [c.shares({"factor": share})])
+        wide = replace(fit, slopes=fit.slopes * 0.02)
+        (p,) = parameters(problem, wide, found.left)
+        assert p.low >= c.effect.parameters[0].lower
+
+
 def test_a_clean_case_has_the_interval_of_its_noise() -> None:
     problem, found = pendulum(())
     (p,) = found.parameters

@@ -69,7 +69,11 @@ def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = ()) -> lis
             elif abs(u[k]) < s[k]:
                 flag = NEUTRAL
             doubt = "" if w[k] <= s[k] else ALL_OF_IT if abs(u[k]) < w[k] else WIDER
-            out.append(ParameterReport(index, name, value, value - half, value + half, flag, doubt))
+            low, high = value - half, value + half
+            if math.isfinite(half):  # no farther than physics allows
+                known = c.effect.parameters[k]
+                low, high = max(low, min(known.lower, value)), min(high, max(known.upper, value))
+            out.append(ParameterReport(index, name, value, low, high, flag, doubt))
         at += c.size
     return out
 

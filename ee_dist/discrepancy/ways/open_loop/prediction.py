@@ -145,11 +145,12 @@ def wired_commands(trial: MeasuredTrial, model: Robot) -> Commands:
 
 
 def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) -> Rollout:
-    """The physics of a model on the trial's own commands, with clean sensors (``bare``, if it is at hand already)."""
+    """The physics of a model on the trial's own commands, with clean sensors (``bare``: the model as it is simulated, if that is
+    at hand already)."""
     commands, enabled = released(wired_commands(trial, model).values)
     start = start_of(trial.log, model)
     return Rollout(
-        trial.simulated(bare or clean(model)),
+        bare or trial.simulated(clean(model)),
         Commands(commands),
         len(trial.log),
         start=start,
@@ -174,14 +175,15 @@ class Predictor:
         """Digests for (trial, model) pairs, simulated in one call."""
         changed = {id(m): self._changed(m) for _, m in pairs}
         jobs = []
-        bare: dict[int, Robot] = {}
+        bare: dict[tuple[int, bool | None], Robot] = {}
         for k, model in pairs:
-            if id(model) not in bare:
-                bare[id(model)] = clean(model)
+            which = id(model), self.trials[k].held
+            if which not in bare:
+                bare[which] = self.trials[k].simulated(clean(model))
             early = self.trials[k].early(self.base)
             whole = bool(changed[id(model)])
             reduction = ToSensors(early) if whole else ToDigest(self.block, self.window, self.rows[k], early)
-            jobs.append(Job(rollout_of(self.trials[k], model, bare[id(model)]), reduction))
+            jobs.append(Job(rollout_of(self.trials[k], model, bare[which]), reduction))
         found = self.evaluator.evaluate(jobs)
         out: list[Digest] = list(found)
         alike: dict[tuple[int, ...], list[int]] = {}
