@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from ee_dist.basics.files import write_whole
-from ee_dist.basics.quoted import quoted, short
+from ee_dist.basics.quoted import one_line, quoted, short
 from ee_dist.basics.uncut import keeping, trial_on_hardware
 from ee_dist.effects.catalogue import text_of_plugin
 from ee_dist.evaluation.installed import installed
@@ -74,7 +74,7 @@ class Unfinished:
         for name, theirs in versions.items():
             if name in _PACKAGES and installed().get(name) != theirs:
                 raise ConfigError(
-                    f"resume={shown(self.folder.parent)}: it was begun with {name} {short(str(theirs), 40)}, here is "
+                    f"resume={shown(self.folder.parent)}: it was begun with {name} {one_line(str(theirs), 40)}, here is "
                     f"{installed().get(name)}: its results would be of two kinds; install that version to go on"
                 )
         other = [path for path, text in self.plugins.items() if text not in texts.values()]
