@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from ee_dist.effects import catalogue, laws
+from ee_dist.effects import catalogue, laws, plugins
 from ee_dist.viewing.browser import BrowserError, HeadlessBrowser, chromium
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN and threading.current_thread() is threading.main_thread():
@@ -47,7 +47,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(autouse=True)
 def own_catalogue() -> Iterator[None]:
     """Leaves the catalogue as it was: an effect that one test's plugin registers is a candidate in no other test."""
-    registries: tuple[dict, ...] = (catalogue._registry, catalogue._plugins, laws.LAWS, laws.TEXTS)
+    registries: tuple[dict, ...] = (catalogue.registered, plugins._plugins, laws.LAWS, laws.TEXTS)
     kept = [dict(registry) for registry in registries]
     yield
     for registry, before in zip(registries, kept, strict=True):

@@ -82,9 +82,7 @@ def assumed_drives(
 def puts_right(robot: Robot, c: Candidate) -> bool:
     """Whether it is one of these effects, at joints whose gains were assumed; or one value for all of whatever was assumed."""
     at = {*(c.members(robot) or (c.target,))}
-    return c.target == c.effect.guessed(robot) != "" or (
-        c.effect.name in TOGETHER and at <= {*robot.assumed_joints("kp")}
-    )
+    return c.effect.guesses_at(robot, c.target) or (c.effect.name in TOGETHER and at <= {*robot.assumed_joints("kp")})
 
 
 def beside(robot: Robot, parts: Sequence[Candidate], terms: Hypothesis, others: Sequence[Candidate]) -> list[Candidate]:

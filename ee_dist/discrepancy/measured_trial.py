@@ -25,8 +25,8 @@ class MeasuredTrial:
     """``driver`` is what the experimenter sent; None where only the log's own commands are known.
 
     Trials of one ``name`` are repeats of one another: the noise floor is measured from them. ``setup`` is what is known
-    to be special about the trial (a gain, a payload); it is applied to the model as well as any hypothesis. ``held``: whether
-    the drives held each command until the next one, as those of real robots do, rather than obeyed it in one step of a
+    to be special about the trial (a gain, a payload); it is applied to the model as well as any hypothesis. ``commands_held``:
+    whether the drives held each command until the next one, as those of real robots do, rather than obeyed it in one step of a
     simulation; None where that is not known yet.
     """
 
@@ -34,19 +34,19 @@ class MeasuredTrial:
     log: SensorLog
     driver: Driver | None = None
     setup: Hypothesis = ()
-    held: bool | None = False
+    commands_held: bool | None = False
 
     def obeyed(self, commands: Array) -> Array:
         """Commands (T, M) as the steps of a simulation take them."""
-        return held(commands) if self.held else commands
+        return held(commands) if self.commands_held else commands
 
     def early(self, robot: Robot) -> tuple[int, ...]:
         """The channels that a simulation reads half a step before their row."""
-        return tuple(i for i, s in enumerate(robot.sensors) if s.kind in SPEEDS) if self.held else ()
+        return tuple(i for i, s in enumerate(robot.sensors) if s.kind in SPEEDS) if self.commands_held else ()
 
     def simulated(self, model: Robot) -> Robot:
         """The model as the steps of a simulation take it."""
-        return between_steps(model) if self.held else model
+        return between_steps(model) if self.commands_held else model
 
 
 def driver_of(excitation: Excitation, robot: Robot) -> Commands | Network:

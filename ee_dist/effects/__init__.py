@@ -22,11 +22,10 @@ from ee_dist.effects.catalogue import (
     Term,
     apply,
     effect,
-    load_plugin,
-    loaded_plugins,
     term,
 )
 from ee_dist.effects.laws import LawContext, drive_law
+from ee_dist.effects.plugins import load_plugin, loaded_plugins
 
 __all__ = [
     "CATALOGUE",

@@ -10,24 +10,19 @@ A user's own file does the same and takes part in everything; see docs/own_effec
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
 import math
 import re
 import sys
-import traceback
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Real
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 from ee_dist.basics.names import did_you_mean, listed, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.groups import common, members_of, name_of, shared_targets
-from ee_dist.effects.laws import LAWS, TEXTS
 from ee_dist.effects.scales import Range, Ranges
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.system import System
@@ -123,6 +118,10 @@ class Effect:
         joints = () if self.guesses is None or not isinstance(robot, Robot) else self.guesses(robot)
         return name_of(robot, tuple(j for j in joints if j in self.targets(robot)))
 
+    def guesses_at(self, robot: System, target: str) -> bool:
+        """Whether this target is all that the description only assumed."""
+        return target != "" and target == self.guessed(robot)
+
     @property
     def main(self) -> Parameter:
         """The parameter that says how much."""
@@ -195,11 +194,12 @@ class Term:
 
 Hypothesis = tuple[Term, ...]
 
-_registry: dict[str, Effect] = {}
+registered: dict[str, Effect] = {}
+"""Where ``effect`` enters those on robots; what others read is CATALOGUE."""
 _others: dict[str, Effect] = {}
-CATALOGUE: Mapping[str, Effect] = MappingProxyType(_registry)
+CATALOGUE: Mapping[str, Effect] = MappingProxyType(registered)
 """All effects on robots by name, in the order in which they were registered."""
-EVERY: Mapping[str, Effect] = MappingProxyType(ChainMap(_others, _registry))
+EVERY: Mapping[str, Effect] = MappingProxyType(ChainMap(_others, registered))
 """These, and the effects on other systems."""
 
 
@@ -233,7 +233,7 @@ def effect(
                 raise EffectError(f"{name}: the neutral value of {p.name} lies outside its bounds")
             if ranges is None and not (math.isfinite(p.lower) and math.isfinite(p.upper)):
                 raise EffectError(f"{name}: {p.name} has no finite bounds, so the effect must give ranges")
-        (_registry if of is Robot else _others)[name] = Effect(
+        (registered if of is Robot else _others)[name] = Effect(
             name,
             family,
             transform,
@@ -342,74 +342,3 @@ def apply(robot: Model, hypothesis: Iterable[Term]) -> Model:
 def _kind(of: type) -> str:
     """A kind of system in words: GeneNetwork is a gene network."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", of.__name__).lower()
-
-
-_plugins: dict[str, str] = {}
-
-
-def load_plugin(path: str | Path, text: str = "") -> None:
-    """Run a user's file that registers effects of their own; again only if it has changed. ``text``: the digest it must have.
-
-    Raises EffectError where it cannot be read, fails, registers nothing or has another text; the catalogue is then as it was.
-    """
-    file = Path(path).resolve()
-    if not file.is_file():
-        raise EffectError(f"no such file of effects: {path}")
-    content = hashlib.sha256(file.read_bytes()).hexdigest()
-    if text and content != text:
-        raise EffectError(f"plugins={path}: its text is not the one that the run began with; begin the run anew")
-    if _plugins.get(str(file)) == content:
-        return
-    # Two files may share a name; the module's name tells them apart and is the same in every process.
-    name = f"ee_dist_plugin_{file.stem}_{hashlib.sha256(str(file).encode()).hexdigest()[:8]}"
-    spec = importlib.util.spec_from_file_location(name, file)
-    if spec is None or spec.loader is None:
-        raise EffectError(f"not a Python file: {path}")
-    before, laws, texts = dict(_registry), dict(LAWS), dict(TEXTS)
-    for registry in (_registry, LAWS):
-        for key in [k for k, v in registry.items() if getattr(v, "transform", v).__module__ == name]:
-            del registry[key]
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    TEXTS[name] = content
-    try:
-        spec.loader.exec_module(module)
-        if not any(e.transform.__module__ == name for e in _registry.values()):
-            raise EffectError("it registers no effect; decorate its transform with @effect(...)")
-    except (Exception, SystemExit) as error:
-        _registry.clear()
-        _registry.update(before)
-        LAWS.clear()
-        LAWS.update(laws)
-        TEXTS.clear()
-        TEXTS.update(texts)
-        said = f"{error}" if isinstance(error, EffectError) else f"{type(error).__name__}: {error}"
-        if isinstance(error, SystemExit):
-            said = f"sys.exit({error.code!r}) was called; a file of effects only defines them"
-        raise EffectError(f"{path}{_line_of(error, file)}: {said}") from error
-    _plugins[str(file)] = content
-
-
-def loaded_plugins() -> tuple[str, ...]:
-    """Absolute paths of the files loaded so far, in order: what a worker process must load to know the same effects."""
-    return tuple(_plugins)
-
-
-def text_of_plugin(path: str | Path) -> str:
-    """Digest of a user's file as it was loaded last; of one that was not loaded, as it is now.
-
-    Of the file alone: what it imports from others is not in it. Raises EffectError where there is none.
-    """
-    file = Path(path).resolve()
-    if str(file) in _plugins:
-        return _plugins[str(file)]
-    if not file.is_file():
-        raise EffectError(f"no such file of effects: {path}")
-    return hashlib.sha256(file.read_bytes()).hexdigest()
-
-
-def _line_of(error: BaseException, file: Path) -> str:
-    if isinstance(error, SyntaxError):
-        return f", line {error.lineno}"
-    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(file)]
-    return f", line {lines[-1]}" if lines else ""

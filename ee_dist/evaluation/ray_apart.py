@@ -19,7 +19,7 @@ from os import environ
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from ee_dist.effects.catalogue import loaded_plugins
+from ee_dist.effects.plugins import loaded_plugins
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.jobs import Counts, Job
 from ee_dist.evaluation.ray_folder import Guard

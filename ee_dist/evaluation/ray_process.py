@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from typing import Any
 
-from ee_dist.effects.catalogue import load_plugin
+from ee_dist.effects.plugins import load_plugin
 from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, stop_ray
 
 DONE, FAILED, LOST = b"+", b"-", b"!"

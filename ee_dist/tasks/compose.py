@@ -16,7 +16,8 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from ee_dist.basics.quoted import short
-from ee_dist.effects.catalogue import find, load_plugin
+from ee_dist.effects.catalogue import find
+from ee_dist.effects.plugins import load_plugin
 from ee_dist.tasks.config import Config, ConfigError, Handling, check_keys, groups_of, one_of
 
 TASKS = (

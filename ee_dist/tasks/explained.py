@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ee_dist.discrepancy.contenders import with_one_exchanged
-from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, load_plugin, term
+from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, term
+from ee_dist.effects.plugins import load_plugin
 from ee_dist.robots.model import Robot
 from ee_dist.robots.untrusted import UntrustedError, json_of, text_of, yaml_of
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig

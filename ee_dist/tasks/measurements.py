@@ -73,7 +73,7 @@ def load(config: Config) -> Measurements:
             # What an import says about a trial (a gain, a payload) comes on top of how it was held.
             setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
             trials.append(
-                MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup, _whether_held(run))
+                MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup, _commands_held(run))
             )
     if not trials:
         raise LogError(_too_short(*short[0]))
@@ -106,7 +106,7 @@ def load(config: Config) -> Measurements:
     )
 
 
-def _whether_held(run: RunRecord) -> bool | None:
+def _commands_held(run: RunRecord) -> bool | None:
     """Drives of our own simulations do not hold their commands; of others it is to be found out."""
     real = run.metadata.get("task") == "import" or (run.metadata.get("task") == "trial" and "seal" not in run.metadata)
     return None if real else False

@@ -15,7 +15,8 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from ee_dist.basics.files import write_whole
-from ee_dist.effects.catalogue import Hypothesis, text_of_plugin
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.effects.plugins import text_of_plugin
 from ee_dist.tasks.config import Config
 
 FORMAT = 1

@@ -17,7 +17,7 @@ import yaml
 from ee_dist.basics.files import write_whole
 from ee_dist.basics.quoted import one_line, quoted, short
 from ee_dist.basics.uncut import keeping, trial_on_hardware
-from ee_dist.effects.catalogue import text_of_plugin
+from ee_dist.effects.plugins import text_of_plugin
 from ee_dist.evaluation.installed import installed
 from ee_dist.evaluation.jobs import Evaluator
 from ee_dist.evaluation.journal import Journal, JournaledEvaluator

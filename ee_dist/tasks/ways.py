@@ -36,14 +36,14 @@ class Way:
     def make(self, measured: Measurements, config: Config) -> Problem:
         """The problem. Where nobody knows whether drives held their commands from row to row, the reading of the log with which
         the robot as it is described leaves less: drives of a robot do, those of somebody's simulation may not."""
-        if not self.commanded or all(t.held is not None for t in measured.trials):
+        if not self.commanded or all(t.commands_held is not None for t in measured.trials):
             return self.build(measured, config)
         readings = [self.build(_as_held(measured, held), config) for held in (False, True)]
         return min(readings, key=lambda problem: error(problem.residuals([()])[0]))
 
 
 def _as_held(measured: Measurements, held: bool) -> Measurements:
-    trials = [t if t.held is not None else replace(t, held=held) for t in measured.trials]
+    trials = [t if t.commands_held is not None else replace(t, commands_held=held) for t in measured.trials]
     return replace(measured, trials=tuple(trials))
 
 

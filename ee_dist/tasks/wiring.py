@@ -7,7 +7,7 @@ import gc
 import os
 from dataclasses import dataclass, replace
 
-from ee_dist.effects.catalogue import load_plugin, text_of_plugin
+from ee_dist.effects.plugins import load_plugin, text_of_plugin
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.jobs import Evaluator

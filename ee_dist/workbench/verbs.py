@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ee_dist.discrepancy.search.search import Progress
-from ee_dist.effects.catalogue import load_plugin
+from ee_dist.effects.plugins import load_plugin
 from ee_dist.tasks.config import Config
 from ee_dist.workbench import results
 

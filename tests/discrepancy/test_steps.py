@@ -72,7 +72,7 @@ def test_steps_follow_what_a_robot_does_in_between(engine: str, command: str) ->
     log = in_continuous_time(robot, motion(1, robot), runs)
     left = []
     for is_held in (False, True):
-        trial = MeasuredTrial("m", log, Commands(log.commands), held=is_held)
+        trial = MeasuredTrial("m", log, Commands(log.commands), commands_held=is_held)
         (found,) = runs.rollout([rollout_of(trial, robot)])
         left.append(np.sqrt(np.mean((angles(robot, found) - angles(robot, log)) ** 2)))
     runs.close()
@@ -95,7 +95,7 @@ def test_what_is_made_up_for_goes_with_the_step() -> None:
 
 
 def problem_of(log: SensorLog, robot: Robot, whether: bool | None):
-    trials = tuple(MeasuredTrial(n, log, Commands(log.commands), held=whether) for n in ("a",))
+    trials = tuple(MeasuredTrial(n, log, Commands(log.commands), commands_held=whether) for n in ("a",))
     return WAYS["open_loop"].make(Measurements(robot, trials, (), (), None, Path()), CONFIG)
 
 
@@ -106,7 +106,7 @@ def test_the_log_says_whether_commands_were_held() -> None:
     (simulated,) = engine.rollout([Rollout(robot, Commands(commands), len(commands), pose=True)])
     for log, is_held in ((in_continuous_time(robot, commands, engine), True), (simulated, False)):
         problem = problem_of(log, robot, None)
-        assert [t.held for t in problem.measured] == [is_held]
+        assert [t.commands_held for t in problem.measured] == [is_held]
         other = problem_of(log, robot, not is_held)
         assert error(problem.residuals([()])[0]) < 0.2 * error(other.residuals([()])[0])
 
@@ -115,7 +115,7 @@ def test_the_log_says_whether_commands_were_held() -> None:
 def test_every_way_that_simulates_takes_it_so(way: str) -> None:
     engine, robot = MuJoCoEngine(1), coarse()
     log = in_continuous_time(robot, motion(3, robot), engine)
-    trials = (MeasuredTrial("a", log, Commands(log.commands), held=None),)
+    trials = (MeasuredTrial("a", log, Commands(log.commands), commands_held=None),)
     problem = WAYS[way].make(Measurements(robot, trials, (), (), None, Path()), CONFIG)
-    assert problem.measured[0].held
+    assert problem.measured[0].commands_held
     assert problem.simulated(())[0] is not None

@@ -14,8 +14,8 @@ import pytest
 from effect_robots import MASS_KG, Bench, slider
 
 from ee_dist.effects import CATALOGUE, EffectError, apply, load_plugin, loaded_plugins, term
-from ee_dist.effects.catalogue import text_of_plugin
 from ee_dist.effects.laws import LAWS, LawError, drive_law, find_law
+from ee_dist.effects.plugins import text_of_plugin
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine

@@ -109,19 +109,19 @@ def test_a_transform_that_fails_is_one_line(body, said):
     """Whatever a user's own effect does, it ends as an error of effects that names it."""
     from dataclasses import replace
 
-    from ee_dist.effects.catalogue import CATALOGUE, EffectError, _registry, apply, term
+    from ee_dist.effects.catalogue import CATALOGUE, EffectError, apply, registered, term
     from ee_dist.robots.quadruped import quadruped
 
     name = "motor_weak"
     known = CATALOGUE[name]
     space: dict[str, object] = {}
     exec(f"def transform(robot, target, values):\n    {body}", space)
-    _registry[name] = replace(known, transform=space["transform"])
+    registered[name] = replace(known, transform=space["transform"])
     try:
         with pytest.raises(EffectError) as caught:
             apply(quadruped(), [term(name, "knee_front_left", loss=0.5)])
     finally:
-        _registry[name] = known
+        registered[name] = known
     assert name in str(caught.value)
     assert "\n" not in str(caught.value)
     assert said in str(caught.value) or body == "return None"

@@ -120,7 +120,7 @@ def test_a_run_does_not_go_on_with_another_text_of_an_effect_of_ones_own(cli, ti
     moved = tmp_path / "moved.py"
     moved.write_text(text)
     file.unlink()
-    for registry in (catalogue._registry, laws.LAWS):  # what a new process would not have
+    for registry in (catalogue.registered, laws.LAWS):  # what a new process would not have
         del registry["cogging"]
     ask = (*tiny, *FAST, f"plugins=[{moved}]")
     assert cli(*ask, f"resume={out}").status == 0

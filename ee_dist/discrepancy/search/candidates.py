@@ -129,7 +129,7 @@ def candidate(robot: Robot, effect: Effect | str, target: str) -> Candidate:
             u = (plain.upper if plain.upper[k] else plain.lower) * 0.5 * np.eye(plain.size)[k]
             if apply(robot, (plain.term(u),)) == robot:
                 inert.append(k)
-    return Candidate(entry, target, bounds, tuple(inert), target != "" and target == entry.guessed(robot))
+    return Candidate(entry, target, bounds, tuple(inert), entry.guesses_at(robot, target))
 
 
 def candidates(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from ee_dist.measurements.errors import MeasurementError, nearest
@@ -26,16 +25,15 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     _check_hints(robot, hints)
     v = View(recorded, robot, hints)
     flaws = _add_times(v)
-    timed = replace(v.recorded, tables=tuple(t for t in v.recorded.tables if t.name in v.times))
-    if not timed.tables:
+    if not v.timed.tables:
         cure = "mend that row or drop it, or say task.rate_hz=ROWS_A_SECOND"
         v.out.ask(f"{flaws[0]}; {cure}" if flaws else "no column rises like a time; say task.rate_hz=ROWS_A_SECOND")
         return v.out
-    flaws += [error for t in timed.tables for error in unreadable(t, v.robot.motor_names)]
+    flaws += [error for t in v.timed.tables for error in unreadable(t, v.robot.motor_names)]
     v.blocks = v.gathered()
     position = v.pick(ranked_positions(v))
     if position is None:
-        _time_choice(v, timed.tables[0].name)
+        _time_choice(v, v.timed.tables[0].name)
         ask_for_positions(v)
         v.out.choices += [
             Choice("commands", m, {"column": "???"}, UNKNOWN, "not looked for yet") for m in command_units(robot)

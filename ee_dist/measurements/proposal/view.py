@@ -50,12 +50,16 @@ class View:
         self.needed: tuple[Array, Array] | None = None
         self.gained: list[str] = []
 
+    @property
+    def timed(self) -> Recorded:
+        """The tables that have a time."""
+        return replace(self.recorded, tables=tuple(t for t in self.recorded.tables if t.name in self.times))
+
     def gathered(self) -> list[Block]:
         """The blocks of all tables that have a time."""
-        timed = replace(self.recorded, tables=tuple(t for t in self.recorded.tables if t.name in self.times))
         known = {n: t.column for n, t in self.times.items() if t.column is not None}
         known |= {t.name: t.clock for t in self.recorded.tables if t.clock is not None}
-        found = blocks_of(timed, self.robot.motor_names, self.hints.joints, known)
+        found = blocks_of(self.timed, self.robot.motor_names, self.hints.joints, known)
         return [self.even(b) for b in found if len(b.values) > 20]
 
     def driven(self) -> View:

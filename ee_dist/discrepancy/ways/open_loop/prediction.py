@@ -177,7 +177,7 @@ class Predictor:
         jobs = []
         bare: dict[tuple[int, bool | None], Robot] = {}
         for k, model in pairs:
-            which = id(model), self.trials[k].held
+            which = id(model), self.trials[k].commands_held
             if which not in bare:
                 bare[which] = self.trials[k].simulated(clean(model))
             early = self.trials[k].early(self.base)
