@@ -20,6 +20,9 @@ from ee_dist.viewing.processes import gone
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 ANSWER_S = 300.0
+PICTURE_S = 60.0
+"""For a page that is drawn already."""
+ENDING_S = 5.0
 SWITCHES = (
     "--headless",
     "--no-sandbox",
@@ -44,6 +47,10 @@ LAUNCH = "import os, sys; r, w = map(int, sys.argv[1:3]); r, w = os.dup(r), os.d
 
 class BrowserError(RuntimeError):
     """Chromium is not installed, or did not answer; said in one line."""
+
+
+class _SilentError(BrowserError):
+    """It runs, and does not answer."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +117,15 @@ class HeadlessBrowser:
 
     def look(self, page: Path, width: int, *, dark: bool = False, height: int = 900, whole: bool = False) -> Look:
         """Open a page and scroll through all of it; a picture of its first screen or of the ``whole``. Raises BrowserError."""
+        try:
+            return self._look(page, width, dark, height, whole)
+        except _SilentError:
+            # On a busy machine a frame may never come, of which then no picture is taken; another Chromium draws it.
+            self._end()
+            self.__enter__()
+            return self._look(page, width, dark, height, whole)
+
+    def _look(self, page: Path, width: int, dark: bool, height: int, whole: bool) -> Look:
         self.open(page, width, dark=dark, height=height)
         # Every part is opened and comes into sight once, so that whatever can go wrong in drawing it does.
         self.evaluate(
@@ -127,7 +143,7 @@ class HeadlessBrowser:
         if whole:
             tall = int(self.evaluate("document.documentElement.scrollHeight"))
             clip = {"clip": {"x": 0, "y": 0, "width": width, "height": tall, "scale": 1}, "captureBeyondViewport": True}
-        shot = self._ask("Page.captureScreenshot", {"format": "png", **clip}, page=True)["data"]
+        shot = self._ask("Page.captureScreenshot", {"format": "png", **clip}, page=True, patience_s=PICTURE_S)["data"]
         return Look(base64.b64decode(shot), self._asked(), self._complaints(), max(0, overflow))
 
     def evaluate(self, script: str) -> Any:
@@ -155,7 +171,13 @@ class HeadlessBrowser:
                 found.append(said["entry"]["text"])
         return tuple(found)
 
-    def _ask(self, method: str, parameters: dict[str, Any] | None = None, page: bool = False) -> dict[str, Any]:
+    def _ask(
+        self,
+        method: str,
+        parameters: dict[str, Any] | None = None,
+        page: bool = False,
+        patience_s: float = ANSWER_S,
+    ) -> dict[str, Any]:
         self._count += 1
         message: dict[str, Any] = {"id": self._count, "method": method, "params": parameters or {}}
         if page:
@@ -164,7 +186,7 @@ class HeadlessBrowser:
             os.write(self._to, json.dumps(message).encode() + b"\0")
         except BrokenPipeError as error:
             raise BrowserError("Chromium ended by itself") from error
-        deadline = time.monotonic() + ANSWER_S
+        deadline = time.monotonic() + patience_s
         while True:
             answer = self._next(deadline, method)
             if answer.get("id") == self._count:
@@ -182,8 +204,10 @@ class HeadlessBrowser:
         while b"\0" not in self._buffer:
             ready, _, _ = select.select([self._from], [], [], max(0.0, deadline - time.monotonic()))
             chunk = os.read(self._from, 1 << 20) if ready else b""
+            if not ready:
+                raise _SilentError(f"Chromium did not answer {waiting}")
             if not chunk:
-                raise BrowserError(f"Chromium did not answer {waiting}" if not ready else "Chromium ended by itself")
+                raise BrowserError("Chromium ended by itself")
             self._buffer += chunk
         message, self._buffer = self._buffer.split(b"\0", 1)
         return dict(json.loads(message))
@@ -191,6 +215,6 @@ class HeadlessBrowser:
     def _end(self) -> None:
         # Without anybody to listen to, Chromium ends itself and its children.
         os.close(self._to)
-        gone(self._process, 5.0)
+        gone(self._process, ENDING_S)
         os.close(self._from)
         self._profile.cleanup()
