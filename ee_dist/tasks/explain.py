@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
+from ee_dist.discrepancy.confidence import confidence
 from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
 from ee_dist.discrepancy.measured_trial import reading_s
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
@@ -72,10 +73,11 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             # As noisy and as seldom read as these: what a simulation reads is exact, and read in every row.
             robot, every_s = with_known_noise(measured), reading_s(measured.trials)
             ahead = next(iter(next_trials(robot, tied, evaluator_of(config), every_s=every_s)), None)
-    account = explain_account(problem, found, ahead, planning(out, problem.robot))
+    share = confidence(problem.way, found)
+    account = explain_account(problem, found, ahead, planning(out, problem.robot), share)
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
-    write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead))
+    write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))
     following = []
     if found.verdict == EFFECT:
         effect = setting("effect", typed(found.best.terms) if found.best else "auto")

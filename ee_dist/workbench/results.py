@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ee_dist.discrepancy.accounts.account import Account
-from ee_dist.discrepancy.accounts.of_explain import above, confidence
+from ee_dist.discrepancy.accounts.of_explain import above, taken_off
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
@@ -99,7 +99,7 @@ def _ranked(problem: Problem, found: Explanation, c: Judged, best: Judged) -> Ra
         above(c),
         kind,
         c.why_not,
-        confidence(c),
+        taken_off(c),
         entry.physics,
         entry.signature,
     )

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ee_dist.discrepancy.accounts.of_explain import confidence
+from ee_dist.discrepancy.accounts.of_explain import taken_off
 from ee_dist.tasks.results.scenes import _candidate
 from ee_dist.tasks.results.tables import show_candidates
 from ee_dist.tasks.terminal import terminal
@@ -27,4 +27,4 @@ def test_no_more_than_all_of_it_nor_less_than_nothing(
     found = SimpleNamespace(candidates=[c])
     line = candidate_table([_candidate(problem, found, c, False)])[-1]  # type: ignore[arg-type]
     assert f"| {said} |" in line and "| -100 % to 100 % |" in line
-    assert confidence(c).startswith(f"{said} of what is above the noise (95 % interval -100 %")  # type: ignore[arg-type]
+    assert taken_off(c).startswith(f"{said} of what is above the noise (95 % interval -100 %")  # type: ignore[arg-type]

@@ -40,9 +40,15 @@ NOTHING_STANDS_OUT = "Nothing else stands out."
 NO_MOTION_TRIED = "None of the motions tried is expected to tell them apart."
 
 
-def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | None, planner: str = "") -> Account:
+def explain_account(
+    problem: Problem,
+    found: Explanation,
+    ahead: PlannedTrial | None,
+    planner: str = "",
+    confidence: float | None = None,
+) -> Account:
     """The verdict, what it is, what speaks for it, what stays open, what to do next; ``planner`` is said where something is tied
-    that another trial might tell apart."""
+    that another trial might tell apart, ``confidence`` is that of confidence.py."""
     robot, best = problem.robot, found.best
     lines = [
         f"Noise floor: {found.floor_source}. {counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried."
@@ -77,7 +83,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
         nothing = BEYOND if unsure else nothing
         head += " More than noise is left with it." if found.left else f" {nothing}"
         error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
-        sure = f"How sure: it takes off {confidence(best)}{unexplained_rest(best.explained, not found.left)}"
+        sure = f"How sure: it takes off {taken_off(best)}{unexplained_rest(best.explained, not found.left)}"
         sure += f"; {_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}."
         advice = slower(unsure) if unsure else ""
         guessed = best.proposal.label == LABEL
@@ -110,6 +116,7 @@ def explain_account(problem: Problem, found: Explanation, ahead: PlannedTrial | 
             f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
             f"(predicted distance {ahead.separation:.0f} standard deviations)."
         )
+    sure = f"{sure[:-1]}; {_counted_right(confidence)}."
     good = (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)) and not unsure
     tied = found.verdict == EFFECT and best is not None and best.tied_with
     return Account(
@@ -128,6 +135,12 @@ def _rivals(tried: int, tied: Sequence[str], more: str) -> str:
         return f"of {counted(tried, 'explanation')} no other does as well"
     told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
     return f"of {counted(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+
+
+def _counted_right(confidence: float | None) -> str:
+    if confidence is None:
+        return "how often such a verdict is right was not counted"
+    return f"in {100 * confidence:.0f} of 100 simulated cases that looked like this one the verdict was right"
 
 
 def _doubt(found: Explanation) -> str:
@@ -156,7 +169,7 @@ def shown_gain(c: Judged) -> tuple[float, float, float]:
     return max(0.0, min(c.explained, 1.0)), max(low, -1.0), min(high, 1.0)
 
 
-def confidence(best: Judged) -> str:
+def taken_off(best: Judged) -> str:
     """What it takes off held-out data, as a share of what is not noise, with its interval."""
     share, low, high = shown_gain(best)
     interval = f"95 % interval {percent(low)} to {percent(high)}"

@@ -59,12 +59,13 @@ def of_comparison(
 
 
 def of_explanation(
-    problem: Problem, found: Explanation, account: Account, ahead: PlannedTrial | None
+    problem: Problem, found: Explanation, account: Account, ahead: PlannedTrial | None, confidence: float | None
 ) -> dict[str, Any]:
     worth = ahead is not None and ahead.separation >= ENOUGH
     return {
         **common(problem, account, found.noise_floor, found.floor_source, found.before),
         "verdict": found.verdict,
+        "confidence": confidence,
         "baseline_error": found.baseline_error,
         "baseline_error_natural": problem.natural(found.baseline_error),
         "refitted_error": found.refitted_error,

@@ -1,0 +1,89 @@
+"""In how many simulated cases that looked like this one the verdict was right: nothing where nobody counted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from way_samples import measure, problem_by, samples
+
+from ee_dist.discrepancy.accounts.of_explain import explain_account
+from ee_dist.discrepancy.confidence import FEWEST, MOST, RULE, Signs, confidence, foretold, misfit_of, signs_of
+from ee_dist.discrepancy.examine import Effort
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, Explanation, explain
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import parse
+from ee_dist.effects.catalogue import Hypothesis, term
+
+QUICK = Effort(first=4, second=2, final=2, starts=1)
+HIDDEN = term("coulomb_friction", "elbow", torque_nm=0.3)
+
+
+def explained(hidden: Hypothesis, by: str = "open_loop") -> tuple[Problem, Explanation]:
+    sample = samples()["arm"]
+    problem = problem_by(by, measure(sample, hidden), sample.robot)
+    pool = [parse(problem.robot, f"{e}@elbow") for e in ("coulomb_friction", "viscous_friction", "parallel_spring")]
+    return problem, explain(problem, pool, (), effort=QUICK)
+
+
+@pytest.fixture(scope="module")
+def friction() -> tuple[Problem, Explanation]:
+    return explained((HIDDEN,))
+
+
+signs = st.builds(Signs, st.floats(0, MOST), st.floats(-1, MOST), st.sampled_from([0.0, 1.0]))
+
+
+@given(signs, st.floats(0, 1))
+def test_more_evidence_and_a_wider_lead_are_surer_and_a_rest_less(one: Signs, more: float) -> None:
+    here = foretold(one)
+    assert 0.0 < here < 1.0
+    assert foretold(replace(one, evidence=one.evidence + more)) >= here
+    assert foretold(replace(one, ahead=one.ahead + more)) >= here
+    assert foretold(replace(one, rest=1.0)) < foretold(replace(one, rest=0.0))
+
+
+def test_an_effect_that_is_plain_has_plain_signs(friction: tuple[Problem, Explanation]) -> None:
+    _, found = friction
+    seen = signs_of(found)
+    assert found.verdict == EFFECT and seen is not None
+    assert seen.evidence > 1.0 and seen.rest == 0.0 and misfit_of(found) < 1.2
+    assert 0.9 < (confidence("open_loop", found) or 0.0) < 1.0
+
+
+def test_a_rest_counts_against_it_and_so_does_a_tie(friction: tuple[Problem, Explanation]) -> None:
+    _, found = friction
+    plain = confidence("open_loop", found) or 0.0
+    left = replace_examined(found, left=[object()])
+    assert (confidence("open_loop", left) or 1.0) < plain
+
+
+def replace_examined(found: Explanation, **changes: object) -> Explanation:
+    return replace(found, examined=replace(found.examined, **changes))  # type: ignore[arg-type]
+
+
+def test_nothing_is_said_of_what_nobody_counted(friction: tuple[Problem, Explanation]) -> None:
+    problem, found = friction
+    assert confidence("force_balance", found) is None
+    strict = replace(RULE, misfit=0.5)
+    assert confidence("open_loop", found, strict) is None, "no case fitted as badly"
+    assert found.best is not None
+    sure = explain_account(problem, found, None, "", None).sure
+    assert sure.endswith("how often such a verdict is right was not counted.")
+
+
+def test_other_verdicts_are_right_as_often_as_they_were() -> None:
+    problem, found = explained(())
+    assert found.verdict == NOTHING_MISSING and signs_of(found) is None
+    cases, right = RULE.counted[NOTHING_MISSING]
+    share = confidence("open_loop", found)
+    assert share == pytest.approx(right / cases, abs=0.02)
+    said = explain_account(problem, found, None, "", share).sure
+    assert said.endswith(
+        f"in {100 * (share or 0):.0f} of 100 simulated cases that looked like this one the verdict was right."
+    )
+    few = replace(RULE, counted={UNEXPLAINED: (FEWEST - 1, FEWEST - 1)})
+    assert confidence("open_loop", SimpleNamespace(verdict=UNEXPLAINED, best=None), few) is None  # type: ignore[arg-type]
