@@ -96,6 +96,12 @@ class HardwareConfig:
             if not 0.0 < getattr(self, name) <= 3600.0:
                 raise ConfigError(f"hardware.{name}={getattr(self, name)}: must be above 0 and at most 3600 (s)")
         self.limits()
+        given = [f.name for f in fields(self) if getattr(self, f.name) != f.default]
+        if self.address is None and given:
+            raise ConfigError(
+                f"hardware.{given[0]}={getattr(self, given[0]):g}: it is for a robot of your own, and none is named: "
+                f"hardware.address=host:port (docs/hardware.md); a slow simulated one has command_speed in its description"
+            )
 
     def limits(self) -> Limits:
         try:

@@ -167,6 +167,7 @@ VALUES: Rows = (
     ("+scenario=8 hardware.timeout_s=0", "must be above 0 and at most 3600 (s)"),
     ("+scenario=8 hardware.speed=-1", "must be above 0"),
     ("+scenario=8 hardware.range_share=2", "must be above 0 and at most 1"),
+    ("+scenario=8 hardware.speed=2", "hardware.speed=2: it is for a robot of your own, and none is named"),
     ("+scenario=8 resume=nothing", "name the folder of a run that was stopped"),
     (
         '+scenario=8 "scenario.changes=[{effect: motor_week, target: knee_front_left}]"',
