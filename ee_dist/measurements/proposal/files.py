@@ -12,11 +12,14 @@ import numpy as np
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.model import Hints, Proposal
+from ee_dist.measurements.proposal.stated import add_stated
 from ee_dist.measurements.proposal.time import time_of
 from ee_dist.measurements.proposal.words import TIME, read_name, role_of
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.table import Recorded, Table
+from ee_dist.robots.model import Robot
 
+MOST_SHOWN = 12
 _CUT = re.compile(r"[_\-. ]+")
 _TRIALS = frozenset(["episode", "episodes", "trial", "trials", "run", "runs", "demo", "traj", "trajectory", "rollout"])
 
@@ -110,7 +113,7 @@ def _first_of_split(recorded: Recorded, head: dict[str, Any]) -> Recorded:
     return recorded
 
 
-def proposal_for(files: Sequence[Path], robot: Any, hints: Hints) -> Proposal:
+def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
     """A mapping for files and a robot. Raises MeasurementError."""
     from ee_dist.measurements.proposal.choose import propose
 
@@ -121,4 +124,10 @@ def proposal_for(files: Sequence[Path], robot: Any, hints: Hints) -> Proposal:
         recorded = replace(recorded, tables=tuple(shown) or recorded.tables)
     proposal = propose(recorded, robot, hints)
     proposal.head = head | proposal.head
+    add_stated(proposal, files, recorded, robot)
+    used = {c.column for c in proposal.choices}
+    left = [name for name in proposal.unused if name not in used]
+    if left:
+        more = f" and {len(left) - MOST_SHOWN} more" if len(left) > MOST_SHOWN else ""
+        proposal.notes.append(f"columns not used: {', '.join(left[:MOST_SHOWN])}{more}")
     return proposal

@@ -39,6 +39,8 @@ class Choice:
     def column(self) -> str:
         if self.entry is None:
             return "-"
+        if self.group == "settings":
+            return next(str(v.get("header", v.get("column"))) for v in self.entry.values() if isinstance(v, dict))
         place = self.entry.get("table")
         column = str(self.entry.get("column", self.entry.get("speed_of", self.entry.get("rate_hz", ""))))
         return f"{place}: {column}" if place else column
@@ -53,6 +55,8 @@ class Proposal:
     notes: list[str] = field(default_factory=list)
     head: dict[str, Any] = field(default_factory=dict)
     """Keys of the mapping besides the channels: robot, tables, split."""
+    unused: list[str] = field(default_factory=list)
+    """Columns that nothing was made of."""
 
     def ask(self, question: str) -> None:
         if question not in self.questions:

@@ -64,6 +64,4 @@ def add_switches(v: View) -> None:
                     left.append(name)
             else:
                 left.append(name)
-    if left:
-        more = f" and {len(left) - 12} more" if len(left) > 12 else ""
-        v.out.notes.append(f"columns not used: {', '.join(left[:12])}{more}")
+    v.out.unused += left

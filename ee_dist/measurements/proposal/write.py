@@ -7,7 +7,7 @@ from typing import Any
 
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice, Proposal
 
-GROUPS = ("time", "sensors", "commands", "torques", "supply", "enabled")
+GROUPS = ("time", "sensors", "commands", "torques", "supply", "enabled", "settings")
 SINGLE = ("time", "supply", "enabled")
 
 
@@ -24,6 +24,11 @@ def as_yaml(proposal: Proposal, robot: Any, sources: str) -> str:
         if group in SINGLE:
             for c in found:
                 lines += [f"# {c.sure}: {c.why}", f"{group}: {_flow(c.entry)}"]
+            continue
+        if group == "settings":
+            lines += ["settings:"] * bool(found)
+            for c in found:
+                lines += [f"  # {c.sure}: {c.why}", f"  - {_flow(c.entry)}"]
             continue
         if found or group == "sensors":
             lines.append(f"{group}:" if found else f"{group}: {{}}")
@@ -63,7 +68,12 @@ def rows(proposal: Proposal) -> list[tuple[str, str, str, str, str]]:
     out = []
     for (group, sure, why), several in found.items():
         names = ", ".join(c.name for c in several)
-        named = {"sensors": names, "commands": f"command of {names}", "torques": f"torque of {names}"}
+        named = {
+            "sensors": names,
+            "commands": f"command of {names}",
+            "torques": f"torque of {names}",
+            "settings": names,
+        }
         channel = named.get(group, group)
         units = dict.fromkeys(_unit(c) for c in several)
         out.append((channel, ", ".join(dict.fromkeys(c.column for c in several)), ", ".join(units), sure, why))

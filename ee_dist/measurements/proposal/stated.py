@@ -1,0 +1,126 @@
+"""What files state about their trials: numbers that are one all through a trial, such as a controller's gain."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.proposal.model import LIKELY, Choice, Proposal
+from ee_dist.measurements.proposal.words import tokens
+from ee_dist.measurements.readers import read
+from ee_dist.measurements.table import Recorded
+from ee_dist.robots.model import Robot
+
+HEADER, COLUMN = "header", "column"
+GAINS = {"kp": "position_gain", "pgain": "position_gain", "kd": "speed_gain", "dgain": "speed_gain"}
+"""The effect that a controller's gain of a trial is told as, by what the number is called."""
+FILLING = frozenset(["gain", "gains", "position", "joint", "motor", "servo", "drive", "controller", "pid", "value"])
+"""Words that say no more than that it is a gain of a drive."""
+LEAST_ROWS = 20
+SHOWN = 4
+
+
+def add_stated(proposal: Proposal, files: Sequence[Path], first: Recorded, robot: Robot) -> None:
+    """Settings for gains that differ between the trials of ``files``, a note for one that does not, and for whatever else
+    differs. Raises MeasurementError for a file that cannot be read."""
+    used = {(c.entry or {}).get("column") for c in proposal.choices}
+    named = [key for key in dict(_numbers(first)) if key[1] not in used]
+    # Other files are read for what may differ only: columns that stand still are many, and mostly mean nothing.
+    named = [(place, name) for place, name in named if place == HEADER or _gain(name, robot) is not None]
+    if not named or "split" in proposal.head:
+        return
+    trials = [
+        dict(_numbers(r)) for k, f in enumerate(files) for r in ([first] if k == 0 and len(files) == 1 else read(f))
+    ]
+    differ = []
+    for place, name in named:
+        values, found = [t.get((place, name), math.nan) for t in trials], _gain(name, robot)
+        if not np.isfinite(values).all():
+            continue
+        if len(set(values)) == 1:
+            if found is not None:
+                proposal.notes.append(
+                    f"{name} is {values[0]:g} in all trials: the description's gain is taken for it; say it as settings of the "
+                    "mapping where it is not, or where other files, with other gains, are to be compared with the same model"
+                )
+        elif found is None or min(values) <= 0:
+            differ.append(f"{name} ({_listed(values)})")
+        else:
+            proposal.choices.append(_setting(found, place, name, values))
+    if differ:
+        proposal.notes.append(
+            f"differs between trials, and is not used: {', '.join(differ)}; settings of the mapping can say what it changes"
+        )
+
+
+def _setting(found: tuple[str, str], place: str, name: str, values: Sequence[float]) -> Choice:
+    """The usual value, of those as usual the smallest, stands for the description's gain."""
+    effect, target = found
+    usual, _ = min(Counter(values).items(), key=lambda item: (-item[1], item[0]))
+    why = (
+        f"called a gain, and differs between trials ({_listed(values)}); the description's gain is taken for that at "
+        f"{usual:g}: where it is that of another, change the scale"
+    )
+    entry = {"effect": effect, "target": target, "factor": {place: name, "scale": 1.0 / usual}}
+    return Choice("settings", f"{effect} at {target}", entry, LIKELY, why)
+
+
+def _numbers(recorded: Recorded) -> Iterator[tuple[tuple[str, str], float]]:
+    """((place, name), value) of each number that is the same all through a trial."""
+    for table in recorded.tables:
+        for name, value in table.header.items():
+            if isinstance(value, (int, float)) and not isinstance(value, bool):
+                yield (HEADER, name), float(value)
+    if len(recorded.tables) != 1 or len(recorded.tables[0]) < LEAST_ROWS:
+        return
+    (table,) = recorded.tables
+    for name in table.addresses():
+        if name == table.clock or not _gain_words(name):
+            continue
+        try:
+            seen = table.numbers(name)
+        except MeasurementError:
+            continue
+        if np.isfinite(seen).all() and (seen == seen[0]).all():
+            yield (COLUMN, name), float(seen[0])
+
+
+def _gain_words(name: str) -> tuple[str, list[str]] | None:
+    """What a gain is called by, and the words of the name that are left."""
+    words = tokens(name)
+    for key in GAINS:
+        if key in words:
+            return key, [w for w in words if w != key and w not in FILLING]
+    for short in ("p", "d"):
+        if short in words and {"gain", "gains"} & set(words):
+            return f"{short}gain", [w for w in words if w != short and w not in FILLING]
+    return None
+
+
+def _gain(name: str, robot: Robot) -> tuple[str, str] | None:
+    """(effect, target) of a number that is called a gain of one drive, or of all; None where it is not, or no drive has one."""
+    found = _gain_words(name)
+    if found is None:
+        return None
+    key, rest = found
+    effect = GAINS[key]
+    able = [
+        d.joint for d in robot.drives if d.command == "position" and (d.kp if effect == "position_gain" else d.kd) > 0
+    ]
+    if not rest:
+        if len(robot.drives) == 1:
+            return (effect, able[0]) if able else None
+        return (effect, "all_joints") if len(able) == len(robot.drives) else None
+    of_joint = [j for j in able if [w for w in tokens(j) if w not in FILLING] == rest]
+    return (effect, of_joint[0]) if len(of_joint) == 1 else None
+
+
+def _listed(values: Sequence[float]) -> str:
+    distinct = sorted(set(values))
+    more = f" and {len(distinct) - SHOWN} more" if len(distinct) > SHOWN else ""
+    return ", ".join(f"{v:g}" for v in distinct[:SHOWN]) + more
