@@ -264,7 +264,8 @@ STUDIED = {
 }  # fmt: skip
 ANSWERS = [{"sensors": [0.0] * 8}, *2 * [{"sensors": [0.1] * 8, "torques": [0.1] * 8}], {"done": True, "travel_m": 1.0}]
 WORDS = (
-    "+scenario=8", "seed=3", "engine=mujoco", "budget.population=200", "evaluator=serial", "ray.address=a:1", "hardware.speed=3",
+    "+scenario=8", "seed=3", "engine=mujoco", "budget.population=200", "evaluator=serial", "ray.address=a:1",
+    "hardware.address=a:2", "hardware.speed=3",
     "scenario.changes=[{effect: motor_weak, target: knee_front_left, loss: 0.5}]", "hydra.run.dir=out", "budget.steps=200",
 )  # fmt: skip
 MORE_WORDS = (
