@@ -149,7 +149,8 @@ class AddView(View):
             with ui.column().classes("gap-0").style("flex: 1 1 auto; min-width: 0"):
                 quiet(f"{said}{shown}, {low:.3g} to {high:.3g}")
                 slider = Slider(low, high, (high - low) / STEPS, value,
-                                lambda e: self.moves.ask((k, name, float(e.args))), self._release)  # fmt: skip
+                                lambda e: self.moves.ask((k, name, float(e.args))),
+                                lambda e: self._release((k, name, float(e.args))))  # fmt: skip
                 slider.props(f'aria-label="{escape(f"{said} of {placed(entry.name)}{shown}")}"')
                 slider.mark(f"slider-{k}-{name}")
                 for label, a, b in entry.intervals:
@@ -174,6 +175,8 @@ class AddView(View):
         session, place = self.session, self.page.place
         if place is None or k >= len(session.bench.entries):
             return
+        if not session.gripped and dict(session.bench.entries[k].term.values)[name] == value:
+            return  # told late, after it was settled: nobody would let go of the slider again
         glance = await of(session.attempt(session.slide, k, {name: value}, place))
         if glance is None:
             return
@@ -195,9 +198,9 @@ class AddView(View):
         if error is not None:
             self.page.show_error(error)
 
-    async def _release(self) -> None:
-        # The last move may still be on its way.
-        await asyncio.sleep(0.05)
+    async def _release(self, last: Move) -> None:
+        """The hand is off the slider, where it stands then."""
+        await self.moves.ask(last)
         while self.moves.newer:
             await asyncio.sleep(0.02)
         await self.page.act(self.session.release)
@@ -206,5 +209,4 @@ class AddView(View):
         entries = self.session.bench.entries
         if value is None or k >= len(entries) or f"{dict(entries[k].term.values)[name]:.5g}" == f"{value:.5g}":
             return
-        await self.moves.ask((k, name, float(value)))
-        await self._release()
+        await self._release((k, name, float(value)))

@@ -10,7 +10,8 @@ from nicegui.element import Element
 
 class Slider(Element):
     """Quasar's own, which follows the hand by itself. The toolkit's is sent every value that it has just sent, and the whole page
-    is gone through for it, before the curves come. ``moved`` is called with the toolkit's event, ``released`` with nothing."""
+    is gone through for it, before the curves come. ``moved`` and ``released`` are called with the toolkit's event, whose
+    ``args`` are the value. On a slow page the last value may be told as moved after it was told as released."""
 
     def __init__(
         self,
@@ -19,7 +20,7 @@ class Slider(Element):
         step: float,
         value: float,
         moved: Callable[[Any], Any],
-        released: Callable[[], Any],
+        released: Callable[[Any], Any],
         throttle_s: float = 0.02,
     ) -> None:
         super().__init__("q-slider")
