@@ -33,7 +33,10 @@ class LawContext:
 LawFunction = Callable[[LawContext], Array]
 
 LAWS: dict[str, LawFunction] = {}
-"""Drive laws by name: each returns the torque (R,) to add at its joints."""
+"""Drive laws by name: each returns the torque (R,) to add at its joints, or,"""
+SPEED_LAWS: set[str] = set()
+"""those of these names, the speed (R,) that the controller of its joints goes by, in place of the true one. Where the force of
+a drive was measured, they have had their say."""
 
 
 TEXTS: dict[str, str] = {}
@@ -57,6 +60,12 @@ def drive_law(name: str) -> Callable[[LawFunction], LawFunction]:
         return function
 
     return register
+
+
+def speed_law(name: str) -> Callable[[LawFunction], LawFunction]:
+    """Register a law of the speed that a controller knows. Raises LawError."""
+    SPEED_LAWS.add(name)
+    return drive_law(name)
 
 
 def text_of_law(name: str) -> str:

@@ -1,6 +1,7 @@
 """The drive path: from command to joint torque, for a whole batch at once and the same for every engine.
 
-    command -> delay -> gain -> velocity limit -> controller (of position, with deadband and zero offset, of speed, or none)
+    command -> delay -> gain -> velocity limit -> controller (of position, with deadband and zero offset, of speed, or none; the
+            speed that it knows may be a law's)
             -> motor (torque limit, back-EMF, strength, supply)
             -> transmission (backlash, compliance) -> joint (spring, offset, a user's own laws, friction, brake, stops)
 
@@ -16,7 +17,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ee_dist.effects.laws import LAWS, LawContext, LawFunction, drive_law, find_law
+from ee_dist.effects.laws import LAWS, SPEED_LAWS, LawContext, LawFunction, drive_law, find_law
 from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import EngineError
 from ee_dist.engines.delay import Delay
@@ -123,12 +124,14 @@ class DrivePath:
                 key = (law.name, tuple(n for n, _ in law.values))
                 place = robot.motor_names.index(law.joint)
                 groups.setdefault(key, []).append((i, place, tuple(v for _, v in law.values)))
-        self.laws: list[tuple[LawFunction, Array, Array, LawContext]] = []
+        self.laws: list[_Law] = []
+        self.speeds: list[_Law] = []
+        """Laws of torques, and of the speeds that controllers go by."""
         for (name, value_names), members in groups.items():
             values = {n: np.array([m[2][k] for m in members]) for k, n in enumerate(value_names)}
             rows, columns = np.array([m[0] for m in members]), np.array([m[1] for m in members])
             context = LawContext(values, self.dt, self.inertia[rows, columns])
-            self.laws.append((find_law(name), rows, columns, context))
+            (self.speeds if name in SPEED_LAWS else self.laws).append((find_law(name), rows, columns, context))
 
     # -- one step ----------------------------------------------------------------------------------------------------
 
@@ -150,6 +153,11 @@ class DrivePath:
         if self.uses["command_speed"]:
             wanted = self._limited(wanted, q, enabled)
         position, speed = (q, qd) if self.transmission is None else self.transmission.motor_side(q, qd)
+        for function, rows, columns, context in self.speeds:
+            context.t_s = t_s
+            context.position, context.speed = position[rows, columns], speed[rows, columns]
+            speed = speed.copy()
+            speed[rows, columns] = _given(function, context)
         active, stiffness, damping = self._motor(wanted, position, speed, supply_v, enabled)
         if self.transmission is not None:
             active = self.transmission(active, stiffness, damping, q, qd)
@@ -167,7 +175,7 @@ class DrivePath:
             context.t_s = t_s
             context.position, context.speed = q[rows, columns], qd[rows, columns]
             context.torque = torque[rows, columns]
-            added = _torque_of(function, context)
+            added = _given(function, context)
             torque = torque.copy()
             np.add.at(torque, (rows, columns), added)
         if self.friction is not None:
@@ -233,6 +241,8 @@ class DrivePath:
 MOTOR = ("kp", "ki", "kd", "zero_offset", "deadband", "torque_limit", "strength", "own_emf", "integral_limit")
 """Rows of the table that ``_drive`` reads, in this order."""
 POSITION, SPEED, TORQUE, NONE = range(len(COMMANDS))
+_Law = tuple[LawFunction, Array, Array, LawContext]
+"""With the rows and columns of the joints (R,) that carry it."""
 
 
 @compiled
@@ -345,8 +355,8 @@ def _present(robot: Robot) -> list[bool]:
     return [d.joint in have for d in robot.drives]
 
 
-def _torque_of(law: LawFunction, context: LawContext) -> Array:
-    """What a law of a user's own returns. Raises EngineError where it fails, or gives something else than torques."""
+def _given(law: LawFunction, context: LawContext) -> Array:
+    """What a law of a user's own returns. Raises EngineError where it fails, or gives something else than a number a joint."""
     said = f"drive law {law.__name__} ({law.__module__.removeprefix('ee_dist_plugin_')})"
     try:
         given = law(context)
@@ -355,5 +365,5 @@ def _torque_of(law: LawFunction, context: LawContext) -> Array:
         raise EngineError(f"{said}: {type(error).__name__}: {' '.join(str(error).split())}") from error
     if given is None or found.shape not in ((), context.position.shape):
         what = "nothing" if given is None else f"an array of shape {found.shape}"
-        raise EngineError(f"{said}: it gave {what}; expected a torque for each of its {len(context.position)} joints")
+        raise EngineError(f"{said}: it gave {what}; expected a number for each of its {len(context.position)} joints")
     return found

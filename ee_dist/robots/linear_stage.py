@@ -16,7 +16,7 @@ SPEED_GAIN_V_S_M = 243.45
 LIMIT_V = 10.0
 TRAVEL_M = (-0.05, 0.3)
 SPEED_LAW = "speed_from_readings"
-"""The drive law that replaces the true speed in the controller by a difference of readings; see effects/controller_laws.py."""
+"""The law by which the controller goes by a difference of readings, not by the true speed; see effects/controller_laws.py."""
 
 
 def linear_stage(
@@ -44,7 +44,7 @@ def linear_stage(
         speed_limit=float("inf"),
         viscous=viscous,
     )
-    laws = (Law(SPEED_LAW, JOINT, (("gain", damping), ("samples", float(speed_samples)))),) if speed_samples else ()
+    laws = (Law(SPEED_LAW, JOINT, (("samples", float(speed_samples)),)),) if speed_samples else ()
     return Robot(
         name="linear_stage",
         parts=parts,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import scipy
-from way_samples import Sample, evaluator_for, measure, sines, two_joint_arm
+from way_samples import Sample, engine_for, evaluator_for, measure, samples, sines, two_joint_arm
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
@@ -17,17 +17,20 @@ from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
-from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.pool import pool_of
-from ee_dist.discrepancy.ways.force_balance.noise import roughness_of_noise
+from ee_dist.discrepancy.ways.force_balance.noise import roughness_of_noise, share_of_noise
 from ee_dist.discrepancy.ways.force_balance.places import Way, share_of_no_place
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
-from ee_dist.measurements.sampling import decimated
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.measurements.sampling import LowPass, decimated
+from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.inverse_dynamics import parameters, regressor
 from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array, SensorLog
 from ee_dist.trials.noise import with_noise
 
@@ -129,16 +132,42 @@ def test_noise_stays_noise_where_the_places_are_passed_again_and_again(alike: fl
     every = problem.processing.keep_every
     left = [b(m) for b, m in zip(problem.balances, problem.models, strict=True)]
     ways = [Way(m.position[:, 1], m.speed[:, 1], x[0][:, 1]) for m, x in zip(problem.motions, left, strict=True) if x]
-    assert share_of_no_place(ways, every, problem.robot.time_step_s) > 0.85
+    step_s = problem.robot.time_step_s
+    assert share_of_no_place(ways, every, step_s, problem.processing.filter_for(step_s)) > 0.85
     # White noise is noise beyond doubt; noise that is slower than the readings may be a quick force.
     assert (problem.sure < problem.floor).all() == (alike > 0)
 
 
 @pytest.mark.parametrize("every", [1, 2, 5, 10])
-def test_the_roughness_of_noise_of_which_some_rows_are_kept(every: int) -> None:
-    kept = decimated(np.random.default_rng(0).normal(size=(100_000, 1)), every)[50:-50]
+def test_noise_of_which_some_rows_are_kept(every: int) -> None:
+    passed = 0.5 / max(every, 2)
+    smooth = LowPass(passed)(np.random.default_rng(0).normal(size=100_000), 1.0)
+    kept = decimated(smooth[:, None], every)[50:-50]
     found = roughness(kept)[1:-1].mean() / kept.var()
-    assert roughness_of_noise(every) == pytest.approx(found, rel=0.05)
+    assert roughness_of_noise(every, passed) == pytest.approx(found, rel=0.05)
+    assert share_of_noise(every, passed) == pytest.approx(kept.var(), rel=0.05)
+
+
+NOISE = {"pendulum": 5e-5, "stage": 3e-6, "arm": 2e-4}
+
+
+@pytest.mark.parametrize("name", NOISE)
+def test_a_balance_of_forces_leaves_of_the_right_model_what_its_floor_says(name: str) -> None:
+    """Of quick motions too, that the controller is stiff in, and that go on where the record ends."""
+    robot = with_noise(with_motor_torques(samples()[name].robot), NOISE[name])
+    quick = (Excitation("steps", 2.0, 0.15, 2), Excitation("fast_sines", 1.5, 0.05, 4))
+    trials = []
+    for k, e in enumerate(quick):
+        hardware = PhysicalRobot(engine_for(robot), robot, (), np.random.SeedSequence([310, k]))
+        trials.append(
+            MeasuredTrial(f"motion {k}", hardware.trial(driver_of(e, robot), e.steps(robot)), driver_of(e, robot))
+        )
+    problem = ForceBalance(trials, robot)
+    left = problem.residuals([()])[0]
+    assert 0.4 < error(left) < 1.25
+    for part in problem.slices:
+        ends = np.abs(left[part].reshape(-1, len(problem.channels)))[[0, -1]]
+        assert ends.max() < 5.0
 
 
 def unequal() -> FreeRun:

@@ -72,7 +72,7 @@ def test_the_table_is_long_enough_and_has_every_verb():
 
 
 @pytest.mark.parametrize(("plugin", "said"), [
-    ("shape", "it gave an array of shape (3,); expected a torque for each of its 1 joints"), ("law", "ZeroDivisionError"),
+    ("shape", "it gave an array of shape (3,); expected a number for each of its 1 joints"), ("law", "ZeroDivisionError"),
     ("nothing", "it gave nothing"), ("text", "could not convert"), ("nan", "unstable"),
 ])  # fmt: skip
 def test_a_drive_law_that_fails_is_one_line(files, monkeypatch, tmp_path, plugin, said):

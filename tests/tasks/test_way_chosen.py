@@ -79,7 +79,7 @@ def test_where_gravity_and_inertia_cancel_torques_are_a_poor_witness(times: floa
         swing = 0.1 * np.sin(rad_s * t)[:, None]
         sensors = np.tile(swing, (1, len(robot.sensors)))
         new = replace(log(robot), times_s=t, sensors=sensors, joints=swing, commands=0.01 * swing, torques=0.01 + swing)
-        return new, motion_of(new, robot, Processing.for_rate(dt))
+        return new, motion_of(MeasuredTrial("a", new), robot, Processing.for_rate(dt))
 
     def own() -> float:
         """Where weight and inertia are the same share of the position."""

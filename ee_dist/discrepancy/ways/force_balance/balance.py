@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.ways.force_balance.motion import Motion
-from ee_dist.effects.controller_laws import CONTROLLER_LAWS
-from ee_dist.effects.laws import LawContext, find_law
+from ee_dist.effects.laws import SPEED_LAWS, LawContext, find_law
 from ee_dist.engines.friction import DRY, LOADED, SIDED, SLOPED, Friction
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.inertia import felt_inertia
@@ -93,7 +92,7 @@ def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]
     torque = active - p["spring"] * (q - p["spring_rest"]) + p["offset_torque"]
     place = {d.joint: k for k, d in enumerate(drives)}
     for law in robot.laws:
-        if law.name in CONTROLLER_LAWS or law.joint not in place:
+        if law.name in SPEED_LAWS or law.joint not in place:
             continue
         k = place[law.joint]
         context = LawContext({n: np.full(len(q), v) for n, v in law.values}, INSTANT_S)

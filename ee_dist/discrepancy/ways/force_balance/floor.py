@@ -17,7 +17,7 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.slow_noise import MEDIAN_OF_SQUARES, reading_step
 from ee_dist.discrepancy.ways.force_balance.balance import Balance
-from ee_dist.discrepancy.ways.force_balance.motion import torque_readings
+from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
 from ee_dist.discrepancy.ways.force_balance.noise import Prepared, roughness_of_noise, share_of_noise
 from ee_dist.discrepancy.ways.force_balance.places import Way, share_of_no_place
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
@@ -45,31 +45,35 @@ def floor_of(
     """What a model accounts for is no noise: the least of what the models as they are leave over, and of what the measured force
     shows and noise of the positions adds to it."""
     every, size = ready.processing.keep_every, ready.size
+    step_s = float(np.median(np.diff(trials[0].log.times_s)))
+    low_pass = ready.processing.filter_for(step_s)
+    passed = low_pass.cutoff_hz * step_s
     added = ready.noise.first / size**2
-    candidates = [([decimated(m.torque, every) / size for m in ready.motions], added)]
+    candidates = [([decimated(m.torque, every) / size for m in ready.motions], np.zeros_like(size))]
     both = [balance(model) for model, balance in zip(models, balances, strict=True)]
     left = [b[1] / size for b in both if b is not None]
     if len(left) == len(both):
-        candidates.append((left, np.zeros_like(size)))
-    found = np.array([_variance(series) / roughness_of_noise(every) + more for series, more in candidates])
+        # The noise of positions, differentiated twice, is rougher than white noise is: it is in this one, and known.
+        candidates.append((left, ready.noise.first_roughness / size**2))
+    white = roughness_of_noise(every, passed)
+    found = np.array([np.maximum(_variance(series) - less, 0.0) / white + added for series, less in candidates])
     most, chosen = found.min(axis=0), found.argmin(axis=0)
-    sure = added + _white(trials, models, ready)
-    step_s = float(np.median(np.diff(trials[0].log.times_s)))
+    sure = added + _white(trials, models, ready, passed)
     for k in np.flatnonzero(most > ALIKE**2 * sure):
-        series, more = candidates[chosen[k]]
+        series = candidates[chosen[k]][0]
         ways = [Way(m.position[:, k], m.speed[:, k], s[:, k]) for m, s in zip(ready.motions, series, strict=True)]
-        most[k] = (most[k] - more[k]) * share_of_no_place(ways, every, step_s) + more[k]
+        most[k] = (most[k] - added[k]) * share_of_no_place(ways, every, step_s, low_pass) + added[k]
     return Floor(most, np.where(most > ALIKE**2 * sure, sure, most))
 
 
-def _white(trials: Sequence[MeasuredTrial], models: Sequence[Robot], ready: Prepared) -> Array:
+def _white(trials: Sequence[MeasuredTrial], models: Sequence[Robot], ready: Prepared, passed: float) -> Array:
     """(M,) what thinning leaves of the noise from one reading to the next, and of the steps in which readings come."""
-    cut = slice(ready.processing.drop_rows, None)
-    read = [torque_readings(t.log, model) for t, model in zip(trials, models, strict=True)]
-    rows = [r[cut] for r in read if r is not None]
+    cut = ready.processing.settled
+    read = [motor_torques(t.log, model) for t, model in zip(trials, models, strict=True)]
+    rows = [cut(r) for r in read if r is not None]
     steps = np.mean([[reading_step(column) ** 2 / 12 for column in r.T] for r in rows], axis=0)
     noise = np.maximum(_variance(rows), steps)
-    return np.asarray(noise * share_of_noise(ready.processing.keep_every) / ready.size**2)
+    return np.asarray(noise * share_of_noise(ready.processing.keep_every, passed) / ready.size**2)
 
 
 def _variance(series: Sequence[Array]) -> Array:

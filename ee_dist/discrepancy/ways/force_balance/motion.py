@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.measurements.errors import MeasurementError
@@ -27,14 +28,17 @@ REST_NOISE = 3.0
 """Standard deviations of the readings' slope below which a joint rests."""
 REST_WINDOWS = 1
 """Lengths of that line that a rest lasts at least."""
+FEWEST = 10
+"""Rows of forces that a log must leave."""
 FINEST = 1e-5
 """Share of a joint's travel that no reading resolves."""
 
 
 @dataclass(frozen=True)
 class Processing:
-    """What is done to the measurements: low-pass of the positions (None: at a share ``passed`` of the rate, 50 Hz at 1 kHz),
-    rows dropped at the start (where the filter settles), one row kept of ``keep_every``, blocks of time judged apart."""
+    """What is done to the measurements: low-pass of positions and forces (None: at a share ``passed`` of the rate, 50 Hz at
+    1 kHz), rows dropped at either end (a filter that runs forward and backward settles at both), one row kept of
+    ``keep_every``, blocks of time judged apart."""
 
     low_pass: LowPass | None = None
     drop_rows: int = 49
@@ -54,12 +58,25 @@ class Processing:
     def filter_for(self, step_s: float) -> LowPass:
         return self.low_pass or LowPass(cutoff_hz=self.passed / step_s)
 
+    def settled(self, series: Array) -> Array:
+        """(T - 2 drop_rows, ...) of a series (T, ...): where filters have settled."""
+        return series[self.drop_rows : len(series) - self.drop_rows]
+
+    def fewest(self, kept: int) -> int:
+        """Rows that a log needs so that ``kept`` are kept of it."""
+        return 2 * self.drop_rows + kept * self.keep_every
+
+    def smooth(self, series: Array, step_s: float) -> Array:
+        """(T - 2 drop_rows, M) of readings (T, M)."""
+        low_pass = self.filter_for(step_s)
+        return self.settled(np.stack([low_pass(column, step_s) for column in series.T], axis=1))
+
     def differentiated(self, joints: Array, step_s: float) -> tuple[Array, Array, Array]:
-        """Positions, speeds and accelerations, (T, M) each, of readings (T, M), without the rows dropped."""
-        smooth, cut = self.filter_for(step_s), slice(self.drop_rows, None)
-        position = np.stack([smooth(q, step_s) for q in joints.T], axis=1)
+        """Positions, speeds and accelerations, (T - 2 drop_rows, M) each, of readings (T, M)."""
+        low_pass, cut = self.filter_for(step_s), self.settled
+        position = np.stack([low_pass(q, step_s) for q in joints.T], axis=1)
         speed = np.gradient(position, step_s, axis=0)
-        return position[cut], speed[cut], np.gradient(speed, step_s, axis=0)[cut]
+        return cut(position), cut(speed), cut(np.gradient(speed, step_s, axis=0))
 
 
 @dataclass(eq=False)
@@ -110,8 +127,9 @@ class Motion:
         return (shape, asked), known.last[1]
 
 
-def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
+def motion_of(trial: MeasuredTrial, robot: Robot, processing: Processing) -> Motion:
     """Raises MeasurementError where the log lacks positions or torques, or is too short."""
+    log = trial.log
     joints = positions_of(log, robot)
     torques = motor_torques(log, robot)
     if joints is None or torques is None:
@@ -123,16 +141,25 @@ def motion_of(log: SensorLog, robot: Robot, processing: Processing) -> Motion:
                 f"describe it as kind {MOTOR_TORQUE}"
             )
         raise MeasurementError(f"the log of {robot.name} has no {what}: a balance of forces needs both{hint}")
-    if len(log) < processing.drop_rows + 10 * processing.keep_every:
+    if len(log) < processing.fewest(FEWEST):
         raise MeasurementError(f"the log of {robot.name} has only {len(log)} rows: too few for the filters")
+    if log.torques is None and trial.commands_held is False:
+        torques = of_the_step_after(torques)
     dt = float(np.median(np.diff(log.times_s)))
-    cut = slice(processing.drop_rows, None)
+    # Forces go the way of the positions: what a filter takes from the motion, and not from them, would look like a missing force.
     return Motion(
         *processing.differentiated(joints, dt),
-        np.array(torques[cut]),
-        at_rest(joints, dt, processing)[cut],
-        None if log.external is None else np.array(log.external[cut]),
+        processing.smooth(torques, dt),
+        processing.settled(at_rest(joints, dt, processing)),
+        None if log.external is None else processing.smooth(log.external, dt),
     )
+
+
+def of_the_step_after(readings: Array) -> Array:
+    """(T, M) of readings (T, M) in our own simulations, where a sensor shows the step before its row: the force of the step that
+    begins at the row. It is this one that bends the motion there: engines take force, then speed, then position
+    (``discrepancy/steps.py``), so that second differences of positions about a row are its work alone."""
+    return np.concatenate([readings[1:], readings[-1:]])
 
 
 def at_rest(joints: Array, dt: float, processing: Processing) -> Mask:
@@ -152,19 +179,8 @@ def noise_of(readings: Array) -> Array:
 
 
 def motor_torques(log: SensorLog, robot: Robot) -> Array | None:
-    """(T, M) what the motors gave, before friction: the log's torques, else what sensors of motor torque read; None without.
-
-    A sensor shows the step before its reading. Differences of positions are of both steps about a row: so is the mean of a
-    reading and the next.
-    """
-    read = torque_readings(log, robot)
-    if log.torques is not None or read is None:
-        return read
-    return np.concatenate([(read[:-1] + read[1:]) / 2, read[-1:]])
-
-
-def torque_readings(log: SensorLog, robot: Robot) -> Array | None:
-    """(T, M) the same as it was read, row by row; None without."""
+    """(T, M) what the motors gave, before friction, row by row: the log's torques, else what sensors of motor torque read; None
+    without."""
     return _channels(log, robot, MOTOR_TORQUE) if log.torques is None else log.torques
 
 

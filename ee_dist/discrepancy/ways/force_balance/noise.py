@@ -51,33 +51,34 @@ def with_energy(left: Array, more: Array) -> Array:
 
 
 @lru_cache
-def _kept(every: int) -> tuple[float, float, float]:
-    """Of white noise of variance 1 of which every n-th row is kept: its variance, and products of neighbours and of those next to
-    them."""
+def _kept(every: int, passed: float) -> tuple[float, float, float]:
+    """Of white noise of variance 1 that went through a low-pass with its cut-off at this share of the rate, and of which
+    every n-th row is kept: its variance, and products of neighbours and of those next to them."""
     around = 200 * every
     found = np.zeros(3)
     for phase in range(every):
-        pulse = np.zeros((2 * around, 1))
+        pulse = np.zeros(2 * around)
         pulse[around + phase] = 1.0
-        answer = decimated(pulse, every)[:, 0]
+        answer = decimated(LowPass(passed)(pulse, 1.0)[:, None], every)[:, 0]
         found += [answer @ answer, answer[1:] @ answer[:-1], answer[2:] @ answer[:-2]]
     return float(found[0]), float(found[1]), float(found[2])
 
 
-def roughness_of_noise(every: int) -> float:
-    """Mean square of the second differences of white noise of which every n-th row is kept, over 6 times its variance: 1 where
-    all are kept. The filter before it leaves neighbours alike, and less rough than white noise is."""
-    own, next_, second = _kept(every)
+def roughness_of_noise(every: int, passed: float) -> float:
+    """Mean square of the second differences of such noise, over 6 times its variance: 1 for white noise. Filters leave neighbours
+    alike, and less rough than white noise is."""
+    own, next_, second = _kept(every, passed)
     return (6.0 * own - 8.0 * next_ + 2.0 * second) / (6.0 * own)
 
 
-def share_of_noise(every: int) -> float:
-    """Share of the variance of white noise that is left of it where every n-th row is kept."""
-    return _kept(every)[0]
+def share_of_noise(every: int, passed: float) -> float:
+    """Share of the variance of white noise that is left of it."""
+    return _kept(every, passed)[0]
 
 
 class MotionNoise:
-    """By drive: mean products (M, P, P) of the columns of a noise regressor, so that a model's noise is a quadratic form.
+    """By drive: mean products (M, P, P) of the columns of a noise regressor, so that a model's noise is a quadratic form; and
+    those of their second differences, for how rough it is.
 
     The columns are the inertial parameters, rotor inertia and viscous friction.
     """
@@ -89,25 +90,33 @@ class MotionNoise:
         motions: Sequence[Motion],
         processing: Processing,
     ) -> None:
-        sums, rows = 0.0, 0
+        sums, rough, rows = np.zeros(()), np.zeros(()), 0
         for k, (trial, model, motion) in enumerate(zip(trials, models, motions, strict=True)):
             noise = decimated(_added(trial, model, motion, processing, k), processing.keep_every)
-            sums = sums + np.einsum("tmp,tmq->mpq", noise, noise)
+            sums = sums + _products(noise)
+            rough = rough + _products(np.diff(noise, 2, axis=0)) / 6.0
             rows += len(noise)
-        self.products = np.asarray(sums) / rows
-        self.first = np.mean([self.variance(m) for m in models], axis=0)
+        self.products, self._rough = sums / rows, rough / rows
+        self.first = np.mean([self._of(self.products, m) for m in models], axis=0)
+        self.first_roughness = np.mean([self._of(self._rough, m) for m in models], axis=0)
 
     def variance(self, robot: Robot) -> Array:
         """(M,) of the force that noise makes at each drive, in terms of its measured force. A robot that has lost parts is told
         by its first model's noise."""
+        same = len(parameters(robot)) + MOVING == self.products.shape[1]
+        return self._of(self.products, robot) if same else self.first
+
+    def _of(self, products: Array, robot: Robot) -> Array:
         masses, found = parameters(robot), np.empty(len(robot.drives))
-        if len(masses) + MOVING != self.products.shape[1]:
-            return self.first
         for k, d in enumerate(robot.drives):
             column = np.array([*masses, d.rotor_inertia, d.viscous])
             through = max(d.strength * d.current_gain, 1e-3)
-            found[k] = column @ self.products[k] @ column / through**2
+            found[k] = column @ products[k] @ column / through**2
         return found
+
+
+def _products(columns: Array) -> Array:
+    return np.asarray(np.einsum("tmp,tmq->mpq", columns, columns))
 
 
 def _added(trial: MeasuredTrial, model: Robot, motion: Motion, processing: Processing, number: int) -> Array:
@@ -155,7 +164,7 @@ def prepared(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processin
 
 
 def _tried(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
-    motions = [motion_of(t.log, model, processing) for t, model in zip(trials, models, strict=True)]
+    motions = [motion_of(t, model, processing) for t, model in zip(trials, models, strict=True)]
     forces = np.concatenate([decimated(m.torque, processing.keep_every) for m in motions])
     size = np.sqrt(np.mean(forces**2, axis=0))
     if not size.all():
@@ -178,9 +187,9 @@ def _smoother(trials: Sequence[MeasuredTrial], models: Sequence[Robot], found: P
     for trial, model in zip(trials, models, strict=True):
         joints = positions_of(trial.log, model)
         assert joints is not None
-        if len(joints) < more.drop_rows + FEWEST_ROWS * more.keep_every:
+        if len(joints) < more.fewest(FEWEST_ROWS):
             return None
-        away = joints[more.drop_rows :] - more.differentiated(joints, dt)[0]
+        away = more.settled(joints) - more.differentiated(joints, dt)[0]
         if (np.sqrt(np.mean(away**2, axis=0)) > BENT * noise_of(joints)).any():
             return None
     return more

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.discrepancy.problem import Index, Mask
-from ee_dist.measurements.sampling import decimated
+from ee_dist.measurements.sampling import LowPass, decimated
 from ee_dist.trials.log import Array
 
 PIECES = 12
@@ -45,10 +45,11 @@ class Way:
     force: Array
 
 
-def share_of_no_place(ways: Sequence[Way], keep_every: int, step_s: float) -> float:
+def share_of_no_place(ways: Sequence[Way], keep_every: int, step_s: float, low_pass: LowPass) -> float:
     """Share of the quick part of a force, by its squared second differences, that waves over the position do not foretell.
-    ``step_s``: of the readings. Of long records only some rows are looked at."""
-    seen = _Seen(ways, keep_every, step_s)
+    ``step_s``: of the readings; ``low_pass``: that forces went through before some of their rows were kept. Of long records only
+    some rows are looked at."""
+    seen = _Seen(ways, keep_every, step_s, low_pass)
     left = seen.change.copy()
     if not len(seen.numbers):
         return 1.0
@@ -65,8 +66,8 @@ class _Seen:
     """Rows of all trials, one after the other: ``trial``, ``piece``, second difference ``change``, all (n,), and the
     ``numbers`` (W,) of waves for each rad or m that may show in them."""
 
-    def __init__(self, ways: Sequence[Way], keep_every: int, step_s: float) -> None:
-        self.ways, self.every = ways, keep_every
+    def __init__(self, ways: Sequence[Way], keep_every: int, step_s: float, low_pass: LowPass) -> None:
+        self.ways, self.every, self.step_s, self.low_pass = ways, keep_every, step_s, low_pass
         counts = [len(w.force) - 2 for w in ways]
         thinned = slice(None, None, max(1, -(-sum(counts) // MOST_ROWS)))
         self.trial: Index = np.repeat(np.arange(len(ways)), counts)[thinned]
@@ -98,9 +99,13 @@ class _Seen:
     def wave(self, number: float) -> Array:
         """(n, 4): the same of one wave, as the filter leaves it."""
         angles = [2 * np.pi * number * w.position for w in self.ways]
-        return self._turned(
-            [self._changed([decimated(f(a), self.every) for a in angles])[:, None] for f in (np.cos, np.sin)]
-        )[:, 0]
+        return self._turned([self._changed([self._thinned(f(a)) for a in angles])[:, None] for f in (np.cos, np.sin)])[
+            :, 0
+        ]
+
+    def _thinned(self, series: Array) -> Array:
+        """(R,) of a series (T,): what the filters leave."""
+        return decimated(self.low_pass(series, self.step_s), self.every)
 
     def _turned(self, both: Sequence[Array]) -> Array:
         sign = np.sign(self.speed)[:, None]

@@ -79,8 +79,8 @@ class ForceBalance(Problem):
         p, smooth = self.processing, self.processing.filter_for(float(np.median(np.diff(trials[0].log.times_s))))
         self.error_definition = (
             "root mean square of the force left over, in standard deviations of the measured force's noise "
-            f"({self.noise_share:.2%} of its root mean square); positions through a {smooth}, central differences, "
-            f"forces decimated by {p.keep_every}"
+            f"({self.noise_share:.2%} of its root mean square); positions and forces through a {smooth}, central "
+            f"differences, decimated by {p.keep_every}"
         )
 
     def natural(self, error: float) -> float:
