@@ -1,6 +1,7 @@
 """Feed damaged files to every reader for as long as told, within bounds of time and memory, and keep each that fails.
 
     python tools/fuzz.py --minutes 2 --seed 0 --table fuzz.md
+    python tools/fuzz.py --minutes 2 --seed 0 --guided --only CSV    # led by what is reached (tools/guided.py)
 
 Each reader runs in a process of its own, which is started again after a crash. A failure is an error that is none of ours, one
 that is not one line, a crash, a hang, or more than the bound of seconds or of memory for one file. The samples and the damage
@@ -30,9 +31,13 @@ FUZZ = Path(__file__).parents[1] / "tests" / "fuzz"
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(FUZZ))
 
-from damage import FOREIGN, damaged  # noqa: E402
-from samples import OURS, SAMPLES, Sample, place  # noqa: E402
-from samples import sample as sample_of  # noqa: E402
+import guided  # noqa: E402
+
+with guided.watched() if "--guided" in sys.argv else contextlib.nullcontext():  # before what reads is imported
+    from damage import FOREIGN, damaged
+    from kinds import OURS, Sample
+    from samples import SAMPLES, place
+    from samples import sample as sample_of
 
 SECONDS = 10.0
 """Of the processor, for one file; all samples are smaller than 200 kB."""
@@ -60,19 +65,24 @@ class Figures:
     longest_s: float = 0.0
     most_mb: float = 0.0
     failures: dict[str, str] = field(default_factory=dict)
+    led: int = 0
+    """Files that reached something new in the code, where that is looked at."""
 
     def row(self, name: str) -> str:
         return (
             f"| {name} | {self.files} | {self.cpu_s / 60:.1f} | {self.read} | {self.refused} | {self.longest_s:.2f} "
-            f"| {self.most_mb:.0f} | {len(self.failures)} |"
+            f"| {self.most_mb:.0f} | {len(self.failures)} |" + f" {self.led} |" * (self.led > 0)
         )
 
 
 class Labour:
     """One process that reads: what it reads now is in ``now``, its figures are in ``told``, before anything can go wrong."""
 
-    def __init__(self, name: str, seed: int, cpu_s: float, folder: Path, figures: Figures) -> None:
+    def __init__(
+        self, name: str, seed: int, cpu_s: float, folder: Path, figures: Figures, corpus: Path | None = None
+    ) -> None:
         self.name, self.seed, self.cpu_s, self.folder, self.figures = name, seed, cpu_s, folder, figures
+        self.corpus = corpus
 
     def run(self) -> None:
         warnings.simplefilter("ignore")
@@ -89,30 +99,55 @@ class Labour:
         signal.signal(signal.SIGPROF, _late)
         most = status_mb("VmSize") * 2**20 + GIGABYTES * 2**30
         resource.setrlimit(resource.RLIMIT_AS, (int(most), int(most)))
-        start, begun, first, base = time.process_time(), self.figures.cpu_s, self.figures.files, peak_mb()
-        while self.figures.cpu_s < self.cpu_s and len(self.figures.failures) < MOST:
+        self.started, self.begun, self.first, self.base = (
+            time.process_time(), self.figures.cpu_s, self.figures.files, peak_mb(),
+        )  # fmt: skip
+        if self.corpus is not None:
+            files = [sample.files[name] for name in sample.targets()]
+            guided.lead(
+                files,
+                self.corpus,
+                self.seed,
+                lambda rng, c: _hurt(rng, c, others),
+                lambda k, c: self.led(sample, path, k, c),
+            )
+        while not self.over:
             rng = Random(f"{self.seed} {self.name} {self.figures.files}")
             target = rng.choice(sample.targets())
-            content = rng.choice(FOREIGN) if rng.random() < 0.02 else damaged(rng, sample.files[target], others)
-            (self.folder / "now").write_bytes(json.dumps([self.figures.files, target]).encode() + b"\n" + content)
-            (self.folder / "files" / target).write_bytes(content)
-            trouble, seconds = self.read(sample, path)
-            mb = peak_mb()
-            if self.figures.files < first + SETTLED:
-                base = mb
-            elif mb - base > MEGABYTES and not trouble:
-                trouble = f"memory: {mb - base:.0f} MB"
-            (self.folder / "files" / target).write_bytes(sample.files[target])
-            self.figures.most_mb = max(self.figures.most_mb, mb - base)
-            self.figures.longest_s = max(self.figures.longest_s, seconds)
-            self.figures.files += 1
-            self.figures.cpu_s = begun + time.process_time() - start
-            if trouble and (key := _said(trouble)) not in self.figures.failures:
-                self.figures.failures[key] = trouble
-                keep(self.name, self.figures.files - 1, target, content)
-            if trouble or self.figures.files % TELL_EVERY == 0:
-                self.tell()
+            self.take(sample, path, target, _hurt(rng, sample.files[target], others))
         self.tell()
+
+    @property
+    def over(self) -> bool:
+        return self.figures.cpu_s >= self.cpu_s or len(self.figures.failures) >= MOST
+
+    def led(self, sample: Sample, path: Path, which: int, content: bytes) -> None:
+        """One file that libFuzzer made; ends the process where it is time."""
+        self.take(sample, path, sample.targets()[which], content)
+        if self.over:
+            self.tell()
+            os._exit(0)
+
+    def take(self, sample: Sample, path: Path, target: str, content: bytes) -> None:
+        """One file in the place of ``target``, and what became of it."""
+        (self.folder / "now").write_bytes(json.dumps([self.figures.files, target]).encode() + b"\n" + content)
+        (self.folder / "files" / target).write_bytes(content)
+        trouble, seconds = self.read(sample, path)
+        mb = peak_mb()
+        if self.figures.files < self.first + SETTLED:
+            self.base = mb
+        elif mb - self.base > MEGABYTES and not trouble:
+            trouble = f"memory: {mb - self.base:.0f} MB"
+        (self.folder / "files" / target).write_bytes(sample.files[target])
+        self.figures.most_mb = max(self.figures.most_mb, mb - self.base)
+        self.figures.longest_s = max(self.figures.longest_s, seconds)
+        self.figures.files += 1
+        self.figures.cpu_s = self.begun + time.process_time() - self.started
+        if trouble and (key := _said(trouble)) not in self.figures.failures:
+            self.figures.failures[key] = trouble
+            keep(self.name, self.figures.files - 1, target, content)
+        if trouble or self.figures.files % TELL_EVERY == 0:
+            self.tell()
 
     def read(self, sample: Sample, path: Path) -> tuple[str, float]:
         """What went wrong, if anything, and the seconds that it took."""
@@ -135,6 +170,10 @@ class Labour:
         part = self.folder / "told.part"
         part.write_text(json.dumps(asdict(self.figures)))
         part.replace(self.folder / "told")
+
+
+def _hurt(rng: Random, content: bytes, others: tuple[bytes, ...]) -> bytes:
+    return rng.choice(FOREIGN) if rng.random() < 0.02 else damaged(rng, content, others)
 
 
 def peak_mb() -> float:
@@ -165,13 +204,13 @@ def keep(name: str, number: int, target: str, content: bytes) -> None:
     (folder / f"{number}__{target.replace('/', '+')}").write_bytes(content)
 
 
-def fuzz(name: str, seed: int, minutes: float) -> Figures:
-    """One reader for so long, its process started again where it crashed or hung."""
+def fuzz(name: str, seed: int, minutes: float, corpus: Path | None = None) -> Figures:
+    """One reader for so long, its process started again where it crashed or hung. ``corpus``: led by what is reached."""
     figures = Figures()
     while figures.cpu_s < 60 * minutes and len(figures.failures) < MOST:
         with tempfile.TemporaryDirectory() as place:
             folder, now = Path(place), Path(place) / "now"
-            labour = Labour(name, seed, 60 * minutes, folder, figures)
+            labour = Labour(name, seed, 60 * minutes, folder, figures, corpus)
             process = multiprocessing.get_context("fork").Process(target=labour.run)
             process.start()
             seen, since = -1, time.monotonic()
@@ -199,12 +238,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--minutes", type=float, default=1.0, help="of the processor, for each reader")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--guided", action="store_true", help="led by what a file reaches in the code; needs atheris")
     parser.add_argument("--only", nargs="*", default=[], choices=[*SAMPLES, []], help="names of readers")
     parser.add_argument("--table", type=Path, help="append the figures there, as Markdown")
     given = parser.parse_args()
     bad = 0
     for name in given.only or SAMPLES:
-        figures = fuzz(name, given.seed, given.minutes)
+        with tempfile.TemporaryDirectory() as place:
+            corpus = Path(place) / "corpus" if given.guided else None
+            figures = fuzz(name, given.seed, given.minutes, corpus)
+            figures.led = len(list(corpus.iterdir())) if corpus is not None else 0
         print(figures.row(name), *(f"  {k}\n{v}" for k, v in figures.failures.items()), sep="\n", flush=True)
         if given.table:
             with given.table.open("a", encoding="utf-8") as file:

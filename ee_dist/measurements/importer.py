@@ -29,7 +29,7 @@ from ee_dist.measurements.suspicious import (
     torque_suspicion,
     unit_suspicion,
 )
-from ee_dist.measurements.table import Recorded
+from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.trials import trials_of
 from ee_dist.measurements.units import TURN, UNITS, factor
@@ -179,13 +179,13 @@ class _Import:
         """The column on the grid, in ``unit``; ``step_like`` values are held, others joined by lines."""
         own = self.clocks[column.table]
         raw = own.table.numbers(column.column, gaps=column.gaps == "interpolate")
-        if not quiet and not column.signed_bits:
-            self.report.suspicious += suspicions(f"{name} ({column.column})", raw[np.isfinite(raw)], _turn(column))
         size = factor(column.unit, unit, f"{self.where}: {name}")
-        if np.isnan(raw).any():
-            good = np.flatnonzero(np.isfinite(raw))
-            if len(good) < 2:
-                raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty")
+        good = np.flatnonzero(np.isfinite(raw))
+        if len(good) < min(len(raw), 2):
+            raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty")
+        if not quiet and not column.signed_bits:
+            self.report.suspicious += suspicions(f"{name} ({column.column})", raw[good], _turn(column))
+        if len(good) < len(raw):
             how = "in which the last value holds" if step_like else "filled by straight lines"
             self.report.done.append(f"{name}: {len(raw) - len(good)} empty cells {how}")
             raw = carried(raw) if step_like else np.interp(np.arange(len(raw)), good, raw[good])
@@ -378,7 +378,7 @@ class _Import:
                     f"{seen.max():g}); if these are trials of their own, add 'split: {{column: {value.name}}}'"
                 )
             entry = float(seen[0])
-        if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not math.isfinite(entry):
+        if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not abs(entry) <= LARGEST:
             raise MeasurementError(
                 f"{self.report.file}: {value.place} entry {quoted(value.name)} for {effect} is {quoted(entry)}; "
                 "expected a number"

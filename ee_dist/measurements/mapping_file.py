@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping as Dictionary
 from dataclasses import fields
 from pathlib import Path
@@ -18,6 +17,8 @@ from ee_dist.robots.untrusted import UntrustedError, yaml_of
 
 LONGEST_S = 60.0
 """Leads and means beyond this are a slip of the unit."""
+MOST = 1e12
+"""Of a number that a person states: beyond it sums of squares leave what numbers can hold."""
 READ_ALIKE = ("unit", "sign", "scale", "offset", "signed_bits")
 """What a column has that stands for two channels, at both."""
 UNKNOWN = "???"
@@ -281,8 +282,8 @@ def _made(kind: Any, value: Any, where: str) -> Any:
 def _number(value: Any, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise MeasurementError(f"{where}: cannot be {shown(value)}; expected a number")
-    if not math.isfinite(value):
-        raise MeasurementError(f"{where}: {value}; expected a finite number")
+    if not abs(value) <= MOST:
+        raise MeasurementError(f"{where}: {shown(value)}; expected a finite number of at most {MOST:g}")
     return float(value)
 
 

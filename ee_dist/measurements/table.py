@@ -25,6 +25,8 @@ _SWITCH = {"true": 1.0, "false": 0.0, "": np.nan}
 _BETWEEN = re.compile(r"[,;\s]+")
 WIDEST = 256
 """Cells that hold more numbers than this are pictures or the like, not channels."""
+LARGEST = 1e30
+"""What is measured is smaller, in whatever unit; times in ns since 1970 are."""
 
 
 @dataclass
@@ -111,9 +113,11 @@ class Table:
                 f"{self}: row {self.line(int(bad[0]))}, column {quoted(column)} is {known}; "
                 "fill the gap, drop the row, or set 'gaps: interpolate' for the column"
             )
-        if np.isinf(out).any():
-            row = int(np.flatnonzero(np.isinf(out))[0])
-            raise MeasurementError(f"{self}: row {self.line(row)}, column {quoted(column)} is infinite; drop the row")
+        beyond = np.flatnonzero(np.abs(out) > LARGEST)
+        if len(beyond):
+            row = int(beyond[0])
+            said = "infinite" if np.isinf(out[row]) else f"{out[row]:g}, which nothing measures"
+            raise MeasurementError(f"{self}: row {self.line(row)}, column {quoted(column)} is {said}; drop the row")
         return out
 
     def texts(self, column: str) -> list[str]:

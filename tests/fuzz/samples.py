@@ -6,7 +6,6 @@ import functools
 import json
 import socket
 import sys
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,71 +17,38 @@ import yaml
 # Under every import mode of pytest.
 sys.path.insert(0, str(Path(__file__).parents[1] / "measurements"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tasks"))
+sys.path.insert(0, str(Path(__file__).parent))
 
 import measurement_files as written
 import one_job
 import wrong_files
-from hydra.errors import HydraException
-from omegaconf.errors import OmegaConfBaseException
+from kinds import COMMAND_LINE, OURS, Files, Sample, made
+from proposed_samples import PROPOSED
 
-from ee_dist.effects.catalogue import EffectError, from_dict
+from ee_dist.effects.catalogue import from_dict
 from ee_dist.effects.model_file import read_model
-from ee_dist.engines.contract import EngineError
-from ee_dist.engines.drivers import Commands, DriverError
+from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.journal import Journal
 from ee_dist.evaluation.socket_body import SocketBody
 from ee_dist.evaluation.stepped import SteppedRobot
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.readers import read as read_table
-from ee_dist.recording.errors import RecordingError
 from ee_dist.recording.reader import read_logs, read_run
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.recording.repair import repair
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.describe import load_robot
-from ee_dist.robots.model import RobotError
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.serial import robot_to_dict
 from ee_dist.tasks import compose, explained, measurements, reveal, study
-from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.config import Config
 from ee_dist.tasks.results.story import _asked
 from ee_dist.tasks.seal import opened, sealed
 from ee_dist.tasks.unfinished import FOLDER, Unfinished, finished
-from ee_dist.trials.excitation import ExcitationError
-from ee_dist.trials.hardware import HardwareError, Limits
-from ee_dist.trials.log import LogError
+from ee_dist.trials.hardware import Limits
 
-OURS = (
-    RobotError, EffectError, RecordingError, LogError, ConfigError, HardwareError, EngineError, DriverError, ExcitationError,
-)  # fmt: skip
-"""What a reader may raise for a file that is not as it should be: each is told in one line."""
-COMMAND_LINE = (*OURS, HydraException, OmegaConfBaseException)
-"""Of the command line the program makes one line out of these too."""
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
-Files = dict[str, bytes]
 ROWS = 20
-
-
-@dataclass(frozen=True)
-class Sample:
-    """``files`` by their path in a folder, of which ``main`` is what ``readers`` get; ``damaged`` those that may be damaged."""
-
-    files: Files
-    main: str
-    readers: tuple[Callable[[Path], Any], ...]
-    damaged: tuple[str, ...] = ()
-    allowed: tuple[type[BaseException], ...] = OURS
-
-    def targets(self) -> tuple[str, ...]:
-        return self.damaged or (self.main,)
-
-
-def made(write: Callable[[Path], Any]) -> Files:
-    """All files that ``write`` makes in a folder."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        write(folder)
-        return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 # -- what reads them ---------------------------------------------------------------------------------------------------
@@ -371,6 +337,7 @@ SAMPLES: dict[str, Callable[[], Sample]] = {
     "robot behind a socket": lambda: _one("answers", TALK, answered),
     "command line": lambda: _one("words", _lines(WORDS), command_line, allowed=COMMAND_LINE),
     "command line of a trial": lambda: _one("words", _lines(MORE_WORDS), command_line, allowed=COMMAND_LINE),
+    **PROPOSED,
 }
 """By name of what is read."""
 

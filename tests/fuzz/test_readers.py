@@ -17,7 +17,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from damage import FOREIGN, damaged
-from samples import OURS, SAMPLES, place
+from kinds import OURS
+from samples import SAMPLES, place
 from samples import sample as sample_of
 
 COUNT = int(os.environ.get("EE_DIST_FUZZ", "8"))

@@ -157,7 +157,8 @@ def test_what_was_refused_passes_once_it_is_said_to_be_sure(tmp_path: Path) -> N
     [
         (1114, 1e12, "row 1116, column 't': time jumps by 1e[+]12 s"),
         (500, 1e12, "row 503, column 't': time runs backwards"),
-        (0, -1e300, "row 3, column 't': time jumps by"),
+        (0, -1e25, "row 3, column 't': time jumps by"),
+        (0, -1e300, "row 2, column 't' is -1e[+]300, which nothing measures; drop the row"),
         (1114, "inf", "row 1116, column 't' is inf"),
     ],
 )

@@ -119,7 +119,7 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
 
     head: dict[str, Any] = {}
     recorded = gathered(files, head, hints)
-    if len(recorded.tables) > 1:
+    if len(recorded.tables) > 1 and "tables" not in head:  # what is named as a file is to be named at each channel
         shown = [t for t in recorded.tables if len(t) > 20]
         recorded = replace(recorded, tables=tuple(shown) or recorded.tables)
     proposal = propose(recorded, robot, hints)

@@ -13,7 +13,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.model import LIKELY, Choice, Proposal
 from ee_dist.measurements.proposal.words import tokens
 from ee_dist.measurements.readers import read
-from ee_dist.measurements.table import Recorded
+from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.robots.model import Robot
 
 HEADER, COLUMN = "header", "column"
@@ -21,6 +21,8 @@ GAINS = {"kp": "position_gain", "pgain": "position_gain", "kd": "speed_gain", "d
 """The effect that a controller's gain of a trial is told as, by what the number is called."""
 FILLING = frozenset(["gain", "gains", "position", "joint", "motor", "servo", "drive", "controller", "pid", "value"])
 """Words that say no more than that it is a gain of a drive."""
+LEAST, MOST = 1e-9, 1e9
+"""What a gain may be, in whatever unit a file states it."""
 LEAST_ROWS = 20
 SHOWN = 4
 
@@ -48,7 +50,7 @@ def add_stated(proposal: Proposal, files: Sequence[Path], first: Recorded, robot
                     f"{name} is {values[0]:g} in all trials: the description's gain is taken for it; say it as settings of the "
                     "mapping where it is not, or where other files, with other gains, are to be compared with the same model"
                 )
-        elif found is None or min(values) <= 0:
+        elif found is None or not LEAST <= min(values) <= max(values) <= MOST:
             differ.append(f"{name} ({_listed(values)})")
         else:
             proposal.choices.append(_setting(found, place, name, values))
@@ -74,7 +76,8 @@ def _numbers(recorded: Recorded) -> Iterator[tuple[tuple[str, str], float]]:
     """((place, name), value) of each number that is the same all through a trial."""
     for table in recorded.tables:
         for name, value in table.header.items():
-            if isinstance(value, (int, float)) and not isinstance(value, bool):
+            # A whole number of JSON may have hundreds of digits.
+            if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST:
                 yield (HEADER, name), float(value)
     if len(recorded.tables) != 1 or len(recorded.tables[0]) < LEAST_ROWS:
         return

@@ -93,7 +93,7 @@ class View:
         """The block on an even grid of its own median step, and no longer than it need be."""
         times = self.times[block.table.name].seconds
         step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
-        count = min(int((times[-1] - times[0]) / step) + 1, signals.MOST_ROWS) if step > 0 else 0
+        count = int(min(float(times[-1] - times[0]) / step + 1, signals.MOST_ROWS)) if step > 0 else 0
         at = times[0] + step * np.arange(max(count, 1))
         return replace(block, values=np.stack([np.interp(at, times, c) for c in block.values.T], axis=1))
 
