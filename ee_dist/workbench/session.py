@@ -90,11 +90,11 @@ class Session:
         """Run it on the session's thread, after what runs there."""
         return self._one.submit(act, *arguments)
 
-    def attempt(self, act: Callable[..., T], *arguments: Any) -> Future[T | None]:
+    def attempt(self, act: Callable[..., T | None], *arguments: Any) -> Future[T | None]:
         """The same, where what goes wrong is told to the user, in a line, and gives None."""
         return self.do(self._attempted, act, *arguments)
 
-    def _attempted(self, act: Callable[..., T], *arguments: Any) -> T | None:
+    def _attempted(self, act: Callable[..., T | None], *arguments: Any) -> T | None:
         try:
             return act(*arguments)
         except (*USER_ERRORS, BusyError, NothingOpenError) as error:
@@ -199,15 +199,20 @@ class Session:
         """``effect@target`` onto the model, at neutral or with values. Raises EffectError."""
         self.change(self.bench.added(parse(self._open().robot, name), values))
 
-    def switch(self, index: int, on: bool) -> None:
-        self.change(self.bench.switched(index, on))
+    def switch(self, index: int, on: bool, name: str) -> None:
+        """``name`` of the effect that is meant, here and below: one that is no longer there is let be."""
+        if self.bench.has(index, name):
+            self.change(self.bench.switched(index, on))
 
-    def remove(self, index: int) -> None:
-        self.change(self.bench.without(index))
+    def remove(self, index: int, name: str) -> None:
+        if self.bench.has(index, name):
+            self.change(self.bench.without(index))
 
-    def slide(self, index: int, values: Mapping[str, float], place: Place) -> Glance:
+    def slide(self, index: int, values: Mapping[str, float], place: Place, name: str) -> Glance | None:
         """A slider is moved, and the hand is still on it: what is to be drawn. Moves of one slider in a row, also by many
         strokes of a key, are undone as one step."""
+        if not self.bench.has(index, name):
+            return None
         bench = self.bench.valued(index, values)
         if self._slid != (index, frozenset(values)):
             self._remember()

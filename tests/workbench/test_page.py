@@ -18,10 +18,13 @@ import pytest
 
 pytest.importorskip("nicegui", reason="needs the extra 'workbench'")
 
+from nicegui.version import __version__
 from page_driver import Bench, Person
 
 from ee_dist.viewing.browser import BrowserError, chromium
+from ee_dist.workbench.drawing import plotly
 from ee_dist.workbench.guard import Guard
+from ee_dist.workbench.pages.slider import Slider
 
 try:
     chromium()
@@ -38,6 +41,22 @@ CURVE = (
 )
 ROWS = 500
 FOUND = "document.body.innerText.includes('Ranked, with 95 % intervals')"
+
+
+SLIDER = """(async () => {
+  const { data, methods } = (await import('%s')).default, told = [];
+  const slider = { ...data.call({ begin: 0 }), ...methods, $emit: (...what) => told.push(what) };
+  const rest = () => new Promise((done) => setTimeout(done, 200));
+  for (const value of [1, 2, 3]) slider.move(value);
+  slider.show(9);
+  const held = slider.value;
+  slider.release(3);
+  slider.show(9);
+  const free = slider.value;
+  await rest();
+  slider.move(4); slider.move(5);
+  await rest();
+  return [told, held, free]; })()"""
 
 
 def refused(address: str, **headers: str) -> int:
@@ -65,6 +84,32 @@ def pointed_at(person: Person) -> None:
     assert bytes(asked[:15]) == b"\x32" + bytes([len(asked) - 2]) + b"\x12\x0a\x0a\x08run_time\x1a" and asked[16] == 8
     assert 300.5 < sum((b & 127) << (7 * k) for k, b in enumerate(asked[17:])) / 1e9 < 301.5
     person.evaluate("document.querySelector('iframe.robot').remove()")
+
+
+def slid(person: Person, bench: Bench) -> None:
+    """A slider tells where it is let go of last, whatever it has not told by then, and stays under the hand."""
+    found = person.evaluate(SLIDER % f"{bench.address}_nicegui/{__version__}/components/{Slider.component.key}")
+    told = [["moved", 1], ["released", 3], ["moved", 4], ["moved", 5]]
+    assert found == [told, 3, 9]
+
+
+def left_in_the_middle(bench: Bench, person: Person) -> None:
+    """A page that is closed with a hand on a slider: what it had set is compared, and every page shows it."""
+    before = person.wait(NUMBER)
+    with Person() as other:
+        other.go(bench.address)
+        other.wait(NUMBER)
+        other.open("Add")
+        x, y, width, height = other.wait(
+            "(() => { const r = [...document.querySelectorAll('.q-slider')].map((e) => e.getBoundingClientRect())"
+            ".find((r) => r.width); return r && [r.x, r.y, r.width, r.height]; })()"
+        )
+        other.mouse("mousePressed", x + 0.8 * width, y + height / 2)
+        other.mouse("mouseMoved", x + 0.9 * width, y + height / 2)
+        other.wait(f"{NUMBER} > {1.1 * before}")
+        assert person.evaluate(NUMBER) == before
+    person.wait(f"{NUMBER} > {1.1 * before}")
+    person.wait(f"{CURVE}.data[0].x.length === {ROWS}")
 
 
 def test_the_story(recording: Path, tmp_path: Path) -> None:
@@ -103,6 +148,10 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
             person.wait(f"{CURVE}.data[0].x.length === {ROWS}")  # every row again, once the hand rests
             person.click("Undo", "button")
             person.wait(f"Math.abs({NUMBER} - {good}) < 0.02")
+            slid(person, bench)
+            left_in_the_middle(bench, person)
+            person.click("Undo", "button")
+            person.wait(f"Math.abs({NUMBER} - {good}) < 0.02")
             person.open("Watch")
             person.waits_for("by hand: coulomb friction at servo")
             person.open("Keep")
@@ -122,6 +171,7 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
             assert person.complaints() == ()
             assert person.asked_outside(bench.address) == []
         assert refused(bench.address) == 200
+        assert refused(f"{bench.address}plotly.js", **{"If-None-Match": plotly().tag}) == 304
         assert refused(bench.address, Origin="http://evil.example") == 403
         assert refused(bench.address, Host="evil.example") == 403
         assert refused(f"{bench.address}files/model.yaml") == 200
