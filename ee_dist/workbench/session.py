@@ -39,6 +39,8 @@ MODEL_FILE = "model.yaml"
 MOST_UNDONE = 200
 AT_ONCE = 3
 """Trials up to which all are simulated at each move of a slider."""
+MANY_ROWS = 50_000
+"""Rows of all trials from which their simulation takes half a second and more: not while a hand is on a slider."""
 
 
 class NothingOpenError(ValueError):
@@ -48,7 +50,7 @@ class NothingOpenError(ValueError):
 @dataclass(frozen=True, eq=False)
 class Glance:
     """What a hand on a slider sees: one channel of one trial, and errors as the sight of the moment weighs them. ``error``:
-    over all trials; None where these are so many that it is asked for when the hand rests."""
+    over all trials; None where these are so many that it is asked for when the hand pauses, or rests (``Session.at_pauses``)."""
 
     terms: Hypothesis
     series: Series | None
@@ -222,11 +224,16 @@ class Session:
 
     def glance(self, place: Place) -> Glance:
         sight, terms = self._sight(), self.bench.terms
-        few = len(sight.problem.trials) <= AT_ONCE
+        few = len(sight.problem.trials) <= AT_ONCE and self.at_pauses
         # Few trials are one batch of the engine, and take hardly longer than one.
         residual = sight.whole_residual(terms) if few else sight.trial_residual(terms, place[0])
         whole = error(residual) if few else None
         return Glance(terms, sight.series(terms, place), residual, sight.trial_error(residual, place[0]), whole)
+
+    @property
+    def at_pauses(self) -> bool:
+        """Whether the error over all trials is there soon enough to be looked at while a hand is still on a slider."""
+        return sum(len(t.log) for t in self._sight().measured.trials) < MANY_ROWS
 
     def glance_whole(self) -> float:
         """The error over all trials, as the sight of the moment weighs it."""

@@ -97,6 +97,19 @@ def test_what_a_page_tells_late_or_twice_changes_nothing_else(session):
     assert (session.bench, session.undoable) == before
 
 
+def test_what_takes_long_is_not_simulated_while_a_hand_is_on_a_slider(session, monkeypatch):
+    session.add(FRICTION)
+    place = session.place()
+    assert session.at_pauses and session.slide(0, {"torque_nm": 0.05}, place, FRICTION).error is not None
+    monkeypatch.setattr("ee_dist.workbench.session.MANY_ROWS", 100)
+    moved = session.slide(0, {"torque_nm": 0.1}, place, FRICTION)
+    assert not session.at_pauses and moved.error is None and moved.trial_error > 0
+    session.release()
+    assert session.seen.terms == session.bench.terms and session.seen.found.error == pytest.approx(
+        moved.trial_error, rel=0.2
+    )
+
+
 def test_values_keep_to_their_bounds_and_names_to_the_catalogue(session):
     session.add(FRICTION)
     with pytest.raises(ValueError, match="lies outside"):

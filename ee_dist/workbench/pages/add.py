@@ -187,14 +187,14 @@ class AddView(View):
         await asyncio.sleep(TOLD_S)
         (k, _, name, value), glance = told
         session, error = self.session, glance.error
-        if error is None and not self.moves.newer:
+        if error is None and session.at_pauses and not self.moves.newer:
             error = await of(session.attempt(session.glance_whole))
         if not session.gripped or session.bench.terms != glance.terms:
             return
         number = self._sliders.get((k, name), (None, None))[1]
         if number is not None:
             number.set_value(float(f"{value:.5g}"))
-        if error is not None:
+        if error is not None or not session.at_pauses:
             self.page.show_error(error)
 
     async def _release(self, last: Move) -> None:

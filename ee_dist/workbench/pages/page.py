@@ -22,6 +22,8 @@ from ee_dist.workbench.session import Session
 from ee_dist.workbench.sight import Place
 from ee_dist.workbench.worker import BusyError
 
+UNKNOWN = "looking ..."
+"""Where the error is not known yet."""
 MOVES = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
 IDLE_S = 4.0
 """After which the process of the long verbs is started: not while a page needs the processor to come up."""
@@ -149,17 +151,23 @@ class Page:
             )
         if seen is not None and sight is not None and topics & {"seen", "opened"}:
             self.show_error(seen.found.error)
+        elif seen is not None and sight is not None and seen.terms != session.bench.terms and not session.at_pauses:
+            self.show_error(None)  # it takes a while to compare what stands there now
         elif seen is None:
-            self.number.set_text("" if measured is None or session.notice else "looking ...")
+            self.number.set_text("" if measured is None or session.notice else UNKNOWN)
             self.gauge.set_content("")
         self.notice.set_text(session.notice)
         self.notice.set_visibility(bool(session.notice))
         self._tick()
 
-    def show_error(self, error: float) -> None:
-        """The error of the moment, while a hand is on a slider or after it."""
+    def show_error(self, error: float | None) -> None:
+        """The error of the moment, while a hand is on a slider or after it; None until it is known."""
         sight, seen, ladder = self.session.sight, self.session.seen, self.session.bench.ladder
         if sight is None or seen is None:
+            return
+        if error is None:
+            self.number.set_text(UNKNOWN)
+            self.gauge.set_content("")
             return
         floor, problem = seen.found.noise_floor, sight.problem
         told = problem.told(error) if error < float("inf") else "cannot be simulated"
