@@ -23,10 +23,10 @@ from ee_dist.effects.model_file import read_model
 from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.errors import defect
-from ee_dist.tasks.results.commands import command, setting
 from ee_dist.tasks.terminal import terminal
 from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
 from ee_dist.workbench import saved
+from ee_dist.workbench.commands import going_on
 from ee_dist.workbench.drawing import ADDRESS, plotly
 from ee_dist.workbench.guard import Guard, is_loopback
 from ee_dist.workbench.pages.opening import show_session
@@ -130,9 +130,7 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
         session.close()
         sock.close()
         if session.measured is not None:
-            console.print(
-                f"To go on: {command(['task=workbench', setting('log', out)])}", highlight=False, soft_wrap=True
-            )
+            console.print(f"To go on: {going_on(out)}", highlight=False, soft_wrap=True)
 
 
 def _files(app: FastAPI, folder: Path) -> None:

@@ -131,6 +131,9 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
                 start = person.wait(NUMBER)
                 person.wait("document.querySelectorAll('.js-plotly-plot .main-svg').length > 4")
                 pointed_at(person)
+                # Nothing that was measured is offered to be sent elsewhere.
+                buttons = person.evaluate("[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title)")
+                assert set(buttons) == {"Zoom", "Pan", "Box Select", "Zoom in", "Zoom out", "Reset axes"}
                 person.open("Explain")
                 # Where the machine is slower with a page than with a search, it has ended already.
                 person.wait(f"document.body.innerText.includes('s so far') || {FOUND}")
