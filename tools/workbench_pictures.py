@@ -32,7 +32,7 @@ JUDGED = (
 )
 """Whether the ladder has a step that was judged."""
 COLOURS = 96
-GAP, SHEET = 24, 1800
+GAP, SHEET = 16, 1900
 """Pixels between the views of a sheet, and of a sheet from side to side at most."""
 BY_HAND = 5
 """Strokes of a key by which the slider is moved for the picture of it."""
@@ -101,15 +101,20 @@ def _all(bench: Bench, person: Person, out: Path) -> None:
 
 
 def _sheet(out: Path, width: int, folder: Path) -> None:
-    """All views of a width side by side."""
-    pictures = [Image.open(out / f"{view.lower()}_{width}.png").convert("RGB") for view in VIEWS]
-    step = width + GAP
-    sheet = Image.new("RGB", (step * len(pictures) - GAP, max(p.height for p in pictures)), "#8899aa")
-    for k, picture in enumerate(pictures):
-        sheet.paste(picture, (k * step, 0))
-    share = min(0.5, SHEET / sheet.width)
-    small = sheet.resize((round(share * sheet.width), round(share * sheet.height)), Image.Resampling.LANCZOS)
-    _saved(small, folder / f"workbench_at_{width}.png")
+    """All views of a width, half as large, as many side by side as have room."""
+    pictures = []
+    for view in VIEWS:
+        with Image.open(out / f"{view.lower()}_{width}.png") as picture:
+            pictures.append(picture.convert("RGB").reduce(2))
+    step = width // 2 + GAP
+    count = min(len(VIEWS), (SHEET + GAP) // step)
+    lines = [pictures[k : k + count] for k in range(0, len(pictures), count)]
+    tall = [max(p.height for p in line) + GAP for line in lines]
+    sheet = Image.new("RGB", (step * count - GAP, sum(tall) - GAP), "#ffffff")
+    for k, line in enumerate(lines):
+        for j, picture in enumerate(line):
+            sheet.paste(picture, (j * step, sum(tall[:k])))
+    _saved(sheet.quantize(dither=Image.Dither.NONE), folder / f"workbench_at_{width}.png")
 
 
 def _tour(person: Person, folder: Path) -> None:
@@ -144,12 +149,12 @@ def _shot(person: Person, folder: Path, name: str) -> None:
     path = folder / f"workbench_{name}.png"
     person.picture(path)
     with Image.open(path) as picture:
-        _saved(picture.convert("RGB"), path)
+        small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    _saved(small, path)
 
 
 def _saved(picture: Image.Image, path: Path) -> None:
-    """In few colours."""
-    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    picture.save(path, optimize=True)
     print(path.name, f"{path.stat().st_size / 1e3:.0f} kB")
 
 

@@ -336,7 +336,7 @@ class Session:
     def keep(self) -> Path:
         """The model as a file of its own, which task=compare then looks at. Raises BusyError, OSError."""
         if self.worker.progress is not None:
-            raise BusyError("a search is under way: keep the model when it is done, or cancel it")
+            raise BusyError(BUSY)
         measured, terms = self._open(), self.bench.terms
         path = self.folder / MODEL_FILE
         notes = [f"{s.name}: error {s.error_fit:.4g}" for s in self.bench.ladder]
