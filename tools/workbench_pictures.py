@@ -1,10 +1,12 @@
 """Pictures of the workbench, for looking at and for docs:
 
     python tools/workbench_pictures.py OUT measured=LOG [engine=mujoco ...]
+    python tools/workbench_pictures.py OUT measured=LOG sheets=docs/figures
     python tools/workbench_pictures.py OUT measured=LOG tour=docs/figures
 
-Explains, adds the best and fits it, and takes each view at 1280, 900 and 400 pixels, in light and in dark; with ``tour`` the six
-pictures of the README instead, in few colours so that they stay small. Needs Chromium.
+Explains, adds the best and fits it, and takes each view at 1280, 900 and 400 pixels, in light and in dark; with ``sheets`` all
+views of a width side by side, too; with ``tour`` the six pictures of the README instead, in few colours so that they stay small.
+Needs Chromium.
 """
 
 from __future__ import annotations
@@ -30,6 +32,8 @@ JUDGED = (
 )
 """Whether the ladder has a step that was judged."""
 COLOURS = 96
+GAP, SHEET = 16, 1900
+"""Pixels between the views of a sheet, and of a sheet from side to side at most."""
 BY_HAND = 5
 """Strokes of a key by which the slider is moved for the picture of it."""
 
@@ -37,8 +41,8 @@ BY_HAND = 5
 def main() -> None:
     out = Path(sys.argv[1]).absolute()
     out.mkdir(parents=True, exist_ok=True)
-    words = [a for a in sys.argv[2:] if not a.startswith("tour=")]
-    tour = next((Path(a.removeprefix("tour=")).absolute() for a in sys.argv[2:] if a.startswith("tour=")), None)
+    words = [a for a in sys.argv[2:] if not a.startswith(("tour=", "sheets="))]
+    tour, sheets = _folder("tour"), _folder("sheets")
     arguments = [a if "=" not in a else _absolute(a) for a in words]
     with Bench(out, *arguments, "hydra.run.dir=bench", "overwrite=true") as bench, Person() as person:
         person.go(bench.address)
@@ -47,7 +51,14 @@ def main() -> None:
             _tour(person, tour)
         else:
             _all(bench, person, out)
+            for width in WIDTHS if sheets else ():
+                _sheet(out, width, sheets)
         print("complaints of the console:", person.complaints() or "none")
+
+
+def _folder(key: str) -> Path | None:
+    """That an argument of the command line names."""
+    return next((Path(a.removeprefix(f"{key}=")).absolute() for a in sys.argv[2:] if a.startswith(f"{key}=")), None)
 
 
 def _explained(person: Person) -> None:
@@ -89,6 +100,23 @@ def _all(bench: Bench, person: Person, out: Path) -> None:
                 print(name, f"wider than the window by {over} px" if over > 0 else "")
 
 
+def _sheet(out: Path, width: int, folder: Path) -> None:
+    """All views of a width, half as large, as many side by side as have room."""
+    pictures = []
+    for view in VIEWS:
+        with Image.open(out / f"{view.lower()}_{width}.png") as picture:
+            pictures.append(picture.convert("RGB").reduce(2))
+    step = width // 2 + GAP
+    count = min(len(VIEWS), (SHEET + GAP) // step)
+    lines = [pictures[k : k + count] for k in range(0, len(pictures), count)]
+    tall = [max(p.height for p in line) + GAP for line in lines]
+    sheet = Image.new("RGB", (step * count - GAP, sum(tall) - GAP), "#ffffff")
+    for k, line in enumerate(lines):
+        for j, picture in enumerate(line):
+            sheet.paste(picture, (j * step, sum(tall[:k])))
+    _saved(sheet.quantize(dither=Image.Dither.NONE), folder / f"workbench_at_{width}.png")
+
+
 def _tour(person: Person, folder: Path) -> None:
     """What a person does in the first minute."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -122,7 +150,11 @@ def _shot(person: Person, folder: Path, name: str) -> None:
     person.picture(path)
     with Image.open(path) as picture:
         small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-    small.save(path, optimize=True)
+    _saved(small, path)
+
+
+def _saved(picture: Image.Image, path: Path) -> None:
+    picture.save(path, optimize=True)
     print(path.name, f"{path.stat().st_size / 1e3:.0f} kB")
 
 

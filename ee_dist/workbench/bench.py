@@ -63,6 +63,14 @@ class Bench:
     def names(self) -> frozenset[str]:
         return frozenset(e.name for e in self.entries)
 
+    def has(self, index: int, name: str) -> bool:
+        """Whether an effect is still where a page had it: another page, or a click before, may have removed one."""
+        return index < len(self.entries) and self.entries[index].name == name
+
+    def value(self, index: int, name: str, parameter: str) -> float | None:
+        """Of an effect that is still where a page had it."""
+        return dict(self.entries[index].term.values)[parameter] if self.has(index, name) else None
+
     def added(self, candidate: Candidate, values: Mapping[str, float] | None = None) -> Bench:
         """With one more effect, at the values given or at neutral, where it does nothing yet. The same effect at the same
         place is not added twice: its values are set, and it is switched on."""

@@ -27,7 +27,12 @@ DIGITS = 6
 TIME_DIGITS = 6
 """Of a second, so that every row of a fast log has its own place."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
-_CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["toImage", "lasso2d", "autoScale2d"]}
+_CONFIG = {
+    "displaylogo": False,
+    "modeBarButtonsToRemove": ["toImage", "lasso2d", "autoScale2d"],
+    # Plotly would offer to send what was measured to its makers' servers.
+    "showSendToCloud": False,
+}
 _STILL = {"displayModeBar": False}
 """Of charts in which there is nothing to zoom into."""
 

@@ -12,7 +12,7 @@ from ee_dist.effects.model_file import write_model
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results.commands import asked as words
-from ee_dist.tasks.results.commands import command
+from ee_dist.tasks.results.commands import command, setting
 
 CALIBRATION = ".calibration.yaml"
 
@@ -37,3 +37,8 @@ def asked(config: Config, measured: Measurements, model: Path | str | None) -> C
 def line(task: str, config: Config, by: str, *more: str) -> str:
     """The command line of a verb, as a shell takes it."""
     return command(words(task, config, by, *more))
+
+
+def going_on(folder: Path) -> str:
+    """The command line that goes on with the session kept in a folder."""
+    return command(["task=workbench", setting("log", folder)])

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
-from fastapi import FastAPI, HTTPException, Response
+from fastapi import FastAPI, HTTPException, Request, Response
 from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.responses import FileResponse
 from nicegui import app as toolkit
@@ -23,12 +23,13 @@ from ee_dist.effects.model_file import read_model
 from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.errors import defect
-from ee_dist.tasks.results.commands import command, setting
 from ee_dist.tasks.terminal import terminal
 from ee_dist.viewing.web_viewer import WebViewerError, web_viewer
 from ee_dist.workbench import saved
+from ee_dist.workbench.commands import going_on
+from ee_dist.workbench.drawing import ADDRESS, plotly
 from ee_dist.workbench.guard import Guard, is_loopback
-from ee_dist.workbench.pages.page import show_session
+from ee_dist.workbench.pages.opening import show_session
 from ee_dist.workbench.session import Session
 
 TITLE = "ee_dist workbench"
@@ -129,13 +130,11 @@ def serve(config: Config, by: str, host: str, port: int, show: bool, out: Path) 
         session.close()
         sock.close()
         if session.measured is not None:
-            console.print(
-                f"To go on: {command(['task=workbench', setting('log', out)])}", highlight=False, soft_wrap=True
-            )
+            console.print(f"To go on: {going_on(out)}", highlight=False, soft_wrap=True)
 
 
 def _files(app: FastAPI, folder: Path) -> None:
-    """What is served besides the page: files of the session's folder, and the viewer."""
+    """What is served besides the page: what its charts are drawn with, files of the session's folder, and the viewer."""
     root = folder.resolve()
 
     @app.get("/files/{path:path}")
@@ -144,6 +143,14 @@ def _files(app: FastAPI, folder: Path) -> None:
         if not found.is_relative_to(root) or not found.is_file() or any(p.startswith(".") for p in Path(path).parts):
             raise HTTPException(404)
         return FileResponse(found)
+
+    @app.get(ADDRESS)
+    def library(request: Request) -> Response:
+        script = plotly()
+        headers = {"cache-control": "no-cache", "etag": script.tag}
+        if request.headers.get("if-none-match") == script.tag:
+            return Response(status_code=304, headers=headers)
+        return Response(script.content, media_type="text/javascript", headers=headers)
 
     @app.get("/viewer/{name:path}")
     def viewer(name: str) -> Response:

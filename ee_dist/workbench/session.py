@@ -39,6 +39,8 @@ MODEL_FILE = "model.yaml"
 MOST_UNDONE = 200
 AT_ONCE = 3
 """Trials up to which all are simulated at each move of a slider."""
+MANY_ROWS = 50_000
+"""Rows of all trials from which their simulation takes half a second and more: not while a hand is on a slider."""
 
 
 class NothingOpenError(ValueError):
@@ -48,7 +50,7 @@ class NothingOpenError(ValueError):
 @dataclass(frozen=True, eq=False)
 class Glance:
     """What a hand on a slider sees: one channel of one trial, and errors as the sight of the moment weighs them. ``error``:
-    over all trials; None where these are so many that it is asked for when the hand rests."""
+    over all trials; None where these are so many that it is asked for when the hand pauses, or rests (``Session.at_pauses``)."""
 
     terms: Hypothesis
     series: Series | None
@@ -90,11 +92,11 @@ class Session:
         """Run it on the session's thread, after what runs there."""
         return self._one.submit(act, *arguments)
 
-    def attempt(self, act: Callable[..., T], *arguments: Any) -> Future[T | None]:
+    def attempt(self, act: Callable[..., T | None], *arguments: Any) -> Future[T | None]:
         """The same, where what goes wrong is told to the user, in a line, and gives None."""
         return self.do(self._attempted, act, *arguments)
 
-    def _attempted(self, act: Callable[..., T], *arguments: Any) -> T | None:
+    def _attempted(self, act: Callable[..., T | None], *arguments: Any) -> T | None:
         try:
             return act(*arguments)
         except (*USER_ERRORS, BusyError, NothingOpenError) as error:
@@ -199,15 +201,20 @@ class Session:
         """``effect@target`` onto the model, at neutral or with values. Raises EffectError."""
         self.change(self.bench.added(parse(self._open().robot, name), values))
 
-    def switch(self, index: int, on: bool) -> None:
-        self.change(self.bench.switched(index, on))
+    def switch(self, index: int, on: bool, name: str) -> None:
+        """``name`` of the effect that is meant, here and below: one that is no longer there is let be."""
+        if self.bench.has(index, name):
+            self.change(self.bench.switched(index, on))
 
-    def remove(self, index: int) -> None:
-        self.change(self.bench.without(index))
+    def remove(self, index: int, name: str) -> None:
+        if self.bench.has(index, name):
+            self.change(self.bench.without(index))
 
-    def slide(self, index: int, values: Mapping[str, float], place: Place) -> Glance:
+    def slide(self, index: int, values: Mapping[str, float], place: Place, name: str) -> Glance | None:
         """A slider is moved, and the hand is still on it: what is to be drawn. Moves of one slider in a row, also by many
         strokes of a key, are undone as one step."""
+        if not self.bench.has(index, name):
+            return None
         bench = self.bench.valued(index, values)
         if self._slid != (index, frozenset(values)):
             self._remember()
@@ -217,11 +224,16 @@ class Session:
 
     def glance(self, place: Place) -> Glance:
         sight, terms = self._sight(), self.bench.terms
-        few = len(sight.problem.trials) <= AT_ONCE
+        few = len(sight.problem.trials) <= AT_ONCE and self.at_pauses
         # Few trials are one batch of the engine, and take hardly longer than one.
         residual = sight.whole_residual(terms) if few else sight.trial_residual(terms, place[0])
         whole = error(residual) if few else None
         return Glance(terms, sight.series(terms, place), residual, sight.trial_error(residual, place[0]), whole)
+
+    @property
+    def at_pauses(self) -> bool:
+        """Whether the error over all trials is there soon enough to be looked at while a hand is still on a slider."""
+        return sum(len(t.log) for t in self._sight().measured.trials) < MANY_ROWS
 
     def glance_whole(self) -> float:
         """The error over all trials, as the sight of the moment weighs it."""
@@ -324,7 +336,7 @@ class Session:
     def keep(self) -> Path:
         """The model as a file of its own, which task=compare then looks at. Raises BusyError, OSError."""
         if self.worker.progress is not None:
-            raise BusyError("a search is under way: keep the model when it is done, or cancel it")
+            raise BusyError(BUSY)
         measured, terms = self._open(), self.bench.terms
         path = self.folder / MODEL_FILE
         notes = [f"{s.name}: error {s.error_fit:.4g}" for s in self.bench.ladder]

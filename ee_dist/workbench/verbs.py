@@ -13,12 +13,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ee_dist.discrepancy.search.search import Progress
 from ee_dist.effects.plugins import load_plugin
 from ee_dist.tasks.config import Config
-from ee_dist.workbench import results
+from ee_dist.workbench.results import Compared, Explained, Improved
+
+if TYPE_CHECKING:
+    from ee_dist.discrepancy.search.search import Progress
 
 EXPLAIN, ADD, FIT, AUTO, COMPARE = "explain", "add", "fit", "auto", "compare"
 
@@ -99,44 +101,48 @@ def done(request: Request, told: Progress) -> Any:
     return _VERBS[request.verb](request, told)
 
 
-def _explain(request: Request, told: Progress) -> results.Explained:
+def _explain(request: Request, told: Progress) -> Explained:
     from ee_dist.tasks import explain
+    from ee_dist.workbench import findings
 
     problem, found, account = explain.run(
         request.config, explain.Options(by=request.by, rerun=False), request.folder, told
     )
-    return results.of_explanation(problem, found, account, request.folder)
+    return findings.of_explanation(problem, found, account, request.folder)
 
 
-def _add(request: Request, told: Progress) -> results.Improved:
+def _add(request: Request, told: Progress) -> Improved:
     """Judged alone on held-out data first, then added and fitted whatever the judgement is: the page shows both."""
     from ee_dist.tasks import explain, improve
+    from ee_dist.workbench import findings
 
     alone = explain.Options(by=request.by, only=[request.effect], rerun=False)
     folder = request.folder
     _, judged, _ = explain.run(request.config, alone, folder / "judged", _within("judging: ", told))
     asked = replace(request.config, effect=request.effect)
     _, found, account = improve.run(asked, improve.Options(by=request.by, rerun=False), folder, told)
-    return results.of_improvement(found, account, folder, len(found.ladder) - 1, results.refusal(judged.candidates))
+    return findings.of_improvement(found, account, folder, len(found.ladder) - 1, findings.refusal(judged.candidates))
 
 
-def _fit(request: Request, told: Progress) -> results.Improved:
+def _fit(request: Request, told: Progress) -> Improved:
     from ee_dist.tasks import improve
+    from ee_dist.workbench import findings
 
     asked = replace(request.config, effect="none")
     _, found, account = improve.run(asked, improve.Options(by=request.by, rerun=False), request.folder, told)
-    return results.of_improvement(found, account, request.folder)
+    return findings.of_improvement(found, account, request.folder)
 
 
-def _auto(request: Request, told: Progress) -> results.Improved:
+def _auto(request: Request, told: Progress) -> Improved:
     from ee_dist.tasks import improve
+    from ee_dist.workbench import findings
 
     asked = replace(request.config, effect="auto")
     _, found, account = improve.run(asked, improve.Options(by=request.by, rerun=False), request.folder, told)
-    return results.of_improvement(found, account, request.folder, 2 if request.own else 1)
+    return findings.of_improvement(found, account, request.folder, 2 if request.own else 1)
 
 
-def _compare(request: Request, told: Progress) -> results.Compared:
+def _compare(request: Request, told: Progress) -> Compared:
     from ee_dist.tasks import compare
     from ee_dist.viewing.stream import RUN_TIME, starts_of
 
@@ -146,9 +152,7 @@ def _compare(request: Request, told: Progress) -> results.Compared:
     begins = starts_of([(k, [m.log]) for k, m in enumerate(problem.measured)])
     starts = tuple(b - float(m.log.times_s[0]) for b, m in zip(begins, problem.measured, strict=True))
     told_error = problem.told(found.error)
-    return results.Compared(
-        found.error, found.noise_floor, told_error, account.headline, request.folder, starts, RUN_TIME
-    )
+    return Compared(found.error, found.noise_floor, told_error, account.headline, request.folder, starts, RUN_TIME)
 
 
 def _within(prefix: str, told: Progress) -> Progress:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import json
 import os
 import re
@@ -10,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -88,6 +90,16 @@ class Person(HeadlessBrowser):
         self._ask("Page.navigate", {"url": address}, page=True)
         self._until("Page.loadEventFired")
 
+    @contextlib.contextmanager
+    def unwatched(self) -> Iterator[None]:
+        """As whoever has no tools for programmers open: while these listen, a browser finds out for every error within a script
+        where in it that is, and reads all of the script again."""
+        self._ask("Runtime.disable", page=True)
+        try:
+            yield
+        finally:
+            self._ask("Runtime.enable", page=True)
+
     def wait(self, expression: str, seconds: float = PATIENCE_S) -> Any:
         """Until an expression on the page is true; what it came to."""
         deadline = time.monotonic() + seconds
@@ -112,9 +124,10 @@ class Person(HeadlessBrowser):
               || [...e.querySelectorAll('*')].concat(e).some((n) => n.children.length === 0 && n.textContent.trim() === wanted));
             const found = [...document.querySelectorAll({json.dumps(role)})].find(fits);
             if (!found) return null; found.scrollIntoView({{block: 'center'}}); const r = found.getBoundingClientRect();
-            return [r.x + r.width / 2, r.y + r.height / 2]; }})()"""
-        # Charts that are drawn meanwhile move it: not before it stays where it is.
-        place = self.wait(find)
+            const [x, y] = [r.x + r.width / 2, r.y + r.height / 2];
+            return found.contains(document.elementFromPoint(x, y)) && [x, y]; }})()"""
+        # Charts that are drawn move it, and a list that opens begins below the window: not before it is in sight, and stays.
+        place = None
         while (now := self.wait(find)) != place:
             place = now
             time.sleep(0.1)

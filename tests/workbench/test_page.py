@@ -18,10 +18,13 @@ import pytest
 
 pytest.importorskip("nicegui", reason="needs the extra 'workbench'")
 
+from nicegui.version import __version__
 from page_driver import Bench, Person
 
 from ee_dist.viewing.browser import BrowserError, chromium
+from ee_dist.workbench.drawing import plotly
 from ee_dist.workbench.guard import Guard
+from ee_dist.workbench.pages.slider import Slider
 
 try:
     chromium()
@@ -38,6 +41,22 @@ CURVE = (
 )
 ROWS = 500
 FOUND = "document.body.innerText.includes('Ranked, with 95 % intervals')"
+
+
+SLIDER = """(async () => {
+  const { data, methods } = (await import('%s')).default, told = [];
+  const slider = { ...data.call({ begin: 0 }), ...methods, $emit: (...what) => told.push(what) };
+  const rest = () => new Promise((done) => setTimeout(done, 200));
+  for (const value of [1, 2, 3]) slider.move(value);
+  slider.show(9);
+  const held = slider.value;
+  slider.release(3);
+  slider.show(9);
+  const free = slider.value;
+  await rest();
+  slider.move(4); slider.move(5);
+  await rest();
+  return [told, held, free]; })()"""
 
 
 def refused(address: str, **headers: str) -> int:
@@ -67,6 +86,32 @@ def pointed_at(person: Person) -> None:
     person.evaluate("document.querySelector('iframe.robot').remove()")
 
 
+def slid(person: Person, bench: Bench) -> None:
+    """A slider tells where it is let go of last, whatever it has not told by then, and stays under the hand."""
+    found = person.evaluate(SLIDER % f"{bench.address}_nicegui/{__version__}/components/{Slider.component.key}")
+    told = [["moved", 1], ["released", 3], ["moved", 4], ["moved", 5]]
+    assert found == [told, 3, 9]
+
+
+def left_in_the_middle(bench: Bench, person: Person) -> None:
+    """A page that is closed with a hand on a slider: what it had set is compared, and every page shows it."""
+    before = person.wait(NUMBER)
+    with Person() as other:
+        other.go(bench.address)
+        other.wait(NUMBER)
+        other.open("Add")
+        x, y, width, height = other.wait(
+            "(() => { const r = [...document.querySelectorAll('.q-slider')].map((e) => e.getBoundingClientRect())"
+            ".find((r) => r.width); return r && [r.x, r.y, r.width, r.height]; })()"
+        )
+        other.mouse("mousePressed", x + 0.8 * width, y + height / 2)
+        other.mouse("mouseMoved", x + 0.9 * width, y + height / 2)
+        other.wait(f"{NUMBER} > {1.1 * before}")
+        assert person.evaluate(NUMBER) == before
+    person.wait(f"{NUMBER} > {1.1 * before}")
+    person.wait(f"{CURVE}.data[0].x.length === {ROWS}")
+
+
 def test_the_story(recording: Path, tmp_path: Path) -> None:
     with Bench(tmp_path, f"measured={recording}", "engine=mujoco", "hydra.run.dir=bench") as bench:
         with Person() as person:
@@ -86,6 +131,9 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
                 start = person.wait(NUMBER)
                 person.wait("document.querySelectorAll('.js-plotly-plot .main-svg').length > 4")
                 pointed_at(person)
+                # Nothing that was measured is offered to be sent elsewhere.
+                buttons = person.evaluate("[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title)")
+                assert set(buttons) == {"Zoom", "Pan", "Box Select", "Zoom in", "Zoom out", "Reset axes"}
                 person.open("Explain")
                 # Where the machine is slower with a page than with a search, it has ended already.
                 person.wait(f"document.body.innerText.includes('s so far') || {FOUND}")
@@ -101,6 +149,10 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
                 person.key("PageUp", 33)
             person.wait(f"{NUMBER} > {1.1 * good}")
             person.wait(f"{CURVE}.data[0].x.length === {ROWS}")  # every row again, once the hand rests
+            person.click("Undo", "button")
+            person.wait(f"Math.abs({NUMBER} - {good}) < 0.02")
+            slid(person, bench)
+            left_in_the_middle(bench, person)
             person.click("Undo", "button")
             person.wait(f"Math.abs({NUMBER} - {good}) < 0.02")
             person.open("Watch")
@@ -119,9 +171,12 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
             # The curves stay in sight beside the sliders, and cover nothing before the page is scrolled.
             person.open("Add")
             person.wait(UNCOVERED)
+            # What it would say if the workbench went away.
+            assert "task=workbench log=bench goes on with it" in person.evaluate("document.querySelector('#popup').textContent")
             assert person.complaints() == ()
             assert person.asked_outside(bench.address) == []
         assert refused(bench.address) == 200
+        assert refused(f"{bench.address}plotly.js", **{"If-None-Match": plotly().tag}) == 304
         assert refused(bench.address, Origin="http://evil.example") == 403
         assert refused(bench.address, Host="evil.example") == 403
         assert refused(f"{bench.address}files/model.yaml") == 200

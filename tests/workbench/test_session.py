@@ -48,13 +48,13 @@ def test_a_slider_lowers_the_error_and_undo_brings_it_back(session):
     session.add(FRICTION)
     assert session.seen.found.error == pytest.approx(start)  # at neutral it does nothing
     place = session.place()
-    errors = [session.slide(0, {"torque_nm": v}, place).error for v in (0.03, 0.08, 0.13)]
+    errors = [session.slide(0, {"torque_nm": v}, place, FRICTION).error for v in (0.03, 0.08, 0.13)]
     assert errors == sorted(errors, reverse=True) and errors[-1] < 0.3 * start
     assert session.seen.found.error == pytest.approx(start)  # nothing is settled while the hand is on it
     session.release()
     assert session.seen.found.error < 0.3 * start
     assert [s.error_heldout is None for s in session.bench.ladder] == [False, True]
-    session.slide(0, {"torque_nm": 0.12}, place)
+    session.slide(0, {"torque_nm": 0.12}, place, FRICTION)
     session.release()  # the same slider again: one step back with the moves before
     assert session.undo() and dict(session.bench.entries[0].term.values) == {"torque_nm": 0.0}
     assert session.undo() and session.bench.entries == () and session.seen.found.error == pytest.approx(start)
@@ -72,20 +72,48 @@ def test_terms_go_off_and_on(session):
     bare = session.seen.found.error
     session.add(FRICTION, {"torque_nm": 0.13})
     good = session.seen.found.error
-    session.switch(0, False)
+    session.switch(0, False, FRICTION)
     assert session.seen.found.error == pytest.approx(bare) and session.bench.terms == ()
-    session.switch(0, True)
+    session.switch(0, True, FRICTION)
     assert session.seen.found.error == good
     session.add(FRICTION, {"torque_nm": 0.1})
     assert len(session.bench.entries) == 1 and session.bench.entries[0].origin == HAND
-    session.remove(0)
+    session.remove(0, FRICTION)
     assert session.bench.entries == ()
+
+
+def test_what_a_page_tells_late_or_twice_changes_nothing_else(session):
+    session.add(FRICTION, {"torque_nm": 0.09})
+    session.add("viscous_friction@servo", {"damping_nm_s_rad": 0.001})
+    place = session.place()
+    session.remove(0, FRICTION)
+    session.remove(0, FRICTION)  # the same click once more, or that of another tab
+    session.switch(0, False, FRICTION)
+    assert session.slide(0, {"torque_nm": 0.1}, place, FRICTION) is None
+    assert [(e.name, e.on) for e in session.bench.entries] == [("viscous_friction@servo", True)]
+    assert session.bench.value(0, FRICTION, "torque_nm") is None and not session.gripped
+    before = session.bench, session.undoable
+    session.release()  # of a hand that held nothing
+    assert (session.bench, session.undoable) == before
+
+
+def test_what_takes_long_is_not_simulated_while_a_hand_is_on_a_slider(session, monkeypatch):
+    session.add(FRICTION)
+    place = session.place()
+    assert session.at_pauses and session.slide(0, {"torque_nm": 0.05}, place, FRICTION).error is not None
+    monkeypatch.setattr("ee_dist.workbench.session.MANY_ROWS", 100)
+    moved = session.slide(0, {"torque_nm": 0.1}, place, FRICTION)
+    assert not session.at_pauses and moved.error is None and moved.trial_error > 0
+    session.release()
+    assert session.seen.terms == session.bench.terms and session.seen.found.error == pytest.approx(
+        moved.trial_error, rel=0.2
+    )
 
 
 def test_values_keep_to_their_bounds_and_names_to_the_catalogue(session):
     session.add(FRICTION)
     with pytest.raises(ValueError, match="lies outside"):
-        session.slide(0, {"torque_nm": 99.0}, session.place())
+        session.slide(0, {"torque_nm": 99.0}, session.place(), FRICTION)
     with pytest.raises(EffectError, match="did you mean"):
         session.add("coulomb_frction@servo")
     assert session.attempt(session.add, "gremlin@servo").result() is None
@@ -143,7 +171,7 @@ def test_a_search_that_is_killed_or_cancelled_loses_nothing(session):
 def test_a_session_goes_on_where_it_ended(session, tmp_path):
     session.add(FRICTION, {"torque_nm": 0.09})
     session.add("viscous_friction@servo", {"damping_nm_s_rad": 0.001})
-    session.switch(1, False)
+    session.switch(1, False, "viscous_friction@servo")
     session.close()
     kept = saved.read(session.folder)
     again = Session(session.config, kept.by, tmp_path / "again")
@@ -189,7 +217,7 @@ def test_an_effect_that_is_on_the_bench_is_judged_beside_the_model_without_it(se
     assert asked[0].config.model is None and not asked[0].own
     fitted = term("coulomb_friction", "servo", torque_nm=0.135)
     step = Step("coulomb friction at servo", 0.9, 0.9, "windows")
-    session.switch(0, False)
+    session.switch(0, False, FRICTION)
     session._after(asked[0], Ended(Improved("", (), (fitted,), (), (step,), session.folder)))
     assert [(e.on, dict(e.term.values)) for e in session.bench.entries] == [(True, {"torque_nm": 0.135})]
 
@@ -203,7 +231,7 @@ def test_what_was_kept_stays_when_an_empty_bench_is_exported_or_shown(session, m
     kept, bare = (Compared(*[None] * len(fields(Compared))) for _ in range(2))
     session._after(asked[-1], Ended(kept))
     assert session.kept is kept and session.shown is kept
-    session.remove(0)
+    session.remove(0, FRICTION)
     session.export("yaml")
     assert path.read_text() == text and "effects: []" not in text
     session.start(verbs.COMPARE)

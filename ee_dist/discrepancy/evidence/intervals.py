@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri, stdtrit  # scipy.stats, which calls them, takes a second to load
+import scipy  # which loads its parts when they are used; scipy.stats, which calls these functions, takes a second
 
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.problem import Mask, Problem
@@ -94,7 +94,7 @@ def half_widths(problem: Problem, fit: Fit, level: float = LEVEL) -> Array:
         return np.zeros(0)
     inverse, weak = _inverse(fit)
     excess = max(1.0, fit.energy / max(1, int(fit.mask.sum()) - len(fit.u)))
-    by_noise = np.sqrt(np.maximum(np.diag(inverse), 0.0) * excess) * ndtri(0.5 + level / 2)
+    by_noise = np.sqrt(np.maximum(np.diag(inverse), 0.0) * excess) * scipy.special.ndtri(0.5 + level / 2)
     piece = problem.trial_of if len(problem.trials) >= FEW else problem.segment_of
     piece = np.unique(piece[fit.mask], return_inverse=True)[1]
     count = int(piece.max()) + 1
@@ -103,7 +103,7 @@ def half_widths(problem: Problem, fit: Fit, level: float = LEVEL) -> Array:
     pull = fit.slopes * fit.residual[fit.mask][:, None]
     scores = np.stack([np.bincount(piece, weights=column, minlength=count) for column in pull.T], axis=1)
     spread = inverse @ (scores.T @ scores) @ inverse * count / (count - 1)
-    by_pieces = np.sqrt(np.maximum(np.diag(spread), 0.0)) * stdtrit(count - 1, 0.5 + level / 2)
+    by_pieces = np.sqrt(np.maximum(np.diag(spread), 0.0)) * scipy.special.stdtrit(count - 1, 0.5 + level / 2)
     return np.where(weak, np.inf, np.maximum(by_noise, by_pieces))
 
 
@@ -126,7 +126,7 @@ def half_widths_by_rest(problem: Problem, fit: Fit, left: Sequence[Leftover], le
     squares = np.array(moved).reshape(len(moved), len(fit.u))
     total = squares.sum(axis=0)
     pieces = np.divide(total**2, (squares**2).sum(axis=0), out=np.ones(len(fit.u)), where=total > 0)
-    return np.asarray(np.sqrt(total) * stdtrit(pieces, 0.5 + level / 2))
+    return np.asarray(np.sqrt(total) * scipy.special.stdtrit(pieces, 0.5 + level / 2))
 
 
 def _inverse(fit: Fit) -> tuple[Array, Mask]:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, ndtri  # scipy.stats, which calls them, takes a second to load
+import scipy  # which loads its parts when they are used; scipy.stats, which calls these functions, takes a second
 
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.trials.log import Array
@@ -102,4 +102,4 @@ def _rarity(total: float, each: float, count: float) -> float:
     """How rare a sum of ``count`` squares of noise of mean ``each`` is: the normal deviate that is as rare."""
     if each <= 0 or count < 1:
         return math.inf
-    return -float(ndtri(chdtrc(count, total / each)))
+    return -float(scipy.special.ndtri(scipy.special.chdtrc(count, total / each)))

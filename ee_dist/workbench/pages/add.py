@@ -23,7 +23,8 @@ SKETCHED = 300
 """Points of a curve while the hand is on a slider; all of them when it rests."""
 TOLD_S = 0.1
 """By which numbers come after the curves of a move: what is sent with these is drawn before them."""
-Move = tuple[int, str, float]
+Move = tuple[int, str, str, float]
+"""The place of an entry and its name, the name of a value, and the value."""
 Told = tuple[Move, Glance]
 
 
@@ -45,7 +46,7 @@ class AddView(View):
                 heading("Effects in the model")
                 with ui.row().classes("w-full items-center no-wrap"):
                     self.choice = (
-                        ui.select({}, with_input=True, clearable=True, label="Add an effect: type to search")
+                        ui.select(self._options(), with_input=True, clearable=True, label="Add an effect: type to search")
                         .classes("w-full").props("dense outlined use-input").mark("choice")
                     )  # fmt: skip
                     ui.button("Add", on_click=self._add).props("no-caps").mark("add")
@@ -66,8 +67,8 @@ class AddView(View):
         sight, seen = session.sight, session.seen
         if sight is None or seen is None or place is None:
             return
-        if not self.choice.options or topics & {"opened", "explained"}:
-            self.choice.set_options(self._options())
+        if topics & {"opened", "explained"} and self.choice.options != (names := self._options()):
+            self.choice.set_options(names)  # what is being typed there would be forgotten for the same ones
         self._draw_entries()
         self.where.set_text(
             f"{plain(sight.problem.channels[place[1]])}, {sight.problem.trials[place[0]]}; choose another in Compare."
@@ -125,14 +126,14 @@ class AddView(View):
         with ui.element("div").classes("entry w-full" + ("" if entry.on else " off")):
             with ui.row().classes("w-full items-center no-wrap"):
                 ui.switch(
-                    value=entry.on, on_change=lambda e: self.page.act(self.session.switch, k, bool(e.value))
+                    value=entry.on, on_change=lambda e: self.page.act(self.session.switch, k, bool(e.value), entry.name)
                 ).props(f'dense aria-label="{escape(placed(entry.name))} on or off"').mark(f"switch-{k}")
                 ui.label(placed(entry.name)).style("font-weight:600; flex:1 1 auto")
                 quiet(entry.origin)
                 ui.button(icon="straighten", on_click=lambda: self.page.begin(verbs.ADD, entry.name)).props(
                     'flat dense aria-label="judge and fit"'
                 ).tooltip("Judge it on held-out data, and fit it").mark(f"judge-{k}")
-                ui.button(icon="delete", on_click=lambda: self.page.act(self.session.remove, k)).props(
+                ui.button(icon="delete", on_click=lambda: self.page.act(self.session.remove, k, entry.name)).props(
                     'flat dense aria-label="remove"'
                 ).mark(f"remove-{k}")
             for p, (low, high) in zip(entry.candidate.effect.parameters, entry.candidate.bounds, strict=True):
@@ -149,8 +150,8 @@ class AddView(View):
             with ui.column().classes("gap-0").style("flex: 1 1 auto; min-width: 0"):
                 quiet(f"{said}{shown}, {low:.3g} to {high:.3g}")
                 slider = Slider(low, high, (high - low) / STEPS, value,
-                                lambda e: self.moves.ask((k, name, float(e.args))),
-                                lambda e: self._release((k, name, float(e.args))))  # fmt: skip
+                                lambda v: self.moves.ask((k, entry.name, name, v)),
+                                lambda v: self._release((k, entry.name, name, v)))  # fmt: skip
                 slider.props(f'aria-label="{escape(f"{said} of {placed(entry.name)}{shown}")}"')
                 slider.mark(f"slider-{k}-{name}")
                 for label, a, b in entry.intervals:
@@ -165,37 +166,35 @@ class AddView(View):
                 .props("dense outlined")
             )
             number.mark(f"number-{k}-{name}")
-            number.on("keydown.enter", lambda: self._typed(k, name, number.value))
-            number.on("blur", lambda: self._typed(k, name, number.value))
+            number.on("keydown.enter", lambda: self._typed((k, entry.name, name), number.value))
+            number.on("blur", lambda: self._typed((k, entry.name, name), number.value))
         self._sliders[(k, name)] = (slider, number)
 
     async def _move(self, move: Move) -> None:
         """While the hand is on the slider: the curve first, numbers when there is a moment for them."""
-        k, name, value = move
-        session, place = self.session, self.page.place
-        if place is None or k >= len(session.bench.entries):
+        k, entry, name, value = move
+        place = self.page.place
+        if place is None:
             return
-        if not session.gripped and dict(session.bench.entries[k].term.values)[name] == value:
-            return  # told late, after it was settled: nobody would let go of the slider again
-        glance = await of(session.attempt(session.slide, k, {name: value}, place))
+        glance = await of(self.session.attempt(self.session.slide, k, {name: value}, place, entry))
         if glance is None:
             return
         self.curves.draw(glance.series, points=SKETCHED)
         background_tasks.create(self.told.ask((move, glance)))
 
     async def _tell(self, told: Told) -> None:
-        """The value and the error of a move, unless the hand is off the slider by then: what is settled is told otherwise."""
+        """The value and the error of a move, unless the model is another one by then: what is settled is told otherwise."""
         await asyncio.sleep(TOLD_S)
-        (k, name, value), glance = told
+        (k, _, name, value), glance = told
         session, error = self.session, glance.error
-        if error is None and not self.moves.newer:
+        if error is None and session.at_pauses and not self.moves.newer:
             error = await of(session.attempt(session.glance_whole))
-        if not session.gripped:
+        if not session.gripped or session.bench.terms != glance.terms:
             return
         number = self._sliders.get((k, name), (None, None))[1]
         if number is not None:
             number.set_value(float(f"{value:.5g}"))
-        if error is not None:
+        if error is not None or not session.at_pauses:
             self.page.show_error(error)
 
     async def _release(self, last: Move) -> None:
@@ -205,8 +204,8 @@ class AddView(View):
             await asyncio.sleep(0.02)
         await self.page.act(self.session.release)
 
-    async def _typed(self, k: int, name: str, value: float | None) -> None:
-        entries = self.session.bench.entries
-        if value is None or k >= len(entries) or f"{dict(entries[k].term.values)[name]:.5g}" == f"{value:.5g}":
-            return
-        await self._release((k, name, float(value)))
+    async def _typed(self, which: tuple[int, str, str], value: float | None) -> None:
+        k, entry, name = which
+        had = self.session.bench.value(k, entry, name)
+        if value is not None and had is not None and f"{had:.5g}" != f"{value:.5g}":
+            await self._release((*which, float(value)))

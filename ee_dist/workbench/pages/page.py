@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from pathlib import Path
 from typing import Any
 
 from nicegui import background_tasks, ui
@@ -17,27 +16,18 @@ from ee_dist.workbench.pages.compare import CompareView
 from ee_dist.workbench.pages.explain import ExplainView
 from ee_dist.workbench.pages.keep import KeepView
 from ee_dist.workbench.pages.start import StartView
-from ee_dist.workbench.pages.view import View, dress, gauge, of
+from ee_dist.workbench.pages.view import View, gauge, of
 from ee_dist.workbench.pages.watch import WatchView
 from ee_dist.workbench.session import Session
 from ee_dist.workbench.sight import Place
 from ee_dist.workbench.worker import BusyError
 
-UNSAID = "<script>if (location.search) history.replaceState(null, '', location.pathname);</script>"
-"""The token has become a cookie: it need not stand in the address bar and in the browser's memory."""
+UNKNOWN = "looking ..."
+"""Where the error is not known yet."""
 MOVES = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
 IDLE_S = 4.0
 """After which the process of the long verbs is started: not while a page needs the processor to come up."""
-FOLLOW = Path(__file__).with_name("follow.js")
 KEYS = "Keys: 1 to 5 choose a view, arrows another trial or channel in Compare, e explains, u takes back, Esc cancels a search."
-
-
-def show_session(session: Session) -> None:
-    """Serve the session at the root: every tab of every browser shows the same one."""
-
-    @ui.page("/")
-    def root() -> None:
-        Page(session).build()
 
 
 class Page:
@@ -62,10 +52,8 @@ class Page:
                 loop.call_soon_threadsafe(self.changed, topic)
 
         client.on_delete(self.session.listen(hear))
-        dress()
-        ui.add_head_html(UNSAID)
-        ui.add_head_html(f"<script>{FOLLOW.read_text()}</script>")
-        ui.colors(primary="#0072b2", positive="#009e73", negative="#c04a00")
+        # A hand that goes away with its page has let go.
+        client.on_disconnect(lambda: self.session.attempt(self.session.release))
         with ui.element("main").classes("bench"):
             self._head()
             with ui.column().classes("w-full gap-3") as self.started:
@@ -163,17 +151,23 @@ class Page:
             )
         if seen is not None and sight is not None and topics & {"seen", "opened"}:
             self.show_error(seen.found.error)
+        elif seen is not None and sight is not None and seen.terms != session.bench.terms and not session.at_pauses:
+            self.show_error(None)  # it takes a while to compare what stands there now
         elif seen is None:
-            self.number.set_text("" if measured is None or session.notice else "looking ...")
+            self.number.set_text("" if measured is None or session.notice else UNKNOWN)
             self.gauge.set_content("")
         self.notice.set_text(session.notice)
         self.notice.set_visibility(bool(session.notice))
         self._tick()
 
-    def show_error(self, error: float) -> None:
-        """The error of the moment, while a hand is on a slider or after it."""
+    def show_error(self, error: float | None) -> None:
+        """The error of the moment, while a hand is on a slider or after it; None until it is known."""
         sight, seen, ladder = self.session.sight, self.session.seen, self.session.bench.ladder
         if sight is None or seen is None:
+            return
+        if error is None:
+            self.number.set_text(UNKNOWN)
+            self.gauge.set_content("")
             return
         floor, problem = seen.found.noise_floor, sight.problem
         told = problem.told(error) if error < float("inf") else "cannot be simulated"

@@ -14,7 +14,7 @@ export default {
   props: { figure: Object },
   emits: Object.keys(TOLD),
   async mounted() {
-    await import("plotly");
+    await import("/plotly.js");
     if (this.gone) return;
     this.ready = true;
     this.update();

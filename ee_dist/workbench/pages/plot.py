@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 from nicegui.element import Element
-from nicegui.version import __version__
 
 from ee_dist.workbench.charts import Chart
+from ee_dist.workbench.drawing import ADDRESS
 
 
-def _library() -> Path:
-    """Of the installed plotly, which draws the reports too. To import it for its place would take a third of a second."""
-    found = find_spec("plotly")
-    assert found is not None and found.submodule_search_locations, "plotly is among the requirements"
-    return Path(found.submodule_search_locations[0]) / "package_data" / "plotly.min.js"
-
-
-class Plot(Element, component="plot.js", dependencies=[_library()]):
+class Plot(Element, component="plot.js"):
     """Nothing is drawn before there is a figure. ``height``: pixels that are kept free until then."""
 
     def __init__(self, figure: Chart | None = None, height: int = 0) -> None:
@@ -52,8 +43,7 @@ class Plot(Element, component="plot.js", dependencies=[_library()]):
 
 def preload() -> str:
     """HTML for the head of the page: plotly is loaded while the page is built, not when the first chart asks for it."""
-    (library,) = Plot.exposed_libraries
-    return f'<link rel="modulepreload" href="/_nicegui/{__version__}/libraries/{library.key}" />'
+    return f'<link rel="modulepreload" href="{ADDRESS}" />'
 
 
 def same_but_numbers(figure: Chart, other: Chart) -> bool:

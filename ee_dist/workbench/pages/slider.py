@@ -8,10 +8,10 @@ from typing import Any
 from nicegui.element import Element
 
 
-class Slider(Element):
+class Slider(Element, component="slider.js"):
     """Quasar's own, which follows the hand by itself. The toolkit's is sent every value that it has just sent, and the whole page
-    is gone through for it, before the curves come. ``moved`` and ``released`` are called with the toolkit's event, whose
-    ``args`` are the value. On a slow page the last value may be told as moved after it was told as released."""
+    is gone through for it, before the curves come. ``moved`` and ``released`` are called with a value: while a hand is on it, and
+    once, last, where the hand let go."""
 
     def __init__(
         self,
@@ -19,17 +19,22 @@ class Slider(Element):
         high: float,
         step: float,
         value: float,
-        moved: Callable[[Any], Any],
-        released: Callable[[Any], Any],
-        throttle_s: float = 0.02,
+        moved: Callable[[float], Any],
+        released: Callable[[float], Any],
     ) -> None:
-        super().__init__("q-slider")
+        super().__init__()
+        self._stands = value
         with self._props.suspend_updates():
-            self._props.update({"min": low, "max": high, "step": step, "model-value": value})
-        self.on("update:model-value", moved, throttle=throttle_s)
-        self.on("change", released)
+            self._props.update({"min": low, "max": high, "step": step, "begin": value})
+        self.on("moved", lambda e: moved(self._heard(e)))
+        self.on("released", lambda e: released(self._heard(e)))
 
     def show(self, value: float) -> None:
-        """Where it stands, if the page was not told so last."""
-        if self._props["model-value"] != value:
-            self._props["model-value"] = value
+        """Where it stands, if that is not where the page has it."""
+        if self._stands != value:
+            self._stands = value
+            self.run_method("show", value)
+
+    def _heard(self, event: Any) -> float:
+        self._stands = float(event.args)
+        return self._stands
