@@ -19,7 +19,9 @@ TOO_COARSE = 2.0
 
 def default_step_s(robot: Robot) -> float:
     """The time step of a robot whose description names none, s."""
-    if robot.free_base or robot.world.has_floor or any(d.command == "torque" for d in robot.drives):
+    held = {d.joint for d in robot.drives if d.command in ("position", "speed")}
+    loose = any(j.kind != "fixed" and j.name not in held for j in robot.joints)
+    if robot.free_base or robot.world.has_floor or loose:
         return FINE_S
     coarsest = coarsest_step_s(robot)
     return next((s for s in STEPS_S if s <= coarsest), FINE_S)

@@ -84,3 +84,12 @@ def test_a_link_too_light_for_its_gains_is_told_and_a_starter_never_has_one(tmp_
     assert all(d.rotor_inertia > 0 for d in begun.robot.drives)
     assert begun.robot.time_step_s <= coarsest_step_s(begun.robot)
     assert any("rotor inertia" in m for m in begun.missing), "what was assumed is still to be measured"
+
+
+@pytest.mark.parametrize(
+    "drives", [{}, {"a": {"command": "none"}, "b": {"command": "none"}}, {"a": {"kp": 18.0, "kd": 0.4}}]
+)
+def test_a_joint_that_nothing_holds_swings_by_the_fine_step(tmp_path: Path, drives: dict[str, object]) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM)
+    robot, _ = load_robot({"urdf": str(tmp_path / "arm.urdf"), "drives": drives, "free_base": False})
+    assert robot.time_step_s == FINE_S
