@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ee_dist.measurements.proposal.blocks import BY_NAME, Block
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
-from ee_dist.measurements.proposal.words import POSITION, SPEED
+from ee_dist.measurements.proposal.words import POSITION, SPEED, TIME, read_name
 
 
 def ranked_positions(v: View) -> list[Scored]:
@@ -18,6 +19,8 @@ def ranked_positions(v: View) -> list[Scored]:
         why: list[str] = []
         if r.kind == POSITION:
             score, why = (1.0, ["maybe a position by its letter"]) if r.weak else (2.0, ["called a position"])
+        elif _called_by_joints(b):
+            score, why = 2.0, ["called by the joints alone"]
         if r.command is False:
             score, why = score + 2, [*why, "called measured"]
         elif r.command:
@@ -29,6 +32,13 @@ def ranked_positions(v: View) -> list[Scored]:
             score, why = score + 2 + best[0], [*why, f"its change is {best[1].name} (correlation {best[0]:.3f})"]
         found.append(Scored(b, score, why))
     return _told_by_lead(v, sorted(found, key=lambda s: -s.score))
+
+
+def _called_by_joints(block: Block) -> bool:
+    """Whether columns are called as the joints are and say no more, in a table and a file that say nothing else of them."""
+    silent = block.reading.kind is None and not block.reading.family and block.how == BY_NAME
+    names = (block.table.name, block.table.path.stem)
+    return silent and all(read_name(name).kind in (POSITION, TIME, None) for name in names)
 
 
 def _told_by_lead(v: View, found: list[Scored]) -> list[Scored]:
