@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from ee_dist.measurements.proposal.blocks import BY_NAME, Block
+from ee_dist.measurements.proposal.blocks import BY_NAME, Block, series_of
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
+from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
 from ee_dist.measurements.proposal.words import POSITION, SPEED, TIME, read_name
 
@@ -61,6 +62,11 @@ def ask_for_positions(v: View) -> None:
     names = ", ".join(v.robot.motor_names)
     if len(ranked) > 1 and ranked[0].score >= 2:
         v.out.ask(f"positions: {ranked[0].block.name} or {ranked[1].block.name}? write the right one into the mapping")
+    elif v.hints.joints is None and n > 1 and (called := _other_joints(v)):
+        v.out.ask(
+            f"positions: the columns call the joints {', '.join(called)}; which are these of {names}? say task.joints=[...] with "
+            "the robot's names in that order"
+        )
     elif v.hints.joints is None and n > 1:
         v.out.ask(
             f"no columns can be told to be the positions of {names}; if they have no names, say task.joints=[...] "
@@ -74,6 +80,17 @@ def ask_for_positions(v: View) -> None:
         )
     for m in v.robot.sensors:
         v.out.choices.append(Choice("sensors", m.name, {"column": "???"}, UNKNOWN, "not found"))
+
+
+def _other_joints(v: View) -> tuple[str, ...]:
+    """What the columns of a table call the joints, where the robot calls them otherwise and there are as many of one quantity."""
+    for table in v.timed.tables:
+        names, columns = other_names(
+            [a for a in series_of(table, filled=True) if a != v.times[table.name].column], len(v.joints)
+        )
+        if names and any(read_name(c[0], frozenset(names)).kind == POSITION for c in columns):
+            return names
+    return ()
 
 
 def add_positions(v: View) -> None:
