@@ -68,3 +68,16 @@ def test_what_a_joint_without_a_drive_was_to_do_is_no_command_of_the_other(tmp_p
     proposal = proposal_for([file], robot, Hints())
     assert not proposal.questions, proposal.questions
     assert {c: columns for c, columns, *_ in rows(proposal)}["command of elbow"] == "elbow_des_pos"
+
+
+@pytest.mark.parametrize("names", [("des_time", "meas_time"), ("t_ref", "time"), ("cmd_time", "actual_time")])
+def test_the_time_of_a_plan_is_not_that_of_the_readings(tmp_path: Path, names: tuple[str, str]) -> None:
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    m = samples.motion()
+    frame = pd.DataFrame({names[0]: m["t"] / 7, names[1]: m["t"]})
+    for what, values in (("meas_pos", m["q"]), ("meas_vel", m["w"]), ("des_pos", m["g"])):
+        frame = frame.assign(**{f"{j}_{what}": values[:, k] for k, j in enumerate(samples.JOINTS)})
+    frame.to_csv(tmp_path / "run.csv", index=False)
+    proposal = proposal_for([tmp_path / "run.csv"], robot, Hints())
+    assert not proposal.questions, proposal.questions
+    assert {c: columns for c, columns, *_ in rows(proposal)}["time"] == names[1]
