@@ -248,7 +248,8 @@ def _states(robot: Robot, c: Circumstances, j: int, foot: int | None, at: Array)
     found = {
         "moving": moving, "at rest": ~moving, "moving up": moving & (speed > 0), "moving down": moving & (speed < 0)
     }  # fmt: skip
-    half, middle = (joint.upper - joint.lower) / 2, (joint.upper + joint.lower) / 2
+    low, high = joint.ends
+    half, middle = (high - low) / 2, (high + low) / 2
     if np.isfinite(half):
         near = np.abs(position - middle) > NEAR_LIMIT * half
         found |= {"near a limit": near, "away from limits": ~near}

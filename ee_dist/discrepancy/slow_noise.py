@@ -12,6 +12,9 @@ DIFFERENCES = (2, 3, 4, 5)
 """Orders of divided differences that noise is looked for in."""
 
 
+MOTION = 0.5
+"""Share of what second differences find below which those of higher orders say that the rest of it was motion: of noise alone
+all find the same."""
 RESTS, LEVELS, MULTIPLES = 0.1, 5, 0.9
 """A reading comes in steps where it rests in this share of the rows, on so many levels, this share of whose gaps are whole
 multiples of the least."""
@@ -49,3 +52,10 @@ def slow_noise(times_s: Array, values: Array) -> Array:
         found.append(np.median(left**2, axis=0) / MEDIAN_OF_SQUARES)
     steps = np.array([reading_step(column) for column in values.T])
     return np.maximum(np.sqrt(np.min(found, axis=0)) if found else 0.0, steps / np.sqrt(12))
+
+
+def without_motion(noise: Array, times_s: Array, values: Array) -> Array:
+    """(C,) standard deviations that second differences of readings (R, C) found, where it was not quick motion that they found:
+    of a joint that turns by a tenth of a radian from row to row they find hundreds of times what its encoder leaves open."""
+    least = slow_noise(times_s, values)
+    return np.where(least < MOTION * noise, least, noise)

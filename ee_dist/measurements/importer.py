@@ -250,10 +250,14 @@ class _Import:
         return positions
 
     def _commands(self, torques: Array | None) -> Array:
-        """What the drives were told, (T, M). Without any: the torques where the drives obey torques, else NaN."""
-        found = self._motor_columns(self.mapping.commands, command_units(self.robot), "command")
+        """What the drives were told, (T, M). Without any: the torques where the drives obey torques, else NaN; of joints that
+        all swing freely, nothing."""
+        units = command_units(self.robot)
+        found = self._motor_columns(self.mapping.commands, units, "command")
         if found is not None:
             return found
+        if not units:
+            return np.zeros((len(self.at_s), len(self.robot.drives)))
         assert torques is not None
         if command_kinds(self.robot) == {"torque"}:
             self.report.done.append(

@@ -9,12 +9,16 @@ import numpy as np
 import pytest
 import small_logs as logs
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints
 from ee_dist.measurements.proposal.write import as_yaml
 from ee_dist.robots.describe import load_robot
+from ee_dist.tasks.measurements import Measurements
+from ee_dist.tasks.ways import way_of
 
 
 @pytest.mark.parametrize("driven", samples.JOINTS)
@@ -36,3 +40,21 @@ def test_a_passive_joint_needs_no_command(tmp_path: Path, driven: str, command: 
     ((record, _),) = import_files([file], read_mapping(tmp_path / "mapping.yaml"), robot)
     assert np.allclose(record.log.commands[:, k], m["g"][:, k])
     assert (record.log.commands[:, 1 - k] == 0.0).all()
+
+
+def test_where_nothing_is_driven_a_log_of_positions_is_all_that_there_is(tmp_path: Path) -> None:
+    m, path = samples.motion(), samples.robot_file(tmp_path)
+    text = path.read_text().split("drives:")[0]
+    path.write_text(f"{text}drives:\n" + "".join(f"  {j}: {{command: none}}\n" for j in samples.JOINTS))
+    robot, _ = load_robot(path)
+    frame = logs.frame_of(m["t"], m["q"], m["g"])
+    file = logs.written(tmp_path, frame.drop(columns=[c for c in frame if "goal" in c]))
+    proposal = proposal_for([file], robot, Hints())
+    assert not proposal.questions, proposal.questions
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(path), file.name))
+    ((record, _),) = import_files([file], read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert record.log.torques is None and record.log.joints is not None
+    assert (record.log.commands == 0.0).all()
+    trials = (MeasuredTrial(record.name, record.log, Commands(record.log.commands)),)
+    measured = Measurements(robot, trials, (file,), (), robot, tmp_path)
+    assert way_of(measured, "auto").name == "free_run"

@@ -19,6 +19,7 @@ from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints
 from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.robots.describe import load_robot
+from ee_dist.robots.model import CONTINUOUS_RAD
 
 RIGHT, ASKED, WRONG = "right", "asked", "wrong"
 FEWEST_RIGHT = 14
@@ -203,3 +204,12 @@ def test_joints_that_turn_on_and_on_are_in_radians_or_it_is_asked(tmp_path: Path
     else:
         found = {c.name: c.entry for c in proposal.choices}
         assert [found[f"{j}_position"]["unit"] for j in odd_files.JOINTS] == ["rad"] * 3
+
+
+def test_a_joint_without_ends_has_no_range_that_percent_are_shares_of(tmp_path: Path) -> None:
+    robot, _ = load_robot(samples.robot_file(tmp_path, SO101))
+    roll = {"lower": -CONTINUOUS_RAD, "upper": CONTINUOUS_RAD}
+    robot = replace(robot, joints=tuple(replace(j, **roll) if j.name == "wrist_roll" else j for j in robot.joints))
+    path, _, _ = hobby_arm(tmp_path, 85.0 / 1.3, 100.0)
+    proposal = proposal_for([path], robot, Hints(unit="percent"))
+    assert any("wrist_roll, which has no limits" in q for q in proposal.questions)

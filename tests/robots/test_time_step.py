@@ -13,7 +13,8 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.robots.describe import load_robot, read_body
 from ee_dist.robots.starter import starter
-from ee_dist.robots.time_step import FINE_S, STEPS_S, coarsest_step_s
+from ee_dist.robots.time_step import FINE_S, STEPS_S, SWING_S, coarsest_step_s
+from ee_dist.trials.log import State
 
 ARM = """<robot name="arm"><link name="base"/>
   <link name="upper"><inertial><origin xyz="0.1 0 0"/><mass value="0.4"/>
@@ -84,3 +85,41 @@ def test_a_link_too_light_for_its_gains_is_told_and_a_starter_never_has_one(tmp_
     assert all(d.rotor_inertia > 0 for d in begun.robot.drives)
     assert begun.robot.time_step_s <= coarsest_step_s(begun.robot)
     assert any("rotor inertia" in m for m in begun.missing), "what was assumed is still to be measured"
+
+
+@pytest.mark.parametrize(
+    "drives", [{}, {"a": {"command": "none"}, "b": {"command": "none"}}, {"a": {"kp": 18.0, "kd": 0.4}}]
+)
+def test_links_that_swing_from_one_another_take_the_finest_step(tmp_path: Path, drives: dict[str, object]) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM)
+    robot, _ = load_robot({"urdf": str(tmp_path / "arm.urdf"), "drives": drives, "free_base": False})
+    assert robot.time_step_s == SWING_S
+
+
+def test_a_free_swing_of_two_links_loses_by_itself_far_less_than_in_steps_of_two_milliseconds(tmp_path: Path) -> None:
+    """What two links without any friction have left of their energy after four seconds."""
+    (tmp_path / "arm.urdf").write_text(ARM.replace('"-2"', '"-6"').replace('"2"', '"6"'))
+    file = str(tmp_path / "arm.urdf")
+    lost = {}
+    for name, more in (("fine", {"time_step_s": FINE_S}), ("left out", {})):
+        robot, _ = load_robot(
+            {"urdf": file, "free_base": False, "drives": {j: {"command": "none"} for j in "ab"}, **more}
+        )
+        steps = round(4.0 / robot.time_step_s)
+        start = State(np.array([0.3, -0.4]), np.zeros(2))
+        (log,) = MuJoCoEngine(1).rollout(
+            [Rollout(robot, Commands(np.zeros((steps, 2))), steps, start=start, pose=True)]
+        )
+        assert log.joints is not None
+        speed = np.gradient(log.joints, robot.time_step_s, axis=0)
+        lost[name] = 1.0 - _energy(log.joints[-2], speed[-2]) / _energy(start.joints, start.speeds)
+    assert abs(lost["left out"]) < 0.4 * abs(lost["fine"])
+
+
+def _energy(q: np.ndarray, w: np.ndarray) -> float:
+    """J, above hanging straight down (zero is along x, and y turns it downwards), of the two links of ARM."""
+    (m1, m2), (c1, c2), i, l1 = (0.4, 0.3), (0.1, 0.1), 1e-3, 0.2
+    a, b, wa, wb = q[0], q[0] + q[1], w[0], w[0] + w[1]
+    height = m1 * (c1 - c1 * np.sin(a)) + m2 * (l1 + c2 - l1 * np.sin(a) - c2 * np.sin(b))
+    moved = m1 * (c1 * wa) ** 2 + m2 * ((l1 * wa) ** 2 + (c2 * wb) ** 2 + 2 * l1 * c2 * wa * wb * np.cos(a - b))
+    return float(9.81 * height + 0.5 * (moved + i * (wa**2 + wb**2)))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.words import OTHER, TIME, Reading, read_name, role_of, tokens, unit_word
 from ee_dist.measurements.signals import derivative, relation
 from ee_dist.measurements.table import Recorded, Table
@@ -99,9 +100,9 @@ def blocks_of(
         named = {} if order is not None and _own_numbers(joints) else _named_in_full(list(series), joints)
         families: dict[tuple[str, bool], list[tuple[str, Reading, str | None]]] = {}
         for address in series:
-            joint, stem = _joint_in(address, words), _stem(address)
+            joint, stem = joint_in(address, words), _stem(address)
             reading = read_name(
-                stem if joint is None or _joint_in(stem, words) else address, words[joint] if joint else frozenset()
+                stem if joint is None or joint_in(stem, words) else address, words[joint] if joint else frozenset()
             )
             if address in named:
                 joint, reading = named[address]
@@ -116,6 +117,9 @@ def blocks_of(
             elif all(m[1].kind is None for m in members):
                 mute += [m[0] for m in members]
         found += _by_place(table, [a for a in series if a in mute], series, joints, order)
+        if order is not None:
+            used = {c for b in found for c in b.columns}
+            found += _by_other_names(table, [a for a in series if a not in used], series, joints, order)
     return [b for b in found if b.reading.kind != OTHER]
 
 
@@ -124,7 +128,7 @@ def unreadable(table: Table, joints: Sequence[str]) -> list[str]:
     words = joint_words(joints)
     read, failed = set(), []
     for address in table.addresses():
-        joint = _joint_in(address, words)
+        joint = joint_in(address, words)
         reading = read_name(address, words[joint] if joint else frozenset())
         if reading.kind in (TIME, OTHER) or not (reading.kind or reading.command):
             continue
@@ -141,7 +145,7 @@ def _stem(address: str) -> str:
     return re.sub(r"\[[^\[\]]*\]$", "", address)
 
 
-def _joint_in(address: str, words: dict[str, frozenset[str]]) -> str | None:
+def joint_in(address: str, words: dict[str, frozenset[str]]) -> str | None:
     """The joint whose words all stand in a name, if it is one alone; the longest of several wins."""
     have = set(tokens(address))
     return _longest([j for j, w in words.items() if w and w <= have and any(not x.isdigit() for x in w)], words)
@@ -250,6 +254,21 @@ def _by_place(
     chosen = _hanging_together(mute, size, series)
     places = [list(order or joints).index(j) for j in joints] if order is None or set(joints) <= set(order) else []
     return [_made(table, tuple(part[p] for p in places), SILENT, BY_PLACE, series) for part in chosen if places]
+
+
+def _by_other_names(
+    table: Table, rest: list[str], series: dict[str, Array], joints: Sequence[str], order: Sequence[str]
+) -> list[Block]:
+    """Blocks of columns that name the joints otherwise than the robot does, in the order that the user said."""
+    names, quantities = other_names(rest, len(order))
+    if not set(joints) <= set(order):
+        return []
+    found = []
+    for columns in quantities:
+        placed = dict(zip(order, columns, strict=True))
+        chosen = tuple(placed[j] for j in joints)
+        found.append(_made(table, chosen, read_name(chosen[0], frozenset(names)), BY_PLACE, series))
+    return [b for b in found if b.reading.kind != TIME]
 
 
 def _hanging_together(mute: list[str], size: int, series: dict[str, Array]) -> list[list[str]]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from ee_dist.measurements.proposal.blocks import BY_NAME, Block, series_of
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
+from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
-from ee_dist.measurements.proposal.words import POSITION, SPEED
+from ee_dist.measurements.proposal.words import POSITION, SPEED, TIME, read_name
 
 
 def ranked_positions(v: View) -> list[Scored]:
@@ -18,6 +20,8 @@ def ranked_positions(v: View) -> list[Scored]:
         why: list[str] = []
         if r.kind == POSITION:
             score, why = (1.0, ["maybe a position by its letter"]) if r.weak else (2.0, ["called a position"])
+        elif _called_by_joints(b):
+            score, why = 2.0, ["called by the joints alone"]
         if r.command is False:
             score, why = score + 2, [*why, "called measured"]
         elif r.command:
@@ -29,6 +33,13 @@ def ranked_positions(v: View) -> list[Scored]:
             score, why = score + 2 + best[0], [*why, f"its change is {best[1].name} (correlation {best[0]:.3f})"]
         found.append(Scored(b, score, why))
     return _told_by_lead(v, sorted(found, key=lambda s: -s.score))
+
+
+def _called_by_joints(block: Block) -> bool:
+    """Whether columns are called as the joints are and say no more, in a table and a file that say nothing else of them."""
+    silent = block.reading.kind is None and not block.reading.family and block.how == BY_NAME
+    names = (block.table.name, block.table.path.stem)
+    return silent and all(read_name(name).kind in (POSITION, TIME, None) for name in names)
 
 
 def _told_by_lead(v: View, found: list[Scored]) -> list[Scored]:
@@ -51,6 +62,11 @@ def ask_for_positions(v: View) -> None:
     names = ", ".join(v.robot.motor_names)
     if len(ranked) > 1 and ranked[0].score >= 2:
         v.out.ask(f"positions: {ranked[0].block.name} or {ranked[1].block.name}? write the right one into the mapping")
+    elif v.hints.joints is None and n > 1 and (called := _other_joints(v)):
+        v.out.ask(
+            f"positions: the columns call the joints {', '.join(called)}; which are these of {names}? say task.joints=[...] with "
+            "the robot's names in that order"
+        )
     elif v.hints.joints is None and n > 1:
         v.out.ask(
             f"no columns can be told to be the positions of {names}; if they have no names, say task.joints=[...] "
@@ -64,6 +80,17 @@ def ask_for_positions(v: View) -> None:
         )
     for m in v.robot.sensors:
         v.out.choices.append(Choice("sensors", m.name, {"column": "???"}, UNKNOWN, "not found"))
+
+
+def _other_joints(v: View) -> tuple[str, ...]:
+    """What the columns of a table call the joints, where the robot calls them otherwise and there are as many of one quantity."""
+    for table in v.timed.tables:
+        names, columns = other_names(
+            [a for a in series_of(table, filled=True) if a != v.times[table.name].column], len(v.joints)
+        )
+        if names and any(read_name(c[0], frozenset(names)).kind == POSITION for c in columns):
+            return names
+    return ()
 
 
 def add_positions(v: View) -> None:

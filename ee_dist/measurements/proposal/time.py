@@ -18,6 +18,8 @@ from ee_dist.trials.log import Array
 
 TIMES = tuple(u for u, (kind, _) in UNITS.items() if kind == "time" and u in ("s", "ms", "us", "ns"))
 
+WHOSE: dict[bool | None, int] = {False: 0, None: 1, True: 2}
+"""The order in which times are taken: called measured, called neither, called desired."""
 MOSTLY = 0.95
 """Share of its steps in which a time must rise to be one that has a flaw."""
 
@@ -41,7 +43,8 @@ def time_of(table: Table, hints: Hints) -> TimeChoice | None:
     if hints.rate_hz:
         return TimeChoice(None, "s", rows / hints.rate_hz, SURE, f"{hints.rate_hz:g} rows a second, as you said")
     rising = {a: v for a, v in series_of(table).items() if len(v) > 2 and (np.diff(v) > 0).all()}
-    named = [a for a in rising if _reading(a).kind == TIME]
+    # The time of a plan is not that of the readings.
+    named = sorted((a for a in rising if _reading(a).kind == TIME), key=lambda a: WHOSE[_reading(a).command])
     counters = [a for a in rising if np.array_equal(np.diff(rising[a]), np.ones(len(table) - 1)) and a not in named]
     open_ = [a for a in rising if a not in counters]
     # A time with a flaw is to be mended, not to be replaced by whatever else rises.

@@ -149,7 +149,8 @@ def _with_gripper(block: Block, joints: Sequence[Joint], unit: str, sure: str, w
 def _share(block: Block, joints: Sequence[Joint]) -> UnitChoice:
     """-100 to 100 (a gripper 0 to 100) as the range between the model's limits."""
     for j in joints:
-        if not math.isfinite(j.upper - j.lower) or j.upper <= j.lower:
+        low, high = j.ends
+        if not math.isfinite(high - low) or high <= low:
             return UnitChoice(
                 (), UNKNOWN, f"a share of the range of {j.name}, which has no limits in the robot's description"
             )

@@ -10,7 +10,16 @@ import numpy as np
 
 from ee_dist.measurements import signals
 from ee_dist.measurements.alignment import match, one_clock
-from ee_dist.measurements.proposal.blocks import BY_NAME, BY_NUMBER, BY_PLACE, Block, blocks_of, empty_cells
+from ee_dist.measurements.proposal.blocks import (
+    BY_NAME,
+    BY_NUMBER,
+    BY_PLACE,
+    Block,
+    blocks_of,
+    empty_cells,
+    joint_in,
+    joint_words,
+)
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.time import TimeChoice
 from ee_dist.measurements.proposal.units import UnitChoice
@@ -86,7 +95,17 @@ class View:
         if self.needed is not None:
             found.needed = (self.needed[0][:, places], self.needed[1][:, places])
         taken = {(b.table.name, c) for b in self.blocks if b.used for c in b.columns}
-        found.blocks = [b for b in found.gathered() if not taken & {(b.table.name, c) for c in b.columns}]
+        words = joint_words(names)
+        idle = {*names} - {*kept}
+        # What the same quantity is of a joint that takes no command is no command of the others.
+        told = [b for b in self.blocks if b.reading.kind is not None or b.reading.command]
+        taken |= {(b.table.name, c) for b in told for k, c in enumerate(b.columns) if k not in places}
+        found.blocks = [
+            b
+            for b in found.gathered()
+            if not taken & {(b.table.name, c) for c in b.columns}
+            and not any(joint_in(c, words) in idle for c in b.columns)
+        ]
         return found
 
     def even(self, block: Block) -> Block:

@@ -11,6 +11,7 @@ from ee_dist.effects.laws import SPEED_LAWS, LawContext, find_law
 from ee_dist.engines.friction import DRY, LOADED, SIDED, SLOPED, Friction
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.inertia import felt_inertia
+from ee_dist.robots.inverse_dynamics import geometry, gravity, parameters
 from ee_dist.robots.model import DRIVE_NUMBERS, Drive, Robot
 from ee_dist.trials.log import Array
 
@@ -30,6 +31,8 @@ SEEN = (
     *RUBBING,
 )
 """Fields of a drive that a balance of forces sees: neither the controller nor what lies between motor and joint."""
+BEYOND = "torque_limit"
+"""Of these, the one that only says up to which load friction by load is believed: it tells no two models apart."""
 NUDGE = 1e-4
 """Share of a measured force by which it is moved to see how the rest follows."""
 LEAST_SLOPE = 0.05
@@ -74,6 +77,13 @@ class Balance:
         if len(columns) < len(keys):
             return None
         return np.stack([c[0] for c in columns], axis=1), np.stack([c[1] for c in columns], axis=1)
+
+
+def told_by(robot: Robot) -> tuple[object, ...]:
+    """What of a robot a balance of forces depends on: of two with the same it leaves the same."""
+    drives = tuple(tuple(getattr(d, n) for n in SEEN if n != BEYOND) for d in robot.drives)
+    laws = tuple(law for law in robot.laws if law.name not in CONTROLLER_LAWS)
+    return geometry(robot), gravity(robot).tobytes(), parameters(robot).tobytes(), drives, laws
 
 
 def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]) -> tuple[Array, Array]:

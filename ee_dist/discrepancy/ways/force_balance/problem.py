@@ -19,14 +19,14 @@ import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read
 from ee_dist.discrepancy.problem import Layout, Problem, Series
-from ee_dist.discrepancy.ways.force_balance.balance import Balance
+from ee_dist.discrepancy.ways.force_balance.balance import INSTANT_S, Balance, told_by
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED, left_to_give
 from ee_dist.discrepancy.ways.force_balance.floor import floor_of
 from ee_dist.discrepancy.ways.force_balance.motion import Processing
 from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
-from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.effects.catalogue import Hypothesis, apply, find, term
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -51,6 +51,8 @@ class ForceBalance(Problem):
     def __init__(self, trials: Sequence[MeasuredTrial], robot: Robot, processing: Processing | None = None) -> None:
         # Nothing is simulated, so that no time step but that of the readings is wanted.
         trials = [replace(t, log=evenly_read(t.log)) for t in trials]
+        # Nor does a step of a simulation limit what a drive may have: how light a rotor its controller leaves steady.
+        robot = replace(robot, time_step_s=INSTANT_S)
         self.robot, self.measured = robot, tuple(trials)
         self.models = [apply(robot, t.setup) for t in trials]
         self.asked = processing or Processing.for_rate(float(np.median(np.diff(trials[0].log.times_s))))
@@ -170,6 +172,13 @@ class ForceBalance(Problem):
         for k, unit in enumerate(self.layout.units):
             lines += describe(self.remains(hypothesis, k), unit, "m" if unit == "N" else "rad")
         return lines
+
+    def shows(self, effect: str, target: str) -> bool:
+        """A controller's gain, a delay or play in a gear would be proposed for nothing, and named beside what is found."""
+        limits = find(effect).bounds(self.robot, target)
+        corners = [{name: float(ends[end]) for name, ends in limits.items()} for end in (0, 1)]
+        changed = [apply(self.robot, (term(effect, target, **values),)) for values in corners]
+        return any(told_by(robot) != told_by(self.robot) for robot in changed)
 
     @cached_property
     def doubts(self) -> str:

@@ -20,9 +20,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, released, speeds_of
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
 from ee_dist.discrepancy.problem import Layout, Problem, Series, error, joints_of
-from ee_dist.discrepancy.slow_noise import slow_noise
+from ee_dist.discrepancy.slow_noise import slow_noise, without_motion
+from ee_dist.discrepancy.starting import starting_speeds
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -166,7 +167,8 @@ class FreeRun(Problem):
         return self.measured[trial].simulated(apply(self.setups[trial], hypothesis))
 
     def noise_floor(self) -> tuple[float, str]:
-        return 1.0, "estimated: second differences of the measured positions"
+        seldom = any(p.log.filled is not None for p in self.pieces)
+        return 1.0, f"estimated: {'divided' if seldom else 'second'} differences of the measured positions"
 
     def smooth(self, residual: Array) -> Array:
         """The error itself, in units of the noise, instead of its root."""
@@ -284,7 +286,7 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
             f"trial {trial.name!r} has a row every {dt:g} s, {robot.name} a time step of {robot.time_step_s:g} s; import it at "
             f"{1 / robot.time_step_s:g} Hz"
         )
-    speeds = speeds_of(log, robot)
+    speeds = starting_speeds(trial, robot)
     commands, enabled = released(trial.obeyed(log.commands))
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
     found = []
@@ -328,11 +330,15 @@ def _told(value: float, unit: str) -> str:
 
 def _noise(piece: Piece, columns: Sequence[int]) -> float:
     """Mean absolute error that the noise of the readings alone would leave, from second differences of the rows that are
-    compared. A little of the motion is in them, as what the noise of the first state does later is in the error."""
+    compared. A little of the motion is in them, as what the noise of the first state does later is in the error; no more."""
     positions = piece.measured(columns)
     if piece.log.filled is not None:
         return float(np.mean(slow_noise(piece.times_s, positions))) * MEAN_ABSOLUTE
     if len(positions) < 3:
         return 0.0
     rough = np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2])
-    return float(np.median(rough) / np.sqrt(6.0)) * MEAN_ABSOLUTE / MEDIAN_ABSOLUTE
+    found = float(np.median(rough) / np.sqrt(6.0)) / MEDIAN_ABSOLUTE
+    every = piece.log.sensors[
+        :, list(columns)
+    ]  # of the rows between, too: the finer they are, the less motion is in them
+    return float(np.mean(without_motion(np.full(len(columns), found), piece.log.times_s, every))) * MEAN_ABSOLUTE

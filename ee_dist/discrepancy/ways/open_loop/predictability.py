@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import span
 
 SMALL = 0.005
 """Relative change of masses, drive gains and strengths in the ensemble; friction of the floor varies by four times that."""
 OFFSET_SHARE = 0.0005
-"""Change of each drive's zero, as a share of its joint's range."""
+"""Change of each drive's zero, as a share of its joint's range; of one that turns on and on, of a turn."""
 MEMBERS = 6
 
 
@@ -36,9 +37,8 @@ def _neighbour(robot: Robot, rng: np.random.Generator, small: float) -> Robot:
         parts.append(replace(part, mass_kg=by * part.mass_kg, inertia_kg_m2=(xx, yy, zz, xy, xz, yz)))
     drives = []
     for drive in robot.drives:
-        joint = robot.joint(drive.joint)
-        span = joint.upper - joint.lower
-        offset = drive.zero_offset + (OFFSET_SHARE * span * float(rng.uniform(-1, 1)) if np.isfinite(span) else 0.0)
+        low, high = span(robot.joint(drive.joint))
+        offset = drive.zero_offset + OFFSET_SHARE * (high - low) * float(rng.uniform(-1, 1))
         drives.append(replace(drive, kp=drive.kp * scale(), strength=drive.strength * scale(), zero_offset=offset))
     world = replace(robot.world, friction=robot.world.friction * scale(4 * small))
     return replace(robot, parts=tuple(parts), drives=tuple(drives), world=world)

@@ -35,6 +35,7 @@ from ee_dist.effects.groups import members_of
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import span
 from ee_dist.trials.log import Array, SensorLog
 
 BLOCK_S = 0.04
@@ -377,8 +378,7 @@ class OpenLoop(Problem):
 
 def _spans(robot: Robot) -> Array:
     """(M,) ranges of the driven joints."""
-    joints = [robot.joint(d.joint) for d in robot.drives]
-    return np.array([j.upper - j.lower for j in joints])
+    return np.array([high - low for low, high in (span(robot.joint(d.joint)) for d in robot.drives)])
 
 
 def joint_unit(robot: Robot, joint: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.discrepancy.slow_noise import MEDIAN_OF_SQUARES, slow_noise
+from ee_dist.discrepancy.slow_noise import MEDIAN_OF_SQUARES, slow_noise, without_motion
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
@@ -52,7 +52,8 @@ def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
 def _variance(log: SensorLog) -> Array:
     """(S,) of the noise of what was read."""
     if log.filled is None:
-        return np.asarray(np.median(roughness(log.sensors), axis=0) / MEDIAN_OF_SQUARES)
+        rough = np.sqrt(np.median(roughness(log.sensors), axis=0) / MEDIAN_OF_SQUARES)
+        return without_motion(rough, log.times_s, log.sensors) ** 2
     return slow_noise(log.times_s[log.readings], log.sensors[log.readings]) ** 2
 
 

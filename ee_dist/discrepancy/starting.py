@@ -1,0 +1,51 @@
+"""The speeds that a simulation of a measured motion starts with: what is wrong with them is in everything that follows.
+
+A sensor of speed is often an estimate made on the way, late and smoothed. Of a real robot, whose positions are read finely, a
+curve laid through a few of these can know the speed better: where it parts from the sensor by more than the noise of the
+positions and its own lag explain, it is taken.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read, speeds_of
+from ee_dist.discrepancy.slow_noise import slow_noise
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+AROUND, CUBIC = (9, 5), 3
+"""Readings that the curve is laid through, and fewer, which part from the first where it is too stiff; its order."""
+BEYOND = 3.0
+"""Standard deviations of what the curve's own errors explain."""
+
+
+def starting_speeds(trial: MeasuredTrial, robot: Robot) -> Array:
+    """(T, M) with which a simulation from each row is to begin. Of a simulated log, what its sensors read. Of a robot, the best
+    that is known, half a step before: the speed that a step begins with is that of half a step ago (see ``steps``)."""
+    speeds = speeds_of(trial.log, robot)
+    if not trial.commands_held or len(trial.log) < 2:
+        return speeds
+    known = _through_positions(trial, robot, speeds)
+    return np.concatenate([known[:1] - (known[1:2] - known[:1]) / 2, (known[:-1] + known[1:]) / 2])
+
+
+def _through_positions(trial: MeasuredTrial, robot: Robot, read: Array) -> Array:
+    """(T, M): speeds as they were ``read`` (T, M), and of joints whose positions know better, or alone, from these."""
+    even = evenly_read(trial.log)
+    if even.joints is None or len(even) < AROUND[0]:
+        return read
+    step_s = float(np.median(np.diff(even.times_s)))
+    stiff, supple = (scipy.signal.savgol_filter(even.joints, n, CUBIC, deriv=1, delta=step_s, axis=0) for n in AROUND)
+    weights = scipy.signal.savgol_coeffs(AROUND[0], CUBIC, deriv=1, delta=step_s)
+    own = np.hypot(slow_noise(even.times_s, even.joints) * np.linalg.norm(weights), _size(stiff - supple))
+    sensed = np.stack([np.interp(even.times_s, trial.log.times_s, v) for v in read.T], axis=1)
+    alone = {*robot.motor_names} - {s.target for s in robot.sensors if s.kind == "velocity"}
+    better = (_size(sensed - stiff) > BEYOND * own) | np.isin(robot.motor_names, sorted(alone))
+    slopes = np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in stiff.T], axis=1)
+    return np.where(better, slopes, read)
+
+
+def _size(values: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
