@@ -101,8 +101,13 @@ def _unit(term: Term, key: str, robot: Robot | None) -> str:
 
 
 def percent(share: float) -> str:
-    """Never all of it where something is left."""
-    return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 - EXACT else f"{100 * share:.0f} %"
+    """Never all of it where something is left, and never less than nothing where it rounds to nothing."""
+    return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 - EXACT else f"{round(100 * share) + 0:d} %"
+
+
+def percents(low: float, high: float) -> str:
+    """An interval of shares: ``76 to 100 %``."""
+    return f"{percent(low).removesuffix(' %')} to {percent(high)}"
 
 
 def named(term: Term) -> str:

@@ -59,8 +59,8 @@ class Section:
 @dataclass
 class Page:
     """``tone``: good, open or plain, the colour of the finding. ``first``: lines below the headline: how large the error is,
-    how sure all of it; ``following``: the command to type next; ``proof``: the one picture that shows it. ``tiles``: (number,
-    what it is). ``links``: (name, relative path). ``terms``: (word, what it means)."""
+    how sure all of it; ``following``: the command to type next, after ``lead``; ``proof``: the one picture that shows it.
+    ``tiles``: (number, what it is). ``links``: (name, relative path). ``terms``: (word, what it means)."""
 
     title: str
     subtitle: str
@@ -69,6 +69,7 @@ class Page:
     tone: str = "plain"
     first: Sequence[str] = ()
     following: str = ""
+    lead: str = "Next"
     proof: Section | None = None
     tiles: Sequence[tuple[str, str]] = ()
     sections: list[Section] = field(default_factory=list)

@@ -13,9 +13,9 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import placed, told_all
+from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
-from ee_dist.tasks.results.tables import TIED_STANDING, standing
+from ee_dist.tasks.results.tables import TIED_STANDING, candidate_label, standing
 from ee_dist.workbench.bench import Step
 
 BEST, TIED, EARNED, REFUSED = "best", "tied", "earned", "not"
@@ -91,7 +91,7 @@ def _ranked(problem: Problem, found: Explanation, c: Judged, best: Judged) -> Ra
     entry = CATALOGUE[c.terms[0].effect]
     return Ranked(
         c.name,
-        told_all(c.terms, problem.robot),
+        candidate_label(c, problem.robot),
         c.terms,
         (*found.fixed, *c.hypothesis),
         c.error_heldout,

@@ -63,7 +63,7 @@ def test_what_looks_the_same_is_named(tied: list[str], said: str) -> None:
 
 
 def test_a_rest_above_the_noise_is_no_contradiction_where_nothing_is_left() -> None:
-    assert "; what it leaves of that stands out nowhere; of 9" in account([], 0.66).sure
+    assert "; what it leaves of that stands out nowhere. Of 9" in account([], 0.66).sure
     assert "leaves" not in account([], 0.99).sure
 
 
@@ -72,14 +72,21 @@ def test_that_no_motion_tried_helps_is_not_that_none_does() -> None:
     told_of = account(["a@c"], ahead=ahead, planner="plan it")
     assert told_of.advice == "None of the motions tried is expected to tell them apart."
     assert told_of.planner == "plan it" and told_of.first[-1].endswith(" plan it")
+    assert told_of.first[-1].startswith("To look for other motions: ") and told_of.lead == "Next"
     assert not account([], ahead=None, planner="plan it").planner, "nothing is tied"
 
 
+def test_what_is_tied_is_open_and_told_apart_before_it_is_added() -> None:
+    tied, alone = account(["a@c"], planner="plan it"), account([], planner="plan it")
+    assert tied.first[-1] == "Next, to tell them apart: plan it" and tied.lead == "Or go on without" and not tied.good
+    assert alone.lead == "Next" and alone.good
+
+
 def test_more_twins_than_a_headline_holds_are_named_below_it() -> None:
-    assert "of 9 explanations no other does as well" in account([]).sure
-    assert "2 others do as well; " in account(["a@c", "b@c"]).sure, "the headline names them"
-    assert "3 others do as well (a at c; b at c; d at c); " in account(["a@c", "b@c", "d@c"]).sure
-    assert "(a at c; b at c; d at c; e at c and 2 more); " in account([f"{x}@c" for x in "abdefg"]).sure
+    assert "Of 9 explanations no other does as well." in account([]).sure
+    assert "2 others do as well. " in account(["a@c", "b@c"]).sure, "the headline names them"
+    assert "3 others do as well (a at c; b at c; d at c). " in account(["a@c", "b@c", "d@c"]).sure
+    assert "(a at c; b at c; d at c; e at c and 2 more). " in account([f"{x}@c" for x in "abdefg"]).sure
 
 
 def test_one_effect_at_several_joints_is_told_with_each_of_its_values() -> None:
@@ -114,7 +121,9 @@ def test_what_a_candidate_has_is_what_the_next_command_asks_for() -> None:
 
 def compared(error: float, left: list[Leftover]) -> Account:
     found = SimpleNamespace(
-        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={}, channels=[SimpleNamespace(name="a_b")],
+        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={},
+        channels=[SimpleNamespace(name="a_b", normalised=error), SimpleNamespace(name="command_b", normalised=0.0)],
+
         unsure=[],
     )  # fmt: skip
     problem = SimpleNamespace(
@@ -125,7 +134,7 @@ def compared(error: float, left: list[Leftover]) -> Account:
         natural_unit="mm",
         notes=[],
         doubts="",
-        channels=("a_b",),
+        channels=("a_b", "command_b"),
         trials=("sway",),
     )
     return compare_account(problem, found, left)  # type: ignore[arg-type]
@@ -141,7 +150,7 @@ def test_a_small_error_is_no_agreement_where_a_channel_stands_out() -> None:
     calm, loud = compared(1.02, []), compared(1.02, [Leftover("sway", "a_b", 7.0, 3.0, True)])
     assert calm.good and calm.headline.startswith("The model agrees") and calm.advice.startswith("Next: nothing")
     assert not loud.good and "nearly right" in loud.headline and "most of all at a b" in loud.headline
-    assert "stands out in 1 of 1 curve (1 channel in 1 trial)" in loud.sure and not loud.advice
+    assert "1 of 1 curve (1 channel in 1 trial) differs by more than noise" in loud.sure and not loud.advice
 
 
 def test_times_the_floor_are_those_of_the_errors_that_are_told() -> None:
@@ -157,7 +166,7 @@ def test_small_errors_keep_their_digits(error_m: float, said: str) -> None:
 def test_what_may_be_noise_is_no_proof_that_nothing_is_left() -> None:
     told_of = account([], unsure=("knee_left", "hip"))
     assert told_of.headline.endswith("Nothing else is left beyond what may be noise.") and not told_of.good
-    assert "; the noise floor is only an upper bound at knee left, hip; " in told_of.sure
+    assert "; the noise floor is only an upper bound at knee left, hip. " in told_of.sure
     assert told_of.advice.startswith("To tell, repeat the motion at a third of its pace")
     assert account([]).good and "beyond" not in " ".join(account([]).words)
 

@@ -15,18 +15,20 @@ FEW = 4
 """and the line below it, where there are more."""
 MOSTLY = 0.97
 """Share of what is above the noise from which nobody asks for the rest."""
-GRANTED = "What is above the floor is no more than chance, and what contacts and reversals leave that come a row early or late."
+GRANTED = "The little above the floor is chance, and contacts or reversals that come one row early or late."
 SPREAD = (
-    "What is left stands out nowhere; all together it is more than noise, and below the resolution at which channels are "
-    "compared."
+    "What is left stands out nowhere. All together it is more than noise, and too little to tell apart in any channel."
 )
 NOTHING_ELSE = "Nothing else is left above the noise."
 BEYOND = "Nothing else is left beyond what may be noise."
 CONTENT = (
     "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
 )
-PLAN = "What to record to tell them apart, within limits of yours:"
-"""Before the command that finds it."""
+NO_MOTION_TRIED = "None of the motions tried is expected to tell them apart."
+PLAN, PLAN_OTHERS = "Next, to tell them apart:", "To look for other motions:"
+"""Before the command that finds what to record: first of all, or, where no motion tried would help, as what else may be tried."""
+NEXT, OR = "Next", "Or go on without"
+"""Before the command to type: the only one, or beside that which tells apart what is tied."""
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
 
@@ -49,8 +51,14 @@ class Account:
     @property
     def first(self) -> list[str]:
         """What comes below the headline before anything else."""
-        planned = f"{PLAN} {self.planner}" if self.planner else ""
+        before = PLAN_OTHERS if self.advice.endswith(NO_MOTION_TRIED) else PLAN
+        planned = f"{before} {self.planner}" if self.planner else ""
         return [line for line in (*self.warnings, self.error, self.sure, self.advice, planned) if line]
+
+    @property
+    def lead(self) -> str:
+        """What stands before the command to type."""
+        return OR if self.planner and not self.advice.endswith(NO_MOTION_TRIED) else NEXT
 
     @property
     def words(self) -> list[str]:
@@ -106,11 +114,11 @@ def error_name(problem: Problem) -> str:
     return _capital(problem.natural_name) + unit
 
 
-def before_and_after(problem: Problem, before: float, after: float, floor: float, held_out: str) -> str:
+def before_and_after(problem: Problem, before: float, after: float, floor: float) -> str:
     """The model, the improved one and noise in one line."""
     return (
-        f"{error_name(problem)}: model {problem.told(before)}, improved model {problem.told(after)} held out "
-        f"({held_out}), noise floor {problem.told(floor)}."
+        f"{error_name(problem)}: model {problem.told(before)}, improved model {problem.told(after)}, noise floor "
+        f"{problem.told(floor)}."
     )
 
 
