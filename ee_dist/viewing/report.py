@@ -69,13 +69,13 @@ class Page:
     tone: str = "plain"
     first: Sequence[str] = ()
     following: str = ""
-    lead: str = "Next"
     proof: Section | None = None
     tiles: Sequence[tuple[str, str]] = ()
     sections: list[Section] = field(default_factory=list)
     links: Sequence[tuple[str, str]] = ()
     terms: Sequence[tuple[str, str]] = ()
     foot: str = ""
+    lead: str = "Next"
 
 
 def write_page(page: Page, path: str | Path) -> Path:

@@ -69,7 +69,7 @@ def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> 
     figure.add_vrect(x0=around[0], x1=around[1], fillcolor="#8899aa", opacity=0.14, line_width=0, layer="below")
     figure.add_hline(y=0, line={"color": "#8899aa", "width": 1}, row=2, col=1)
     styled(figure, 400)
-    figure.update_yaxes(title_text=curve.unit, row=1, col=1)
+    figure.update_yaxes(title_text="" if curve.unit == "1" else curve.unit, row=1, col=1)
     figure.update_yaxes(title_text="residual", row=2, col=1)
     figure.update_xaxes(title_text="s", row=2, col=1)
     return figure

@@ -15,26 +15,29 @@ from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.words import percent, phrase, plain, span, told, told_all
-from ee_dist.effects.catalogue import term
+from ee_dist.effects.catalogue import Term, term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.improve import effects_of
 from ee_dist.tasks.results.tables import typed
 
+DRY = term("coulomb_friction", "servo", torque_nm=0.3)
+
 
 def account(
-    tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = ()
-) -> Account:
+    tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = (),
+    what: Term = DRY, left: tuple[Leftover, ...] = (),
+) -> Account:  # fmt: skip
     best = SimpleNamespace(
-        terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
+        terms=(what,), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
         explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label="", guess=False),
     )  # fmt: skip
     found = SimpleNamespace(
         candidates=[],
         best=best,
         verdict=EFFECT,
-        left=[],
+        left=list(left),
         baseline_error=2.0,
         refitted_error=2.0,
         noise_floor=1.0,
@@ -74,6 +77,23 @@ def test_that_no_motion_tried_helps_is_not_that_none_does() -> None:
     assert told_of.planner == "plan it" and told_of.first[-1].endswith(" plan it")
     assert told_of.first[-1].startswith("To look for other motions: ") and told_of.lead == "Next"
     assert not account([], ahead=None, planner="plan it").planner, "nothing is tied"
+
+
+def test_a_noisy_sensor_explains_the_noise_that_it_leaves() -> None:
+    noise = term("sensor_noise", "speed", deviation=0.4)
+    quick, slow, other = (
+        Leftover("a", c, 9.0, 3.0, t) for c, t in (("speed", False), ("speed", True), ("position", False))
+    )
+    its_own = account([], 0.23, what=noise, left=(quick,))
+    assert its_own.good and its_own.headline.endswith("rad/s). What is left there is this noise itself.")
+    assert "several" not in its_own.headline and not any("more than noise" in line for line in its_own.lines)
+    for more in (slow, other):
+        open_ = account([], 0.23, what=noise, left=(quick, more))
+        assert (
+            not open_.good
+            and "as one of several things" in open_.headline
+            and "in 1 curve; worst" in " ".join(open_.lines)
+        )
 
 
 def test_what_is_tied_is_open_and_told_apart_before_it_is_added() -> None:

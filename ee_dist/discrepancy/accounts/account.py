@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed, plain
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
+from ee_dist.effects.groups import members_of
+from ee_dist.robots.model import Robot
 
 TWINS = 2
 """Others that a headline names beside the one that was found,"""
@@ -19,6 +22,8 @@ GRANTED = "The little above the floor is chance, and contacts or reversals that 
 SPREAD = (
     "What is left stands out nowhere. All together it is more than noise, and too little to tell apart in any channel."
 )
+NOISE = "sensor_noise"
+THAT_NOISE = "What is left there is this noise itself."
 NOTHING_ELSE = "Nothing else is left above the noise."
 BEYOND = "Nothing else is left beyond what may be noise."
 CONTENT = (
@@ -140,6 +145,16 @@ def tie_text(what: str, others: Sequence[str]) -> str:
 def left_text(left: Sequence[Leftover], after: bool) -> str:
     head = "Even with it, more than noise is left in" if after else "It sits in"
     return f"{head} {counted(curves_of(left), 'curve')}; worst: {'; '.join(plain(str(g)) for g in left[:3])}."
+
+
+def left_beside_noise(left: Sequence[Leftover], terms: Hypothesis, robot: Robot) -> Sequence[Leftover]:
+    """What is left that is not the noise of sensors which ``terms`` found noisier than declared: the floor knows only what is
+    declared, and no model foresees a reading's own error."""
+    noisy = set[str]()
+    for t in terms:
+        if t.effect == NOISE:
+            noisy |= {t.target, *members_of(robot, t.target, CATALOGUE[t.effect].targets(robot))}
+    return [g for g in left if g.trend or g.channel not in noisy]
 
 
 def curves_of(left: Sequence[Leftover]) -> int:

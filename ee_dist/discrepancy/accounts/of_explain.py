@@ -12,6 +12,7 @@ from ee_dist.discrepancy.accounts.account import (
     NO_MOTION_TRIED,
     NOTHING_ELSE,
     STUCK,
+    THAT_NOISE,
     TWINS,
     Account,
     advised,
@@ -20,6 +21,7 @@ from ee_dist.discrepancy.accounts.account import (
     counted,
     curves_of,
     error_name,
+    left_beside_noise,
     left_text,
     listed_few,
     slower,
@@ -30,7 +32,7 @@ from ee_dist.discrepancy.accounts.account import (
 )
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
 from ee_dist.discrepancy.evidence.judge import LUCK, Judged
-from ee_dist.discrepancy.evidence.left import SETTLED
+from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
@@ -50,6 +52,7 @@ def explain_account(
     """The verdict, what it is, what speaks for it, what stays open, what to do next; ``planner`` is said where something is tied
     that another trial might tell apart, ``confidence`` is that of confidence.py."""
     robot, best = problem.robot, found.best
+    rest: Sequence[Leftover] = found.left
     lines = [
         f"Noise floor: {found.floor_source}. {counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried."
     ]
@@ -78,10 +81,12 @@ def explain_account(
         # Those that were judged are the most promising: where all of them are tied there may be more.
         more = "at least " if len(best.tied_with) + 1 == len(found.candidates) < found.tried else ""
         less = is_less(best.terms)
-        head = f"{'Too much' if less else 'Missing'}{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best, more)}."
+        rest = left_beside_noise(found.left, best.terms, robot)
+        head = f"{'Too much' if less else 'Missing'}{', as one of several things' if rest else ''}: "
+        head += f"{told_all(best.terms, robot)}{_twins(best, more)}."
         nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
         nothing = BEYOND if unsure else nothing
-        head += " More than noise is left with it." if found.left else f" {nothing}"
+        head += " More than noise is left with it." if rest else f" {THAT_NOISE if found.left else nothing}"
         error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor)
         sure = f"How sure: it explains {taken_off(best)}{unexplained_rest(best.explained, not found.left)}. "
         sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}."
@@ -106,8 +111,8 @@ def explain_account(
         advice = STUCK
         lines += [f"Nearest, but not good enough: {phrase(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]]
     lines += beside_floor(last, found.noise_floor, bool(found.left))
-    if found.left:
-        lines.append(left_text(found.left, found.verdict == EFFECT))
+    if rest:
+        lines.append(left_text(rest, found.verdict == EFFECT))
     if ahead is not None and ahead.separation < ENOUGH:
         advice = NO_MOTION_TRIED
     elif ahead is not None:
@@ -119,9 +124,7 @@ def explain_account(
         )
     sure = f"{sure} {_counted_right(confidence)}."
     tied = bool(found.verdict == EFFECT and best is not None and best.tied_with)
-    good = (
-        (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)) and not unsure and not tied
-    )
+    good = (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not rest)) and not unsure and not tied
     return Account(
         head,
         error,
@@ -144,10 +147,6 @@ def _counted_right(confidence: float | None) -> str:
     if confidence is None:
         return "How often such a verdict is right was not counted"
     return f"In {100 * confidence:.0f} of 100 simulated cases that looked like this one, the verdict was right"
-
-
-def _doubt(found: Explanation) -> str:
-    return "" if not found.left else ", as one of several things"
 
 
 def _twins(best: Judged, more: str) -> str:

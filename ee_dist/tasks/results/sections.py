@@ -64,7 +64,9 @@ def proof_section(
     gained = residual**2 - (problem.floor if after is None else after**2)
     cell = problem.segment_of * width + problem.channel_of
     count = len(problem.segments) * width
-    excess = np.bincount(cell, weights=np.where(problem.layout.reading, gained, 0.0), minlength=count)
+    drawn_ = np.where(problem.layout.reading, gained, 0.0)
+    # What makes a channel rougher, and nothing else, gains in what is compared besides readings.
+    excess = np.bincount(cell, weights=drawn_ if drawn_.sum() > 0.5 * gained.sum() else gained, minlength=count)
     asked = np.tile([not channel or name == channel for name in problem.channels], len(problem.segments))
     excess = np.where(asked, excess, -np.inf)
     by_name = {(o.channel, o.trial): o for o in overlays}
