@@ -12,6 +12,8 @@ from ee_dist.robots.model import Robot
 
 DIGITS, MOST_DIGITS = 3, 8
 """Of the ends of an interval."""
+CHANGES, SIGNED = ("change", "along_x", "along_y", "along_z"), "+"
+"""Shares of what is described that come on top of it: told with a sign."""
 MANY = 3
 """Places of one effect from which their values are told as a range: each has its line in a table."""
 
@@ -51,7 +53,15 @@ def much(term: Term, robot: Robot | None = None) -> str:
 def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
     if value < 0 and CATALOGUE[term.effect].parameter(key).on_top:
         return f"{-value:.3g}{_unit(term, key, robot)} less{_than(term, key, value, robot)}"
+    if is_share(term.effect, key):
+        return f"{100 * value + 0.0:{SIGNED if key in CHANGES else ''}.3g} %"
     return f"{value:.3g}{_unit(term, key, robot)}"
+
+
+def is_share(effect: str, key: str) -> bool:
+    """Whether a value is a share of something, and told in percent: a number without a unit that does nothing at zero."""
+    parameter = CATALOGUE[effect].parameter(key)
+    return parameter.unit == "1" and parameter.neutral == 0.0
 
 
 def _than(term: Term, key: str, value: float, robot: Robot | None) -> str:
@@ -70,7 +80,8 @@ def is_less(terms: Hypothesis) -> bool:
 
 def span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> str:
     """An interval, with as many digits as its ends need to differ."""
-    unit, (a, b) = _unit(term, key, robot), apart(low, high)
+    share = is_share(term.effect, key)
+    unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
     if CATALOGUE[term.effect].parameter(key).on_top and low < 0:
         more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
         return f"{a.removeprefix('-')}{unit} less to {more}{_than(term, key, low, robot)}"

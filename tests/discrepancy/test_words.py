@@ -124,8 +124,8 @@ def test_many_values_are_told_by_kind_and_what_stands_alone_comes_first() -> Non
     mass = [term("part_mass", j, change=v) for j, v in zip(parts, (-0.1, 0.05, 0.0), strict=True)]
     alone = [term("load_friction", b, share=0.3), *(term("zero_offset", j, offset_rad=0.01) for j in (a, c))]
     assert phrase((*mass, *dry, *alone), robot) == (
-        f"load friction at {plain(b)} (share 0.3); zero offset at {plain(a)} (offset 0.01 rad); zero offset at {plain(c)} "
-        "(offset 0.01 rad); part mass at 3 parts (change -0.1 to 0.05); coulomb friction at 3 joints (torque 0.1 to 0.25 N.m)"
+        f"load friction at {plain(b)} (share 30 %); zero offset at {plain(a)} (offset 0.01 rad); zero offset at {plain(c)} "
+        "(offset 0.01 rad); part mass at 3 parts (change -10 to 5 %); coulomb friction at 3 joints (torque 0.1 to 0.25 N.m)"
     )
 
 
@@ -234,6 +234,22 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     assert not any("cannot tell" in line for line in gone.lines) and "not told from" not in gone.sure
     assert "Dropped again: offset torque at servo, which a later effect made useless." in lines
     assert "Left out in the end, since these data do not tell them from neutral: rotor inertia at servo." in lines
+
+
+@pytest.mark.parametrize(
+    ("said", "effect", "values"),
+    [
+        ("part mass at arm (change +266 %)", "part_mass", {"change": 2.66}),
+        ("part mass at arm (change -40 %)", "part_mass", {"change": -0.4}),
+        ("motor weak at arm (loss 29.9 %)", "motor_weak", {"loss": 0.2991}),
+        ("rotor factor at arm (factor 2.5)", "rotor_factor", {"factor": 2.5}),
+    ],
+)
+def test_shares_are_told_in_percent_and_factors_are_not(said: str, effect: str, values: dict[str, float]) -> None:
+    one = term(effect, "arm", **values)
+    assert told(one) == said
+    ((key, value),) = one.values
+    assert span(one, key, value - 0.01, value + 0.01, None).endswith(" %") is (key != "factor")
 
 
 def test_units_are_told_behind_values_and_not_in_names():
