@@ -22,7 +22,7 @@ EXACT = 1e-9
 
 
 def plain(name: str) -> str:
-    return name.replace("_", " ").replace("+", ", ")
+    return re.sub(r"\bcom\b", "centre of mass", name.replace("_", " ").replace("+", ", "))
 
 
 def placed(name: str) -> str:

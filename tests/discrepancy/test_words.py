@@ -240,6 +240,11 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     ("said", "effect", "values"),
     [
         ("part mass at arm (change +266 %)", "part_mass", {"change": 2.66}),
+        (
+            "centre of mass shifted at arm (along x 0.02 m, along y 0.01 m)",
+            "com_shifted",
+            {"along_x_m": 0.02, "along_y_m": 0.01},
+        ),
         ("part mass at arm (change -40 %)", "part_mass", {"change": -0.4}),
         ("motor weak at arm (loss 29.9 %)", "motor_weak", {"loss": 0.2991}),
         ("rotor factor at arm (factor 2.5)", "rotor_factor", {"factor": 2.5}),
@@ -248,8 +253,8 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
 def test_shares_are_told_in_percent_and_factors_are_not(said: str, effect: str, values: dict[str, float]) -> None:
     one = term(effect, "arm", **values)
     assert told(one) == said
-    ((key, value),) = one.values
-    assert span(one, key, value - 0.01, value + 0.01, None).endswith(" %") is (key != "factor")
+    key, value = one.values[0]
+    assert span(one, key, value - 0.01, value + 0.01, None).endswith(" %") is said.endswith("%)")
 
 
 def test_units_are_told_behind_values_and_not_in_names():
