@@ -14,6 +14,7 @@ DIGITS, MOST_DIGITS = 3, 8
 """Of the ends of an interval."""
 CHANGES, SIGNED = ("change", "along_x", "along_y", "along_z"), "+"
 """Shares of what is described that come on top of it: told with a sign."""
+SHARED = " than joints share"
 MANY = 3
 """Places of one effect from which their values are told as a range: each has its line in a table."""
 
@@ -69,7 +70,7 @@ def _than(term: Term, key: str, value: float, robot: Robot | None) -> str:
         return " than described"
     parameter = CATALOGUE[term.effect].parameter(key)
     beyond = takes_more_than_described(robot, term.target, parameter, value)
-    return " than joints share" if beyond else " than described"
+    return SHARED if beyond else " than described"
 
 
 def is_less(terms: Hypothesis) -> bool:
@@ -82,7 +83,9 @@ def span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> 
     """An interval, with as many digits as its ends need to differ."""
     share = is_share(term.effect, key)
     unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
-    if CATALOGUE[term.effect].parameter(key).on_top and low < 0:
+    # One joint shares nothing: an interval that goes below what there is is told as it is.
+    alone = robot is not None and len(robot.motor_names) == 1 and _than(term, key, low, robot) == SHARED
+    if CATALOGUE[term.effect].parameter(key).on_top and low < 0 and not alone:
         more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
         return f"{a.removeprefix('-')}{unit} less to {more}{_than(term, key, low, robot)}"
     return f"{a} to {b}{unit}"

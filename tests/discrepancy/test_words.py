@@ -236,6 +236,12 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     assert "Left out in the end, since these data do not tell them from neutral: rotor inertia at servo." in lines
 
 
+def test_one_joint_alone_shares_nothing() -> None:
+    stage = linear_stage()
+    wide = term("coulomb_friction", "carriage", torque_nm=20.4)
+    assert span(wide, "torque_nm", -26.7, 67.5, stage) == "-26.7 to 67.5 N"
+
+
 @pytest.mark.parametrize(
     ("said", "effect", "values"),
     [
