@@ -60,5 +60,5 @@ def within(p: ParameterReport) -> str:
         return f"{p.value:.4g}"
     digits = max(1 - math.floor(math.log10(half)), 0)  # two of the interval
     fine = half < FINE * abs(p.value)
-    shown = f"{p.value:.4g} ± {half:.1g}" if fine else f"{p.value:.{digits}f} ± {half:.{digits}f}"
+    shown = f"{p.value:.4g} ± {half:.1g}" if fine else f"{round(p.value, digits) + 0.0:.{digits}f} ± {half:.{digits}f}"
     return f"{shown} ({p.flag})" if p.flag else shown
