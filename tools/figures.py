@@ -57,7 +57,7 @@ BENCH = ("task.excitations=['multisine:seconds=4,amplitude=0.5,seed=1']", "task.
 MARKS = "Residual against what the joint did"
 
 
-def told(folder: Path, *words: str, usual: Sequence[str] = ("engine=mujoco", "evaluator=serial")) -> None:
+def told(folder: Path, *words: str, usual: Sequence[str] = ("engine=mujoco",)) -> None:
     """Run a command of ours in a folder, whose paths so are short in what is shown. Raises SystemExit where it fails."""
     settings = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "ee_dist", *words, *usual]
