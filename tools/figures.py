@@ -1,19 +1,24 @@
 """Pictures of the reports and rerun scenes of four robots, narrow and wide, light and dark: python tools/figures.py OUT
 
 Each robot is measured with something hidden, compared, explained and improved. Runs that are there already in OUT are
-looked at as they are; ``--docs`` puts the best pictures into docs/figures. Ends with status 1 if a page or a view complains,
-a page asks for anything outside or is wider than its window, or a scene cannot be shown. Some ten minutes on two cores.
+looked at as they are. ``--docs`` puts the best pictures into docs/figures, with those of the loop and of the workbench, which
+it runs too: all pictures of reports, scenes and pages that the documentation shows. Ends with status 1 if a page or a view
+complains, a page asks for anything outside or is wider than its window, or a scene cannot be shown. Some ten minutes on two
+cores, and with ``--docs`` as many more.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
+
+from PIL import Image
 
 from ee_dist.viewing.browser import BrowserError, HeadlessBrowser
 from ee_dist.viewing.headless import ViewerError
@@ -42,13 +47,20 @@ IN_DOCS = {
     "quadruped_explain_1280_light.png": "report_explain.png",
     "quadruped_improve_1280_dark.png": "report_dark.png",
 }
-MOST_BYTES = 250_000
+DOCS = ROOT / "docs" / "figures"
+COLOURS = 128
+"""Of a picture in docs: few, so that it stays small."""
+LOOP, LOOP_AT_S, LOOP_SIZE = "+scenario=8", 13.0, (1600, 1000)
+"""The run whose scene is shown, a moment at which robot and prediction have parted, and the window."""
+BENCH = ("task.excitations=['multisine:seconds=4,amplitude=0.5,seed=1']", "task.noise=0.002")
+"""The pendulum of the minute on the workbench: one calm record."""
+MARKS = "Residual against what the joint did"
 
 
-def told(folder: Path, *words: str) -> None:
+def told(folder: Path, *words: str, usual: Sequence[str] = ("engine=mujoco",)) -> None:
     """Run a command of ours in a folder, whose paths so are short in what is shown. Raises SystemExit where it fails."""
     settings = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "ee_dist", *words, "engine=mujoco", "evaluator=serial"]
+    command = [sys.executable, "-m", "ee_dist", *words, *usual]
     folder.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(command, cwd=folder, env=settings, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -89,6 +101,43 @@ def scene(folder: Path) -> Iterator[Shot]:
             yield name, seen.png, seen.reports
 
 
+def into_docs(name: str, png: bytes) -> None:
+    """A picture in few colours."""
+    with Image.open(io.BytesIO(png)) as picture:
+        picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(DOCS / name, optimize=True)
+    print(f"docs/figures/{name}", f"{(DOCS / name).stat().st_size / 1e3:.0f} kB", flush=True)
+
+
+def part(window: HeadlessBrowser, page: Path, heading: str) -> bytes:
+    """The section of a page under a heading."""
+    seen = window.look(page, WIDTHS[0], height=TALL, whole=True)
+    left, top, width, height = window.evaluate(
+        f"(() => {{ const box = [...document.querySelectorAll('section')].find((s) => s.querySelector('h2')?.textContent === "
+        f"'{heading}').getBoundingClientRect(); return [box.x, box.y + scrollY, box.width, box.height]; }})()"
+    )
+    with Image.open(io.BytesIO(seen.png)) as whole:
+        out = io.BytesIO()
+        whole.crop((int(left), int(top), int(left + width), int(top + height))).save(out, "png")
+    return out.getvalue()
+
+
+def shown_in_docs(window: HeadlessBrowser, out: Path) -> int:
+    """The pictures in docs that are no first screens: the mark of an effect, the scene of the loop, a minute on the workbench."""
+    into_docs("report_mark.png", part(window, story("quadruped", out)[-1] / "report.html", MARKS))
+    loop = out / "loop" / "logs" / "run"
+    if not (loop / "recovery.rrd").is_file():
+        told(out / "loop", LOOP, "hydra.run.dir=logs/run", usual=())
+    (seen,) = take_pictures(loop / "recovery.rrd", [LOOP_AT_S], size=LOOP_SIZE)
+    into_docs("run.png", seen.png)
+    trial = out / "workbench" / "logs" / "trial"
+    if not (trial / "trial.mcap").is_file():
+        hidden = next(w for w in STORIES["pendulum"] if w.startswith("+hidden"))
+        told(out / "workbench", "task=trial", "robot=servo_pendulum", hidden, *BENCH, "hydra.run.dir=logs/trial")
+    tour = [sys.executable, str(ROOT / "tools" / "workbench_pictures.py"), str(out / "workbench")]
+    log, settings = f"measured={trial}", {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run([*tour, log, "engine=mujoco", f"tour={DOCS}"], env=settings, check=False).returncode
+
+
 def main(arguments: list[str] | None = None) -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -109,9 +158,10 @@ def main(arguments: list[str] | None = None) -> int:
                             (options.out / label).write_bytes(png)
                         print(label, *wrong, sep="\n  ", flush=True)
                         faults += len(wrong)
-                        if options.docs and label in IN_DOCS and len(png) < MOST_BYTES:
-                            (ROOT / "docs" / "figures" / IN_DOCS[label]).write_bytes(png)
-    except BrowserError as error:
+                        if options.docs and label in IN_DOCS:
+                            into_docs(IN_DOCS[label], png)
+            faults += shown_in_docs(window, options.out.resolve()) if options.docs else 0
+    except (BrowserError, ViewerError) as error:
         print(f"no pictures: {error}", file=sys.stderr)
         return 1
     return 1 if faults else 0

@@ -12,6 +12,9 @@ from ee_dist.robots.model import Robot
 
 DIGITS, MOST_DIGITS = 3, 8
 """Of the ends of an interval."""
+CHANGES, SIGNED = ("change", "along_x", "along_y", "along_z"), "+"
+"""Shares of what is described that come on top of it: told with a sign."""
+SHARED = " than joints share"
 MANY = 3
 """Places of one effect from which their values are told as a range: each has its line in a table."""
 
@@ -20,7 +23,7 @@ EXACT = 1e-9
 
 
 def plain(name: str) -> str:
-    return name.replace("_", " ").replace("+", ", ")
+    return re.sub(r"\bcom\b", "centre of mass", name.replace("_", " ").replace("+", ", "))
 
 
 def placed(name: str) -> str:
@@ -51,7 +54,15 @@ def much(term: Term, robot: Robot | None = None) -> str:
 def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
     if value < 0 and CATALOGUE[term.effect].parameter(key).on_top:
         return f"{-value:.3g}{_unit(term, key, robot)} less{_than(term, key, value, robot)}"
+    if is_share(term.effect, key):
+        return f"{100 * value + 0.0:{SIGNED if key in CHANGES else ''}.3g} %"
     return f"{value:.3g}{_unit(term, key, robot)}"
+
+
+def is_share(effect: str, key: str) -> bool:
+    """Whether a value is a share of something, and told in percent: a number without a unit that does nothing at zero."""
+    parameter = CATALOGUE[effect].parameter(key)
+    return parameter.unit == "1" and parameter.neutral == 0.0
 
 
 def _than(term: Term, key: str, value: float, robot: Robot | None) -> str:
@@ -59,7 +70,7 @@ def _than(term: Term, key: str, value: float, robot: Robot | None) -> str:
         return " than described"
     parameter = CATALOGUE[term.effect].parameter(key)
     beyond = takes_more_than_described(robot, term.target, parameter, value)
-    return " than joints share" if beyond else " than described"
+    return SHARED if beyond else " than described"
 
 
 def is_less(terms: Hypothesis) -> bool:
@@ -70,8 +81,11 @@ def is_less(terms: Hypothesis) -> bool:
 
 def span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> str:
     """An interval, with as many digits as its ends need to differ."""
-    unit, (a, b) = _unit(term, key, robot), apart(low, high)
-    if CATALOGUE[term.effect].parameter(key).on_top and low < 0:
+    share = is_share(term.effect, key)
+    unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
+    # One joint shares nothing: an interval that goes below what there is is told as it is.
+    alone = robot is not None and len(robot.motor_names) == 1 and _than(term, key, low, robot) == SHARED
+    if CATALOGUE[term.effect].parameter(key).on_top and low < 0 and not alone:
         more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
         return f"{a.removeprefix('-')}{unit} less to {more}{_than(term, key, low, robot)}"
     return f"{a} to {b}{unit}"
@@ -101,8 +115,13 @@ def _unit(term: Term, key: str, robot: Robot | None) -> str:
 
 
 def percent(share: float) -> str:
-    """Never all of it where something is left."""
-    return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 - EXACT else f"{100 * share:.0f} %"
+    """Never all of it where something is left, and never less than nothing where it rounds to nothing."""
+    return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 - EXACT else f"{round(100 * share) + 0:d} %"
+
+
+def percents(low: float, high: float) -> str:
+    """An interval of shares: ``76 to 100 %``."""
+    return f"{percent(low).removesuffix(' %')} to {percent(high)}"
 
 
 def named(term: Term) -> str:

@@ -259,14 +259,19 @@ def _print(
     table.add_row("truth", "", "", "", "not known" if truth is None else lines(truth))
     console.print(table)
     verdict = "restored" if final.restored else "not restored"
-    named = f"{final.found} of {final.true} true effects at their place, {final.invented} that are not there"
     console.print(
         f"Function {verdict}: best trial {final.recovered_fraction:.0%} of intact."
         + _unwalked(cheats, final)
-        + ("" if truth is None else f" Diagnosis: {named}."),
+        + ("" if truth is None else f" Diagnosis: {named(final.found, final.true, final.invented)}."),
         highlight=False,
     )
     console.print(last.words, highlight=False)
+
+
+def named(found: int, true: int, invented: int) -> str:
+    """How a diagnosis came out."""
+    others = f"{invented} false one{'s' if invented > 1 else ''}" if invented else "nothing else"
+    return f"{found} of {true} true effect{'' if true == 1 else 's'} at {'its' if true == 1 else 'their'} place, and {others}"
 
 
 def _unwalked(cheats: Sequence[tuple[str, ...]], final: Score) -> str:

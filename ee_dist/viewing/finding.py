@@ -87,6 +87,7 @@ class Finding:
     ladder: tuple[Rung, ...] = ()
     better: Account | None = None
     next_command: str = ""
+    lead: str = "Next"
 
     def __post_init__(self) -> None:
         accounts = [self.model, self.better, *(c.account for c in self.candidates)]

@@ -141,7 +141,9 @@ def _layout(stage: _Stage, right: rrb.Container) -> rrb.Blueprint:
     if not stage.shots:
         return blueprint.framed(rrb.Vertical(text))
     view = blueprint.scene_view(
-        stage.found.robot, "Robot and model, where the error is largest", world.eye(stage.found.robot, stage.real)
+        stage.found.robot,
+        "Robot and model (play: where the error is largest)",
+        world.eye(stage.found.robot, stage.real),
     )
     left = rrb.Vertical(text, view, row_shares=[5, 4])
     whole = rrb.Horizontal(left, right, column_shares=[2, 3])

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ee_dist.discrepancy.words import percent
+from ee_dist.discrepancy.words import percent, percents
 from ee_dist.viewing.finding import BEST, TIED, Candidate, Finding
 
+COMMAND = "python -m ee_dist"
+"""A line may end with a command to type."""
 BAR = 5
 """Characters of the longest bar."""
 
@@ -31,8 +33,9 @@ def headline(found: Finding) -> list[str]:
     """Verdict, how large the error is and how sure all of it, and what to do next."""
     lines = [f"### {found.title}", "", f"**{found.verdict}**", ""]
     for line in found.lines:
-        lines += [line, ""]
-    return [*lines, f"Next: `{found.next_command}`", ""] if found.next_command else lines
+        before, command, rest = line.partition(COMMAND)
+        lines += [f"{before}`{command}{rest}`" if command else line, ""]
+    return [*lines, f"{found.lead}: `{found.next_command}`", ""] if found.next_command else lines
 
 
 def colours(found: Finding) -> list[str]:
@@ -69,7 +72,7 @@ def candidate_table(candidates: Sequence[Candidate]) -> list[str]:
     lines = ["| # | missing effect | gain | | 95 % interval | |", "|---|---|---|---|---|---|"]
     for k, c in enumerate(candidates):
         name = f"**{c.label}**" if c.kind in (BEST, TIED) else c.label
-        told = f"{percent(c.low)} to {percent(c.high)}"
+        told = percents(c.low, c.high)
         lines.append(f"| {k + 1} | {name} | {percent(c.gain)} | {bar(c.gain, largest)} | {told} | {c.kind} |")
     return lines
 

@@ -59,8 +59,8 @@ class Section:
 @dataclass
 class Page:
     """``tone``: good, open or plain, the colour of the finding. ``first``: lines below the headline: how large the error is,
-    how sure all of it; ``following``: the command to type next; ``proof``: the one picture that shows it. ``tiles``: (number,
-    what it is). ``links``: (name, relative path). ``terms``: (word, what it means)."""
+    how sure all of it; ``following``: the command to type next, after ``lead``; ``proof``: the one picture that shows it.
+    ``tiles``: (number, what it is). ``links``: (name, relative path). ``terms``: (word, what it means)."""
 
     title: str
     subtitle: str
@@ -75,6 +75,7 @@ class Page:
     links: Sequence[tuple[str, str]] = ()
     terms: Sequence[tuple[str, str]] = ()
     foot: str = ""
+    lead: str = "Next"
 
 
 def write_page(page: Page, path: str | Path) -> Path:

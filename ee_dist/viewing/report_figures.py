@@ -18,6 +18,8 @@ MEASURED, PREDICTED, IMPROVED = "#4a90d9", "#e08a00", "#2e9e62"
 FLOOR, MARK = "#a678e2", "#d0409a"
 DOTS = 700
 """Points of a cloud that are drawn; its mean is of all."""
+BAR_ROOM = 56
+"""Pixels above a map for the bar of its colours."""
 FEWEST = 5
 """Points that a mean is drawn of."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
@@ -67,7 +69,7 @@ def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> 
     figure.add_vrect(x0=around[0], x1=around[1], fillcolor="#8899aa", opacity=0.14, line_width=0, layer="below")
     figure.add_hline(y=0, line={"color": "#8899aa", "width": 1}, row=2, col=1)
     styled(figure, 400)
-    figure.update_yaxes(title_text=curve.unit, row=1, col=1)
+    figure.update_yaxes(title_text="" if curve.unit == "1" else curve.unit, row=1, col=1)
     figure.update_yaxes(title_text="residual", row=2, col=1)
     figure.update_xaxes(title_text="s", row=2, col=1)
     return figure
@@ -101,16 +103,17 @@ def heat_map(
             row=row,
             col=1,
         )
-    styled(figure, 176 + (30 + tall) * len(tables))
+    styled(figure, 100 + BAR_ROOM + (30 + tall) * len(tables))
     pale = min(1.3 * floor / top, 0.9)
     light = [[0, "#f7fbff"], [pale, "#e6eef7"], [0.95, "#b5261e"], [1, "#7a0f0a"]]
     dark = [[0, "#1d252e"], [pale, "#2a3542"], [0.95, "#e0564c"], [1, "#ff8a7a"]]
-    bar = {"title": {"text": label, "side": "top"}, "thickness": 10, "orientation": "h", "y": 1.0,
-           "yanchor": "bottom", "ypad": 20, "len": 0.45, "x": 1.0, "xanchor": "right"}  # fmt: skip
+    # At the top of the figure, not of the plot: there it would be given room twice over.
+    bar = {"thickness": 10, "orientation": "h", "yref": "container", "y": 1.0, "yanchor": "top", "ypad": 4, "len": 0.45,
+           "x": 1.0, "xanchor": "right"}  # fmt: skip
     figure.update_layout(
         coloraxis={"cmin": 0.0, "cmax": top, "colorscale": light, "colorbar": bar},
         hovermode="closest",
-        margin={"l": 20, "r": 16, "t": 76, "b": 30},
+        margin={"l": 20, "r": 16, "t": BAR_ROOM, "b": 30},
         meta={
             "light": {"coloraxis.colorscale": light},
             "dark": {"coloraxis.colorscale": dark},
@@ -119,6 +122,8 @@ def heat_map(
         },
     )
     figure.update_annotations(x=0.0, xanchor="left")
+    figure.add_annotation(text=label, showarrow=False, xref="paper", x=0.54, xanchor="right", yref="paper", y=1.0,
+                          yanchor="top", yshift=BAR_ROOM, font_size=12)  # fmt: skip
     figure.update_yaxes(autorange="reversed", automargin=True, showgrid=False, dtick=1)
     figure.update_xaxes(tickangle=-60, showgrid=False, automargin=True)
     return figure

@@ -75,7 +75,8 @@ def trial_text(run: RunRecord, trials: Sequence[TrialRecord], names: Sequence[st
         lines += ["", "Went forward: " + ", ".join(f"{m:.2f}" for m in gone) + " m."]
     if robot.free_base and any(t.log.base_pose is None for t in trials):
         lines += ["", "Where its body was, was not measured: it is drawn where it starts."]
-    told = [f"{key.replace('_', ' ')} {about[key]}" for key in ("engine", "noise", "seed") if about.get(key)]
+    told = [f"{key} {about[key]}" for key in ("engine", "seed") if about.get(key)]
+    told += [f"noise {100 * float(about['noise']):.3g} % of each channel's range"] if about.get("noise") else []
     if told:
         lines += ["", ", ".join(told).capitalize() + "."]
     if not run.complete:

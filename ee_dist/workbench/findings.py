@@ -11,9 +11,9 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import placed, told_all
+from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import CATALOGUE
-from ee_dist.tasks.results.tables import TIED_STANDING, standing
+from ee_dist.tasks.results.tables import TIED_STANDING, candidate_label, standing
 from ee_dist.workbench.bench import Step
 from ee_dist.workbench.results import BEST, EARNED, REFUSED, TIED, Explained, Improved, Ranked
 
@@ -32,7 +32,7 @@ def _ranked(problem: Problem, found: Explanation, c: Judged, best: Judged) -> Ra
     entry = CATALOGUE[c.terms[0].effect]
     return Ranked(
         c.name,
-        told_all(c.terms, problem.robot),
+        candidate_label(c, problem.robot),
         c.terms,
         (*found.fixed, *c.hypothesis),
         c.error_heldout,

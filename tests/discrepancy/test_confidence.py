@@ -72,7 +72,7 @@ def test_nothing_is_said_of_what_nobody_counted(friction: tuple[Problem, Explana
     assert confidence("open_loop", found, strict) is None, "no case fitted as badly"
     assert found.best is not None
     sure = explain_account(problem, found, None, "", None).sure
-    assert sure.endswith("how often such a verdict is right was not counted.")
+    assert sure.endswith("How often such a verdict is right was not counted.")
 
 
 def test_other_verdicts_are_right_as_often_as_they_were() -> None:
@@ -83,7 +83,7 @@ def test_other_verdicts_are_right_as_often_as_they_were() -> None:
     assert share == pytest.approx(right / cases, abs=0.02)
     said = explain_account(problem, found, None, "", share).sure
     assert said.endswith(
-        f"in {100 * (share or 0):.0f} of 100 simulated cases that looked like this one the verdict was right."
+        f"In {100 * (share or 0):.0f} of 100 simulated cases that looked like this one, the verdict was right."
     )
     few = replace(RULE, counted={UNEXPLAINED: (FEWEST - 1, FEWEST - 1)})
     assert confidence("open_loop", SimpleNamespace(verdict=UNEXPLAINED, best=None), few) is None  # type: ignore[arg-type]

@@ -15,26 +15,29 @@ from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.words import percent, phrase, plain, span, told, told_all
-from ee_dist.effects.catalogue import term
+from ee_dist.effects.catalogue import Term, term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.improve import effects_of
 from ee_dist.tasks.results.tables import typed
 
+DRY = term("coulomb_friction", "servo", torque_nm=0.3)
+
 
 def account(
-    tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = ()
-) -> Account:
+    tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = (),
+    what: Term = DRY, left: tuple[Leftover, ...] = (),
+) -> Account:  # fmt: skip
     best = SimpleNamespace(
-        terms=(term("coulomb_friction", "servo", torque_nm=0.3),), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
+        terms=(what,), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
         explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label="", guess=False),
     )  # fmt: skip
     found = SimpleNamespace(
         candidates=[],
         best=best,
         verdict=EFFECT,
-        left=[],
+        left=list(left),
         baseline_error=2.0,
         refitted_error=2.0,
         noise_floor=1.0,
@@ -63,7 +66,7 @@ def test_what_looks_the_same_is_named(tied: list[str], said: str) -> None:
 
 
 def test_a_rest_above_the_noise_is_no_contradiction_where_nothing_is_left() -> None:
-    assert "; what it leaves of that stands out nowhere; of 9" in account([], 0.66).sure
+    assert "; what it leaves of that stands out nowhere. Of 9" in account([], 0.66).sure
     assert "leaves" not in account([], 0.99).sure
 
 
@@ -72,14 +75,38 @@ def test_that_no_motion_tried_helps_is_not_that_none_does() -> None:
     told_of = account(["a@c"], ahead=ahead, planner="plan it")
     assert told_of.advice == "None of the motions tried is expected to tell them apart."
     assert told_of.planner == "plan it" and told_of.first[-1].endswith(" plan it")
+    assert told_of.first[-1].startswith("To look for other motions: ") and told_of.lead == "Next"
     assert not account([], ahead=None, planner="plan it").planner, "nothing is tied"
 
 
+def test_a_noisy_sensor_explains_the_noise_that_it_leaves() -> None:
+    noise = term("sensor_noise", "speed", deviation=0.4)
+    quick, slow, other = (
+        Leftover("a", c, 9.0, 3.0, t) for c, t in (("speed", False), ("speed", True), ("position", False))
+    )
+    its_own = account([], 0.23, what=noise, left=(quick,))
+    assert its_own.good and its_own.headline.endswith("rad/s). What is left there is this noise itself.")
+    assert "several" not in its_own.headline and not any("more than noise" in line for line in its_own.lines)
+    for more in (slow, other):
+        open_ = account([], 0.23, what=noise, left=(quick, more))
+        assert (
+            not open_.good
+            and "as one of several things" in open_.headline
+            and "in 1 curve; worst" in " ".join(open_.lines)
+        )
+
+
+def test_what_is_tied_is_open_and_told_apart_before_it_is_added() -> None:
+    tied, alone = account(["a@c"], planner="plan it"), account([], planner="plan it")
+    assert tied.first[-1] == "Next, to tell them apart: plan it" and tied.lead == "Or go on without" and not tied.good
+    assert alone.lead == "Next" and alone.good
+
+
 def test_more_twins_than_a_headline_holds_are_named_below_it() -> None:
-    assert "of 9 explanations no other does as well" in account([]).sure
-    assert "2 others do as well; " in account(["a@c", "b@c"]).sure, "the headline names them"
-    assert "3 others do as well (a at c; b at c; d at c); " in account(["a@c", "b@c", "d@c"]).sure
-    assert "(a at c; b at c; d at c; e at c and 2 more); " in account([f"{x}@c" for x in "abdefg"]).sure
+    assert "Of 9 explanations no other does as well." in account([]).sure
+    assert "2 others do as well. " in account(["a@c", "b@c"]).sure, "the headline names them"
+    assert "3 others do as well (a at c; b at c; d at c). " in account(["a@c", "b@c", "d@c"]).sure
+    assert "(a at c; b at c; d at c; e at c and 2 more). " in account([f"{x}@c" for x in "abdefg"]).sure
 
 
 def test_one_effect_at_several_joints_is_told_with_each_of_its_values() -> None:
@@ -97,8 +124,8 @@ def test_many_values_are_told_by_kind_and_what_stands_alone_comes_first() -> Non
     mass = [term("part_mass", j, change=v) for j, v in zip(parts, (-0.1, 0.05, 0.0), strict=True)]
     alone = [term("load_friction", b, share=0.3), *(term("zero_offset", j, offset_rad=0.01) for j in (a, c))]
     assert phrase((*mass, *dry, *alone), robot) == (
-        f"load friction at {plain(b)} (share 0.3); zero offset at {plain(a)} (offset 0.01 rad); zero offset at {plain(c)} "
-        "(offset 0.01 rad); part mass at 3 parts (change -0.1 to 0.05); coulomb friction at 3 joints (torque 0.1 to 0.25 N.m)"
+        f"load friction at {plain(b)} (share 30 %); zero offset at {plain(a)} (offset 0.01 rad); zero offset at {plain(c)} "
+        "(offset 0.01 rad); part mass at 3 parts (change -10 to 5 %); coulomb friction at 3 joints (torque 0.1 to 0.25 N.m)"
     )
 
 
@@ -114,7 +141,9 @@ def test_what_a_candidate_has_is_what_the_next_command_asks_for() -> None:
 
 def compared(error: float, left: list[Leftover]) -> Account:
     found = SimpleNamespace(
-        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={}, channels=[SimpleNamespace(name="a_b")],
+        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={},
+        channels=[SimpleNamespace(name="a_b", normalised=error), SimpleNamespace(name="command_b", normalised=0.0)],
+
         unsure=[],
     )  # fmt: skip
     problem = SimpleNamespace(
@@ -125,7 +154,7 @@ def compared(error: float, left: list[Leftover]) -> Account:
         natural_unit="mm",
         notes=[],
         doubts="",
-        channels=("a_b",),
+        channels=("a_b", "command_b"),
         trials=("sway",),
     )
     return compare_account(problem, found, left)  # type: ignore[arg-type]
@@ -141,7 +170,7 @@ def test_a_small_error_is_no_agreement_where_a_channel_stands_out() -> None:
     calm, loud = compared(1.02, []), compared(1.02, [Leftover("sway", "a_b", 7.0, 3.0, True)])
     assert calm.good and calm.headline.startswith("The model agrees") and calm.advice.startswith("Next: nothing")
     assert not loud.good and "nearly right" in loud.headline and "most of all at a b" in loud.headline
-    assert "stands out in 1 of 1 curve (1 channel in 1 trial)" in loud.sure and not loud.advice
+    assert "1 of 1 curve (1 channel in 1 trial) differs by more than noise" in loud.sure and not loud.advice
 
 
 def test_times_the_floor_are_those_of_the_errors_that_are_told() -> None:
@@ -157,7 +186,7 @@ def test_small_errors_keep_their_digits(error_m: float, said: str) -> None:
 def test_what_may_be_noise_is_no_proof_that_nothing_is_left() -> None:
     told_of = account([], unsure=("knee_left", "hip"))
     assert told_of.headline.endswith("Nothing else is left beyond what may be noise.") and not told_of.good
-    assert "; the noise floor is only an upper bound at knee left, hip; " in told_of.sure
+    assert "; the noise floor is only an upper bound at knee left, hip. " in told_of.sure
     assert told_of.advice.startswith("To tell, repeat the motion at a third of its pace")
     assert account([]).good and "beyond" not in " ".join(account([]).words)
 
@@ -205,6 +234,33 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     assert not any("cannot tell" in line for line in gone.lines) and "not told from" not in gone.sure
     assert "Dropped again: offset torque at servo, which a later effect made useless." in lines
     assert "Left out in the end, since these data do not tell them from neutral: rotor inertia at servo." in lines
+
+
+def test_one_joint_alone_shares_nothing() -> None:
+    stage = linear_stage()
+    wide = term("coulomb_friction", "carriage", torque_nm=20.4)
+    assert span(wide, "torque_nm", -26.7, 67.5, stage) == "-26.7 to 67.5 N"
+
+
+@pytest.mark.parametrize(
+    ("said", "effect", "values"),
+    [
+        ("part mass at arm (change +266 %)", "part_mass", {"change": 2.66}),
+        (
+            "centre of mass shifted at arm (along x 0.02 m, along y 0.01 m)",
+            "com_shifted",
+            {"along_x_m": 0.02, "along_y_m": 0.01},
+        ),
+        ("part mass at arm (change -40 %)", "part_mass", {"change": -0.4}),
+        ("motor weak at arm (loss 29.9 %)", "motor_weak", {"loss": 0.2991}),
+        ("rotor factor at arm (factor 2.5)", "rotor_factor", {"factor": 2.5}),
+    ],
+)
+def test_shares_are_told_in_percent_and_factors_are_not(said: str, effect: str, values: dict[str, float]) -> None:
+    one = term(effect, "arm", **values)
+    assert told(one) == said
+    key, value = one.values[0]
+    assert span(one, key, value - 0.01, value + 0.01, None).endswith(" %") is said.endswith("%)")
 
 
 def test_units_are_told_behind_values_and_not_in_names():

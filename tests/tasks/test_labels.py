@@ -8,9 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ee_dist.effects.catalogue import Term
+from ee_dist.robots.quadruped import quadruped
 from ee_dist.tasks import trial
 from ee_dist.tasks.config import Config, EngineConfig, RobotConfig
 from ee_dist.tasks.results.labels import excess_share, trial_name, worst_trials
+from ee_dist.tasks.results.tables import candidate_label
 
 
 def test_the_worst_trial_is_told_from_its_repeat() -> None:
@@ -34,3 +37,12 @@ def test_little_noise_is_not_none(noise: float, said: str, tmp_path: Path, capsy
     config = Config(robot=RobotConfig(name="servo_pendulum"), engine=EngineConfig("mujoco"))
     trial.run(config, trial.Options(excitations=["multisine:seconds=0.5"], repeats=1, noise=noise), tmp_path)
     assert f"Noise: {said} of each channel's range." in capsys.readouterr().out
+
+
+def test_values_of_many_places_are_told_one_by_one_only_where_they_were_earned() -> None:
+    robot = quadruped()
+    places = zip(robot.motor_names, (0.1, 0.2, 0.15), strict=False)
+    terms = tuple(Term("coulomb_friction", name, (("torque_nm", value),)) for name, value in places)
+    each, short = (candidate_label(SimpleNamespace(terms=terms, earned=e), robot) for e in (True, False))  # type: ignore[arg-type]
+    assert "each joint by itself" in each and "0.15 N.m" in each
+    assert short == "coulomb friction at 3 joints (torque 0.1 to 0.2 N.m)"

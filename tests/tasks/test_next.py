@@ -33,6 +33,14 @@ def test_what_every_run_has_is_left_out():
     assert asked("compare", Config(measured="a.mcap"), AUTO) == ["task=compare", "measured=a.mcap"]
 
 
-@pytest.mark.parametrize("name", ["123", "1e3", "-0.5", "1_000", "null", "True", "nan", "", "a@Gelenk_ü", "2024-05-01"])
+def test_a_pair_of_joints_needs_no_quotes():
+    words = [setting("effect", "motors_swapped@hip_front_left+knee_front_left")]
+    assert command(words).endswith(" effect=motors_swapped@hip_front_left+knee_front_left")
+    assert read(command(words)) == {"effect": "motors_swapped@hip_front_left+knee_front_left"}
+
+
+@pytest.mark.parametrize(
+    "name", ["+1", "123", "1e3", "-0.5", "1_000", "null", "True", "nan", "", "a@Gelenk_ü", "2024-05-01"]
+)
 def test_words_stay_words(name):
     assert read(command([setting("effect", name)])) == {"effect": name}

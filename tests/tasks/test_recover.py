@@ -20,6 +20,7 @@ from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
 from ee_dist.recovery.doubt import doubt_from
+from ee_dist.tasks.recover import named
 from ee_dist.viewing.story import told
 
 KEYS = {
@@ -67,6 +68,18 @@ def test_terminal_tells_the_result_and_where_the_files_are(finished):
     last_lines = " ".join(out.split())
     assert ("Something is wrong that it does not say" in last_lines) == summary["doubt"]["said"]
     assert summary["result_digest"][:16] in out
+
+
+@pytest.mark.parametrize(
+    ("counts", "said"),
+    [
+        ((3, 3, 0), "3 of 3 true effects at their place, and nothing else"),
+        ((2, 3, 1), "2 of 3 true effects at their place, and 1 false one"),
+        ((0, 1, 2), "0 of 1 true effect at its place, and 2 false ones"),
+    ],
+)
+def test_what_a_diagnosis_names_is_a_sentence(counts, said):
+    assert named(*counts) == said
 
 
 def test_plain_mcap_lists_every_trial_and_hypothesis(finished):

@@ -20,6 +20,7 @@ from ee_dist.tasks.results.values import kinds_of, within
         (0.20316, 0.0027, "", "0.2032 ± 0.0027"),
         (203.47, 3.44, "", "203.5 ± 3.4"),
         (12345.6, 321.0, "", "12346 ± 321"),
+        (-0.245, 47.0, "", "0 ± 47"),
         (0.0071, 0.106, NEUTRAL, f"0.01 ± 0.11 ({NEUTRAL})"),
         (0.5, math.inf, NOT_DETERMINED, f"0.5 ({NOT_DETERMINED})"),
         (0.25, 0.0, "", "0.25"),

@@ -85,6 +85,17 @@ def test_a_page_is_quiet_and_fits(window: HeadlessBrowser, page: Path, width: in
     assert ink > 180 if dark else ink < 90, "figures follow"
 
 
+def test_the_bar_of_colours_is_close_above_the_map(window: HeadlessBrowser, page: Path) -> None:
+    window.look(page, 1280)
+    bar, tall, top, map_top = window.evaluate(
+        "(() => { const bar = document.querySelector('.colorbar'), plot = bar.closest('.plot');"
+        "const box = (e) => e.getBoundingClientRect(), at = (s) => box(plot.querySelector(s));"
+        "return [box(bar).top, box(bar).height, box(plot).top, at('.heatmaplayer').top]; })()"
+    )
+    assert 0 <= bar - top < 12, "no empty stretch above it"
+    assert bar + tall < map_top < top + 1.5 * figures.BAR_ROOM
+
+
 def test_what_would_be_wrong_is_seen(window: HeadlessBrowser, tmp_path: Path) -> None:
     bad = tmp_path / "bad.html"
     bad.write_text(

@@ -73,7 +73,7 @@ def test_the_scenes_of_the_verbs_have_no_view_errors(write: Callable[..., None],
     assert picture.reports == ()
     assert len(picture.png) > 30_000
     assert "Result" in picture.views
-    assert "Robot and model, where the error is largest" in picture.views
+    assert "Robot and model (play: where the error is largest)" in picture.views
 
 
 @needs_vulkan

@@ -27,6 +27,7 @@ def test_trials_of_any_robot_are_told_and_drawn(name: str, tmp_path: Path) -> No
     text = rows_of(tmp_path / "trial.rrd", "texts/result", "TextDocument:text")[1][0][0]
     assert f"| 1. slow | 1.2 | {len(slow)} | {len(slow.sensor_names)} |" in text
     assert "sealed: nothing here tells it" in text
+    assert "Noise 2 % of each channel's range." in text
     layout = "\n".join(contents_of(tmp_path / "trial.rrd", blueprint=True))
     for wrong in ("nan", "cut short", "generation", "Orange"):
         assert wrong not in text + layout

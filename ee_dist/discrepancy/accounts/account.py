@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed, plain
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
+from ee_dist.effects.groups import members_of
+from ee_dist.robots.model import Robot
 
 TWINS = 2
 """Others that a headline names beside the one that was found,"""
@@ -15,18 +18,22 @@ FEW = 4
 """and the line below it, where there are more."""
 MOSTLY = 0.97
 """Share of what is above the noise from which nobody asks for the rest."""
-GRANTED = "What is above the floor is no more than chance, and what contacts and reversals leave that come a row early or late."
+GRANTED = "The little above the floor is chance, and contacts or reversals that come one row early or late."
 SPREAD = (
-    "What is left stands out nowhere; all together it is more than noise, and below the resolution at which channels are "
-    "compared."
+    "What is left stands out nowhere. All together it is more than noise, and too little to tell apart in any channel."
 )
+NOISE = "sensor_noise"
+THAT_NOISE = "What is left there is this noise itself."
 NOTHING_ELSE = "Nothing else is left above the noise."
 BEYOND = "Nothing else is left beyond what may be noise."
 CONTENT = (
     "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
 )
-PLAN = "What to record to tell them apart, within limits of yours:"
-"""Before the command that finds it."""
+NO_MOTION_TRIED = "None of the motions tried is expected to tell them apart."
+PLAN, PLAN_OTHERS = "Next, to tell them apart:", "To look for other motions:"
+"""Before the command that finds what to record: first of all, or, where no motion tried would help, as what else may be tried."""
+NEXT, OR = "Next", "Or go on without"
+"""Before the command to type: the only one, or beside that which tells apart what is tied."""
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
 
@@ -49,8 +56,14 @@ class Account:
     @property
     def first(self) -> list[str]:
         """What comes below the headline before anything else."""
-        planned = f"{PLAN} {self.planner}" if self.planner else ""
+        before = PLAN_OTHERS if self.advice.endswith(NO_MOTION_TRIED) else PLAN
+        planned = f"{before} {self.planner}" if self.planner else ""
         return [line for line in (*self.warnings, self.error, self.sure, self.advice, planned) if line]
+
+    @property
+    def lead(self) -> str:
+        """What stands before the command to type."""
+        return OR if self.planner and not self.advice.endswith(NO_MOTION_TRIED) else NEXT
 
     @property
     def words(self) -> list[str]:
@@ -106,11 +119,11 @@ def error_name(problem: Problem) -> str:
     return _capital(problem.natural_name) + unit
 
 
-def before_and_after(problem: Problem, before: float, after: float, floor: float, held_out: str) -> str:
+def before_and_after(problem: Problem, before: float, after: float, floor: float) -> str:
     """The model, the improved one and noise in one line."""
     return (
-        f"{error_name(problem)}: model {problem.told(before)}, improved model {problem.told(after)} held out "
-        f"({held_out}), noise floor {problem.told(floor)}."
+        f"{error_name(problem)}: model {problem.told(before)}, improved model {problem.told(after)}, noise floor "
+        f"{problem.told(floor)}."
     )
 
 
@@ -132,6 +145,16 @@ def tie_text(what: str, others: Sequence[str]) -> str:
 def left_text(left: Sequence[Leftover], after: bool) -> str:
     head = "Even with it, more than noise is left in" if after else "It sits in"
     return f"{head} {counted(curves_of(left), 'curve')}; worst: {'; '.join(plain(str(g)) for g in left[:3])}."
+
+
+def left_beside_noise(left: Sequence[Leftover], terms: Hypothesis, robot: Robot) -> Sequence[Leftover]:
+    """What is left that is not the noise of sensors which ``terms`` found noisier than declared: the floor knows only what is
+    declared, and no model foresees a reading's own error."""
+    noisy = set[str]()
+    for t in terms:
+        if t.effect == NOISE:
+            noisy |= {t.target, *members_of(robot, t.target, CATALOGUE[t.effect].targets(robot))}
+    return [g for g in left if g.trend or g.channel not in noisy]
 
 
 def curves_of(left: Sequence[Leftover]) -> int:

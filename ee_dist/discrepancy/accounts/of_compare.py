@@ -31,8 +31,9 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     off = problem.told(found.error)
     lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}.", *assumed_text(problem.robot)]
     lines += beside_floor(found.error, found.noise_floor, bool(left))
-    parted = [f"{t} at {s:.2f} s" for t, s in found.parted_s.items() if s is not None]
-    lines.append("Prediction and measurement part: " + ("; ".join(parted) or "nowhere") + ".")
+    first = zip(problem.trials, found.parted_s.values(), strict=False)
+    parted = [f"{k}. {t} at {s:.2f} s" for k, (t, s) in enumerate(first, start=1) if s is not None]
+    lines.append("Measurement and prediction first differ clearly: " + ("; ".join(parted) or "nowhere") + ".")
     if left:
         lines.append(left_text(left, False))
     if ratio < CLOSE and not left:
@@ -48,12 +49,14 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
         head = f"{how}{where}: {problem.natural_name} {off}, {times} what noise alone would leave."
     floor = problem.told(found.noise_floor)
     error = f"{error_name(problem)}: model {off}, noise floor {floor}."
-    places = counted(len(found.channels) * len(problem.trials), "curve")
-    of = f"{places} ({counted(len(found.channels), 'channel')} in {counted(len(problem.trials), 'trial')})"
+    # A channel that agrees to the last digit is a command that no sensor comes into: there is nothing to compare.
+    compared = [c for c in found.channels if c.normalised > 0] or found.channels
+    places = counted(len(compared) * len(problem.trials), "curve")
+    of = f"{places} ({counted(len(compared), 'channel')} in {counted(len(problem.trials), 'trial')})"
     sure = (
-        f"How sure: more than noise stands out in {curves_of(left)} of {of}"
+        f"How sure: {curves_of(left)} of {of} differ{'s' if curves_of(left) == 1 else ''} by more than noise"
         if left
-        else f"How sure: none of {of} stands out"
+        else f"How sure: none of {of} differs by more than noise"
     )
     sure += f"; the noise floor is {found.floor_source}."
     settled = ratio < CLOSE and not left

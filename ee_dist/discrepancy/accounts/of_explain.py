@@ -9,8 +9,10 @@ import numpy as np
 from ee_dist.discrepancy.accounts.account import (
     BEYOND,
     CONTENT,
+    NO_MOTION_TRIED,
     NOTHING_ELSE,
     STUCK,
+    THAT_NOISE,
     TWINS,
     Account,
     advised,
@@ -19,6 +21,7 @@ from ee_dist.discrepancy.accounts.account import (
     counted,
     curves_of,
     error_name,
+    left_beside_noise,
     left_text,
     listed_few,
     slower,
@@ -29,15 +32,14 @@ from ee_dist.discrepancy.accounts.account import (
 )
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
 from ee_dist.discrepancy.evidence.judge import LUCK, Judged
-from ee_dist.discrepancy.evidence.left import SETTLED
+from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import is_less, percent, placed, plain, told_all
+from ee_dist.discrepancy.words import is_less, percent, percents, phrase, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE
 
 NOTHING_STANDS_OUT = "Nothing else stands out."
-NO_MOTION_TRIED = "None of the motions tried is expected to tell them apart."
 
 
 def explain_account(
@@ -50,6 +52,7 @@ def explain_account(
     """The verdict, what it is, what speaks for it, what stays open, what to do next; ``planner`` is said where something is tied
     that another trial might tell apart, ``confidence`` is that of confidence.py."""
     robot, best = problem.robot, found.best
+    rest: Sequence[Leftover] = found.left
     lines = [
         f"Noise floor: {found.floor_source}. {counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried."
     ]
@@ -78,13 +81,15 @@ def explain_account(
         # Those that were judged are the most promising: where all of them are tied there may be more.
         more = "at least " if len(best.tied_with) + 1 == len(found.candidates) < found.tried else ""
         less = is_less(best.terms)
-        head = f"{'Too much' if less else 'Missing'}{_doubt(found)}: {told_all(best.terms, robot)}{_twins(best, more)}."
+        rest = left_beside_noise(found.left, best.terms, robot)
+        head = f"{'Too much' if less else 'Missing'}{', as one of several things' if rest else ''}: "
+        head += f"{told_all(best.terms, robot)}{_twins(best, more)}."
         nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
         nothing = BEYOND if unsure else nothing
-        head += " More than noise is left with it." if found.left else f" {nothing}"
-        error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor, best.held_out)
-        sure = f"How sure: it takes off {taken_off(best)}{unexplained_rest(best.explained, not found.left)}"
-        sure += f"; {_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}."
+        head += " More than noise is left with it." if rest else f" {THAT_NOISE if found.left else nothing}"
+        error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor)
+        sure = f"How sure: it explains {taken_off(best)}{unexplained_rest(best.explained, not found.left)}. "
+        sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}."
         advice = slower(unsure) if unsure else ""
         guessed = best.proposal.label == LABEL
         lines.append(GUESSED if guessed else entry.physics)
@@ -99,26 +104,27 @@ def explain_account(
         if found.left:
             head = f"Unexplained: more than noise is left, most at {plain(found.left[0].channel)}, and {none}."
         places = curves_of(found.left)
-        sure = f"How sure: more than noise stands out in {counted(places, 'curve')}; noise floor: {found.floor_source}."
+        sure = (
+            f"How sure: {counted(places, 'curve')} differ{'s' if places == 1 else ''} by more than noise; noise floor: "
+        )
+        sure += f"{found.floor_source}."
         advice = STUCK
-        lines += [
-            f"Nearest, but not good enough: {told_all(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]
-        ]
+        lines += [f"Nearest, but not good enough: {phrase(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]]
     lines += beside_floor(last, found.noise_floor, bool(found.left))
-    if found.left:
-        lines.append(left_text(found.left, found.verdict == EFFECT))
+    if rest:
+        lines.append(left_text(rest, found.verdict == EFFECT))
     if ahead is not None and ahead.separation < ENOUGH:
         advice = NO_MOTION_TRIED
     elif ahead is not None:
         e = ahead.excitation
         where = f", on the {e.fixture}" if robot.free_base else ""
         advice = (
-            f"To tell them apart: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}{where} "
-            f"(predicted distance {ahead.separation:.0f} standard deviations)."
+            f"To tell them apart, record: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed "
+            f"{e.seed}{where}. There they should differ by {ahead.separation:.0f} standard deviations."
         )
-    sure = f"{sure[:-1]}; {_counted_right(confidence)}."
-    good = (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not found.left)) and not unsure
-    tied = found.verdict == EFFECT and best is not None and best.tied_with
+    sure = f"{sure} {_counted_right(confidence)}."
+    tied = bool(found.verdict == EFFECT and best is not None and best.tied_with)
+    good = (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not rest)) and not unsure and not tied
     return Account(
         head,
         error,
@@ -132,19 +138,15 @@ def explain_account(
 
 def _rivals(tried: int, tied: Sequence[str], more: str) -> str:
     if not tied:
-        return f"of {counted(tried, 'explanation')} no other does as well"
+        return f"Of {counted(tried, 'explanation')} no other does as well"
     told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
-    return f"of {counted(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+    return f"Of {counted(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
 
 
 def _counted_right(confidence: float | None) -> str:
     if confidence is None:
-        return "how often such a verdict is right was not counted"
-    return f"in {100 * confidence:.0f} of 100 simulated cases that looked like this one the verdict was right"
-
-
-def _doubt(found: Explanation) -> str:
-    return "" if not found.left else ", as one of several things"
+        return "How often such a verdict is right was not counted"
+    return f"In {100 * confidence:.0f} of 100 simulated cases that looked like this one, the verdict was right"
 
 
 def _twins(best: Judged, more: str) -> str:
@@ -164,13 +166,13 @@ def above(c: Judged) -> tuple[float, float]:
 
 
 def shown_gain(c: Judged) -> tuple[float, float, float]:
-    """The gain of a candidate and the ends of its interval as they are told: no more than all of it, nor less than nothing."""
+    """The gain of a candidate and the ends of its interval as they are told: no more than all of it, nor than the same lost."""
     low, high = above(c)
-    return max(0.0, min(c.explained, 1.0)), max(low, -1.0), min(high, 1.0)
+    return max(-1.0, min(c.explained, 1.0)), max(low, -1.0), min(high, 1.0)
 
 
 def taken_off(best: Judged) -> str:
     """What it takes off held-out data, as a share of what is not noise, with its interval."""
     share, low, high = shown_gain(best)
-    interval = f"95 % interval {percent(low)} to {percent(high)}"
-    return f"{percent(share)} of what is above the noise ({interval}), judged on {best.held_out}"
+    interval = f"95 % interval {percents(low, high)}"
+    return f"{percent(share)} of the error above the noise ({interval}), judged on {best.held_out}"

@@ -72,8 +72,8 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     lines += beside_floor(last.error_heldout, found.noise_floor, not settled)
     if found.left:
         lines.append(left_text(found.left, bool(steps)))
-    error = before_and_after(problem, first.error_heldout, last.error_heldout, found.noise_floor, last.held_out)
-    share = f"{percent(max(0.0, min(found.explained, 1.0)))} of what is above the noise is accounted for"
+    error = before_and_after(problem, first.error_heldout, last.error_heldout, found.noise_floor)
+    share = f"{percent(max(0.0, min(found.explained, 1.0)))} of the error above the noise is explained"
     if len(found.ladder) == 1:
         head = f"Nothing was added: {NOTHING_BEYOND if unsure else found.stopped}."
         error = f"{error_name(problem)}: model {problem.told(last.error_heldout)}, noise floor "
@@ -93,7 +93,7 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     advice = slower(unsure) if unsure else advice
     tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
-    good = settled and not warnings and not unsure
+    good = settled and not warnings and not unsure and not any(ties.values())
     more = (*lines, *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
 

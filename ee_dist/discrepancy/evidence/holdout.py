@@ -19,7 +19,7 @@ from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.trials.log import Array
 
 WINDOWS, MOTIONS, SETTINGS = (
-    "windows of the same motions",
+    "other windows of the same motions",
     "motions that were not fitted",
     "settings that were not fitted",
 )

@@ -26,7 +26,7 @@ def setting(key: str, value: str | os.PathLike[str] | Sequence[str | os.PathLike
 
 def _quoted(value: str | os.PathLike[str]) -> str:
     text = os.path.relpath(value) if os.path.exists(value) else str(value)
-    plain = bool(text) and all((ch.isascii() and ch.isalnum()) or ch in "/._-@:" for ch in text)
+    plain = bool(text) and all((ch.isascii() and ch.isalnum()) or ch in "/._-@:+" for ch in text)
     return text if plain and not _OTHER.fullmatch(text) else _in_quotes(text)
 
 

@@ -29,7 +29,8 @@ TERMS = (
     ),
     ("Effect", "A piece of physics that a model can lack: friction, play, a weak motor, a sensor with an offset."),
     ("Candidate", "An effect at a place, fitted to the measurements as a possible explanation."),
-    ("Gain", "The share of the squared error on held-out data that a candidate takes off. 0 % is useless."),
+    ("Gain", "The share of the squared error on held-out data that a candidate takes off. 0 % is useless, and "
+        "less than that makes it worse."),
     (
         "Above the noise",
         "The part of the squared error that is not noise. A candidate that takes off 100 % of it leaves noise alone.",

@@ -154,6 +154,7 @@ def _page(
         "good" if account.good else "open",
         account.first,
         following=command(following) if following else "",
+        lead=account.lead,
         links=links,
         terms=TERMS,
         foot=f"ee_dist. {problem.error_definition[:1].upper()}{problem.error_definition[1:]}.",

@@ -15,12 +15,12 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
-from ee_dist.discrepancy.words import placed, told_all
+from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, trial_name, unit_of, worst_trials
 from ee_dist.tasks.results.labels import drawn as in_unit
-from ee_dist.tasks.results.tables import TIED_STANDING, standing
+from ee_dist.tasks.results.tables import TIED_STANDING, candidate_label, standing
 from ee_dist.trials.log import SensorLog
 from ee_dist.viewing import finding as drawn
 from ee_dist.viewing.finding_scene import write_compare_rrd, write_explain_rrd, write_improve_rrd
@@ -142,11 +142,12 @@ def _finding(
         unit_of(problem),
         channels,
         next_command=command(following) if following else "",
+        lead=account.lead,
     )
 
 
 def _candidate(problem: Problem, found: Explanation, c: Judged, shown: bool) -> drawn.Candidate:
-    label = told_all(c.terms, problem.robot)
+    label = candidate_label(c, problem.robot)
     kind = STANDINGS.get(standing(c, found.candidates[0]), drawn.REFUSED)
     account = said(problem, placed(c.name), (*found.fixed, *c.hypothesis)) if shown else None
     return drawn.Candidate(label, *shown_gain(c), kind, account)

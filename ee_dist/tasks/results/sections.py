@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.accounts.of_explain import above, shown_gain
+from ee_dist.discrepancy.accounts.of_explain import shown_gain
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.problem import Problem, joined
-from ee_dist.discrepancy.words import percent, placed, plain, told_all
+from ee_dist.discrepancy.words import percent, percents, placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share, trial_name, worst_trials
-from ee_dist.tasks.results.tables import standing
+from ee_dist.tasks.results.tables import candidate_label, standing
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
@@ -64,7 +64,9 @@ def proof_section(
     gained = residual**2 - (problem.floor if after is None else after**2)
     cell = problem.segment_of * width + problem.channel_of
     count = len(problem.segments) * width
-    excess = np.bincount(cell, weights=np.where(problem.layout.reading, gained, 0.0), minlength=count)
+    drawn_ = np.where(problem.layout.reading, gained, 0.0)
+    # What makes a channel rougher, and nothing else, gains in what is compared besides readings.
+    excess = np.bincount(cell, weights=drawn_ if drawn_.sum() > 0.5 * gained.sum() else gained, minlength=count)
     asked = np.tile([not channel or name == channel for name in problem.channels], len(problem.segments))
     excess = np.where(asked, excess, -np.inf)
     by_name = {(o.channel, o.trial): o for o in overlays}
@@ -80,10 +82,10 @@ def proof_section(
     pad = max(PAD_S, 1.5 * (end - begin))
     rows = np.flatnonzero((curve.times_s >= begin - pad) & (curve.times_s <= end + pad))
     shown = thinned(rows_of(curve, rows) if len(rows) > 1 else curve, POINTS)
-    what = "the error is largest" if after is None else "what was found takes off most"
+    what = "the error is largest" if after is None else "what was found explains most"
     shows = "Where the error is largest" if after is None else "Where it shows most"
-    heading = f"{shows}: {curve.channel}, {trial}, {begin:.1f} to {end:.1f} s"
-    caption = f"Measured and predicted where {what} (shaded); below, what was measured less what was predicted."
+    heading = f"{shows}: {curve.channel}, in trial {trial}, {begin:.1f} to {end:.1f} s"
+    caption = f"Shaded: where {what}. Below: measured minus predicted."
     return Section(heading, caption, figures.proof(shown, [n for n, _ in models], (begin, end)))
 
 
@@ -118,7 +120,7 @@ def values_section(kinds: Sequence[Kind]) -> Section | None:
 
 def heat_section(problem: Problem, residual: Array, after: Array | None = None) -> Section:
     segments = [
-        f"{problem.trials[k]} {s.rsplit('@', 1)[1]}"
+        f"{trial_name(problem, int(k))} {s.rsplit('@', 1)[1]}"
         for k, s in zip(problem.trial_of_segment, problem.segments, strict=True)
     ]
     unique = [f"{n}{' ' * segments[:i].count(n)}" for i, n in enumerate(segments)]
@@ -168,7 +170,7 @@ def signature_section(
                 shown.append(figures.cloud(f"{plain(problem.channels[c])} ({layout.units[c]})", part))
     if not shown:
         return None
-    caption = "What was measured less what is predicted, against what the joint did. Thick lines are means. "
+    caption = "Measured minus predicted, against what the joint did. Thick lines are means. "
     legend = [(MODEL, figures.PREDICTED)]
     if after is None:
         caption += (
@@ -178,8 +180,8 @@ def signature_section(
     else:
         legend += [(IMPROVED, figures.IMPROVED), (MARK, figures.MARK)]
         caption += (
-            f"Dashed is the mark of what was found, from the two models alone: where it lies on the line of the {MODEL}, it "
-            "is what was measured."
+            "The dashed line is the mark of what was found: how the two models differ, whatever was measured. Where it lies on "
+            f"the line of the {MODEL}, it is what the robot did."
         )
         caption += "".join(f" {_capital(placed(t.name))}: {CATALOGUE[t.effect].signature}" for t in found[:MARKS])
     return Section("Residual against what the joint did", caption, figures=shown, legend=legend)
@@ -197,20 +199,20 @@ def ranking_section(
     best = judged[0]
     kinds = [_kind(c, best) for c in judged]
     rows = [
-        [str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
-         " to ".join(map(percent, shown_gain(c)[1:])), standing(c, best)]
+        [str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
+         percents(*shown_gain(c)[1:]), standing(c, best)]
         for c in judged
     ]  # fmt: skip
     pale = [k for k, kind in enumerate(kinds) if kind == "not"]
     lead = [k for k, kind in enumerate(kinds) if kind in ("best", "tied")]
     caption = (
-        f"Share of what is above the noise that each takes off data it was not fitted to ({best.held_out}), with its 95 % "
-        "interval. Hatched: refused."
+        f"How much of the error above the noise each explains, judged on {best.held_out}, with its 95 % interval. Hatched: "
+        "refused, as no better than luck or too little."
     )
     figure = figures.ranking(
         [placed(c.name) for c in judged],
-        [c.explained for c in judged],
-        [above(c) for c in judged],
+        [shown_gain(c)[0] for c in judged],
+        [shown_gain(c)[1:] for c in judged],
         kinds,
     )
     columns = ["rank", "effect", f"{problem.natural_name}, held out", "gain", "95 % interval", "judgement"]

@@ -18,8 +18,9 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import percent, plain, told_all
+from ee_dist.discrepancy.words import percent, phrase, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.folder import SETTINGS
 from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import excess_share, step_phrase, worst_trials
@@ -58,11 +59,16 @@ def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged]
         return
     best = judged[0]
     rows = [
-        (str(c.rank), told_all(c.terms, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
+        (str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
          standing(c, best)) for c in judged
     ]  # fmt: skip
     columns = (("", True), ("effect", False), ("held out", True), ("gain", True), ("", False))
     console.print(_table(title, columns, rows))
+
+
+def candidate_label(c: Judged, robot: Robot) -> str:
+    """What a candidate is and how much of it. Of one that was refused nobody needs each value: many are told as a range."""
+    return told_all(c.terms, robot) if c.earned else phrase(c.terms, robot)
 
 
 def standing(c: Judged, best: Judged) -> str:
@@ -103,7 +109,7 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
         whole = bool(account.planner) and line.endswith(account.planner)  # a command is for copying
         console.print(line, highlight=False, markup=False, soft_wrap=whole)
     if following:
-        console.print(f"Next: {command(following)}", highlight=False, markup=False, soft_wrap=True)
+        console.print(f"{account.lead}: {command(following)}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _begun(out: Path) -> float:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
-from ee_dist.discrepancy.words import plain, quantity
+from ee_dist.discrepancy.words import is_share, plain, quantity
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.model import Robot
 
@@ -42,7 +42,10 @@ def kinds_of(terms: Hypothesis, reports: Sequence[ParameterReport], robot: Robot
         term = terms[p.term]
         effect = CATALOGUE[term.effect]
         unit = effect.unit(p.name, robot, term.target)
-        shown = "" if unit in ("1", "channel") else unit
+        share = is_share(term.effect, p.name)
+        if share:
+            p = replace(p, value=100 * p.value, low=100 * p.low, high=100 * p.high)
+        shown = "%" if share else "" if unit in ("1", "channel") else unit
         key = (plain(term.effect), quantity(term, p.name, robot), shown, effect.neutral_values()[p.name])
         found.setdefault(key, []).append((plain(term.target), p))
     return [Kind(*key, tuple(at)) for key, at in found.items()]
@@ -57,5 +60,5 @@ def within(p: ParameterReport) -> str:
         return f"{p.value:.4g}"
     digits = max(1 - math.floor(math.log10(half)), 0)  # two of the interval
     fine = half < FINE * abs(p.value)
-    shown = f"{p.value:.4g} ± {half:.1g}" if fine else f"{p.value:.{digits}f} ± {half:.{digits}f}"
+    shown = f"{p.value:.4g} ± {half:.1g}" if fine else f"{round(p.value, digits) + 0.0:.{digits}f} ± {half:.{digits}f}"
     return f"{shown} ({p.flag})" if p.flag else shown

@@ -48,6 +48,7 @@
     let at = 0;
     function show() {
       const cell = all.cells[at];
+      const unit = cell.u === "1" ? "" : cell.u;
       const own = all.cells.filter((other) => other.c === cell.c).map((other) => other.t);
       trial.replaceChildren(...own.sort((a, b) => a - b).map((k) => option(k, all.trials[k])));
       channel.value = cell.c;
@@ -66,8 +67,8 @@
       const layout = { height: 460, margin: { l: 60, r: 14, t: 34, b: 40 }, paper_bgcolor: "rgba(0,0,0,0)",
         plot_bgcolor: "rgba(0,0,0,0)", modebar: { bgcolor: "rgba(0,0,0,0)", color: "#8899aa" }, hovermode: "x unified", showlegend: true,
         legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0 },
-        xaxis: { title: { text: "s" }, anchor: "y2" }, yaxis: { domain: [0.42, 1], title: { text: cell.u } },
-        yaxis2: { domain: [0, 0.34], title: { text: "residual, " + cell.u } } };
+        xaxis: { title: { text: "s" }, anchor: "y2" }, yaxis: { domain: [0.42, 1], title: { text: unit } },
+        yaxis2: { domain: [0, 0.34], title: { text: unit ? "residual, " + unit : "residual" } } };
       Plotly.react(box, data, layout, CONFIG).then(() => Plotly.relayout(box, looks(box, layout)));
       drawn.add(box);
     }
