@@ -172,7 +172,9 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
             person.open("Add")
             person.wait(UNCOVERED)
             # What it would say if the workbench went away.
-            assert "task=workbench log=bench goes on with it" in person.evaluate("document.querySelector('#popup').textContent")
+            assert "task=workbench log=bench goes on with it" in person.evaluate(
+                "document.querySelector('#popup').textContent"
+            )
             assert person.complaints() == ()
             assert person.asked_outside(bench.address) == []
         assert refused(bench.address) == 200

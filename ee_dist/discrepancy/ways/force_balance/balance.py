@@ -82,7 +82,7 @@ class Balance:
 def told_by(robot: Robot) -> tuple[object, ...]:
     """What of a robot a balance of forces depends on: of two with the same it leaves the same."""
     drives = tuple(tuple(getattr(d, n) for n in SEEN if n != BEYOND) for d in robot.drives)
-    laws = tuple(law for law in robot.laws if law.name not in CONTROLLER_LAWS)
+    laws = tuple(law for law in robot.laws if law.name not in SPEED_LAWS)
     return geometry(robot), gravity(robot).tobytes(), parameters(robot).tobytes(), drives, laws
 
 
