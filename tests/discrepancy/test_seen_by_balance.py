@@ -73,3 +73,10 @@ def test_a_verdict_on_forces_names_no_gains_of_a_controller() -> None:
     named = {t.effect for t in found.best.terms}
     assert "coulomb_friction" in named or "rotor_factor" in named
     assert not named & CONTROLLERS
+
+
+def test_a_measured_force_has_had_its_back_emf_taken_off() -> None:
+    sample = samples()["pendulum"]
+    trials = measure(sample, ())
+    asked = {way: {c.effect.name for c in pool_of(problem_by(way, trials, sample.robot))} for way in sample.ways}
+    assert "speed_limit" in asked["open_loop"] and "speed_limit" not in asked["force_balance"]

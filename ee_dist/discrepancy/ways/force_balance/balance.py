@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ee_dist.discrepancy.ways.force_balance.motion import Motion
 from ee_dist.effects.laws import SPEED_LAWS, LawContext, find_law
-from ee_dist.engines.friction import DRY, LOADED, SIDED, SLOPED, Friction
+from ee_dist.engines.friction import DRY, LOADED, SIDED, Friction
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.inverse_dynamics import geometry, gravity, parameters
@@ -17,7 +18,8 @@ from ee_dist.trials.log import Array
 
 INSTANT_S = 1e-9
 """Time step at which the drive path's implicit friction is that of the instant."""
-RUBBING = (*DRY, *LOADED, *SIDED, *SLOPED)
+RUBBING = (*DRY, *LOADED, *SIDED, "viscous")
+"""Fields of a drive that rub. Back-EMF does not: what was measured, a current or the torque that it makes, is less by it."""
 SEEN = (
     "strength",
     "current_gain",
@@ -89,7 +91,7 @@ def told_by(robot: Robot) -> tuple[object, ...]:
 def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]) -> tuple[Array, Array]:
     """(T, J) at some joints: what the drives gave, less what the motion needed (T, M), in terms of the measured force; and the
     same without friction at what rests (the very same array where that makes no difference)."""
-    drives = [robot.drives[k] for k in joints]
+    drives = [replace(robot.drives[k], back_emf=0.0) for k in joints]
     q, qd, qdd, given = (
         np.ascontiguousarray(a[:, joints]) for a in (motion.position, motion.speed, motion.acceleration, motion.torque)
     )
