@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ee_dist.discrepancy.search.candidates import Candidate, candidate
+from ee_dist.discrepancy.search.candidates import Candidate, candidate, possible
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.robots.model import Robot
 
@@ -13,11 +13,14 @@ LEAST, MOST = 0.1, 0.9
 
 
 def draw(robot: Robot, rng: np.random.Generator) -> tuple[Candidate, Term]:
-    """An effect, then a target, then its values; every effect of the catalogue is as likely as any other."""
+    """An effect, then a target, then its values; every effect of the catalogue that the robot has room for is as likely as
+    any other."""
     entries = [e for e in CATALOGUE.values() if e.proposed(robot)]
     entry = entries[int(rng.integers(len(entries)))]
     targets = entry.proposed(robot)
     chosen = candidate(robot, entry, targets[int(rng.integers(len(targets)))])
+    if not possible(robot, (), [chosen]):
+        return draw(robot, rng)
     u = []
     for low, high in zip(chosen.lower, chosen.upper, strict=True):
         side = float(rng.choice([s for s in (low, high) if s] or [0.0]))

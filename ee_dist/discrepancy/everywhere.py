@@ -18,7 +18,7 @@ from ee_dist.discrepancy.examine import Current, calm_trials
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment
 from ee_dist.discrepancy.pruning import pruned
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.screen import screen
@@ -160,7 +160,8 @@ class _Look:
         """The model with one more effect, of those that promise most on top of its fit ``alone``."""
         search = self.calm
         refit = Refit(slopes_at(search, alone.model, alone.u))
-        screened = screen(search.on(alone.hypothesis), self._others(model), refit=refit)
+        now = search.on(alone.hypothesis)
+        screened = screen(now, possible(search.problem.robot, now.fixed, self._others(model)), refit=refit)
         few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
         starts = []
         for s in few[: max(FEWEST_TRIED, min(MOST_TRIED, VALUES_TRIED // max(len(start), 1)))]:

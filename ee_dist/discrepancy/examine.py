@@ -19,7 +19,7 @@ from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, win
 from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, no_more_than_noise, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
 from ee_dist.discrepancy.search.fit import rough
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.refit import Refit
@@ -97,6 +97,7 @@ class Examined:
 def examine(search: Search, current: Current, pool: Sequence[Candidate], effort: Effort = STANDARD_EFFORT) -> Examined:
     """Judge what of ``pool`` explains the residual of the current model. Raises ValueError for one that cannot be simulated."""
     problem, now = search.problem, search.on(current.hypothesis)
+    pool = possible(problem.robot, now.fixed, pool)
     base = now.base()
     if not np.isfinite(base).all():
         raise ValueError("the model cannot be simulated on these commands: its motion leaves the finite numbers")

@@ -93,6 +93,8 @@ class Effect:
     """Values worth trying on a robot at a target, for parameters whose scale depends on them."""
     worth_proposing: Callable[[Robot], bool] | None = None
     """On which robots ``explain`` proposes it, where that is not all of them."""
+    within: Ranges | None = None
+    """How far a robot's other values leave room for it at a target: beyond that a search does not propose it."""
     everywhere: bool = False
     """Whether a little of it is in every real robot, at each of its targets."""
     of: type = Robot
@@ -155,6 +157,15 @@ class Effect:
                 raise EffectError(f"{self.name}: {p.name} has no finite range at {quoted(target)} of {robot.name}")
         return found
 
+    def room(self, robot: Robot, target: str) -> dict[str, Range]:
+        """(lower, upper) of each parameter that a search may propose on a robot as it is, at a target or a group."""
+        worth = self.bounds(robot, target)
+        if self.within is None:
+            return worth
+        members = members_of(robot, target, self.targets(robot)) or (target,)
+        most = common([self.within(robot, m) for m in members])
+        return {n: (max(low, most[n][0]), min(high, most[n][1])) for n, (low, high) in worth.items()}
+
     def unit(self, parameter: str, robot: Robot, target: str) -> str:
         """The unit of a parameter at this target: N on a slide where it is N.m on a hinge, or the unit of a channel."""
         unit = self.parameter(parameter).unit
@@ -215,6 +226,7 @@ def effect(
     searchable: bool = True,
     ranges: Ranges | None = None,
     worth_proposing: Callable[[Robot], bool] | None = None,
+    within: Ranges | None = None,
     everywhere: bool = False,
     of: type = Robot,
     guesses: Callable[[Robot], tuple[str, ...]] | None = None,
@@ -245,6 +257,7 @@ def effect(
             searchable,
             ranges,
             worth_proposing,
+            within,
             everywhere,
             of,
             guesses,

@@ -213,6 +213,12 @@ def _asymmetry_range(robot: Robot, target: str) -> dict[str, Range]:
     return {"dry_nm": (-dry, dry), "viscous_nm_s_rad": (-viscous, viscous)}
 
 
+def _own_friction(robot: Robot, target: str) -> dict[str, Range]:
+    """Friction of one direction is not below nothing: what differs is a part of what there is."""
+    drive = scales.drive_of(robot, target)
+    return {"dry_nm": (-drive.coulomb, drive.coulomb), "viscous_nm_s_rad": (-drive.viscous, drive.viscous)}
+
+
 @effect(
     "friction_asymmetry",
     family="drive",
@@ -229,6 +235,7 @@ def _asymmetry_range(robot: Robot, target: str) -> dict[str, Range]:
     "unlike an offset.",
     reference="Janot, Gautier and Brunot 2019, Data set and reference models of EMPS",
     ranges=_asymmetry_range,
+    within=_own_friction,
 )
 def friction_asymmetry(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def sided(drive: Drive) -> Drive:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -182,6 +182,22 @@ def on_top_of(robot: Robot, terms: Hypothesis, pool: Iterable[Candidate]) -> lis
         candidate(around[c.effect.name], c.effect, c.target) if c.effect.name in around and not c.members(robot) else c
         for c in pool
     ]
+
+
+def possible(robot: Robot, terms: Hypothesis, pool: Iterable[Candidate]) -> list[Candidate]:
+    """Those of the pool for which a model of these ``terms`` has room, and as far as it has: friction can differ by direction
+    by as much as there is."""
+    out, model = [], None
+    for c in pool:
+        if c.effect.within is None:
+            out.append(c)
+            continue
+        model = apply(robot, terms) if model is None else model
+        room = c.effect.room(model, c.target)
+        bounds = tuple(room[p.name] for p in c.effect.parameters)
+        if any(low < high for low, high in bounds):
+            out.append(replace(c, bounds=bounds))
+    return out
 
 
 def shared(pool: Iterable[Candidate], robot: Robot) -> list[Candidate]:
