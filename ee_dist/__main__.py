@@ -34,6 +34,7 @@ from ee_dist.tasks.errors import (
     hydra_message,
     remove_orphans,
     unasked_end,
+    unforeseen,
     when_lost,
 )
 from ee_dist.tasks.folder import (
@@ -215,6 +216,8 @@ def main() -> int:
         return _complain(_unwritten(error))
     except KeyboardInterrupt as stop:
         _leave(stop)
+    except Exception as error:  # of Hydra, or of what it was told to launch with
+        return _complain(unforeseen(error), DEFECT)
     finally:
         leaving.disarm()
     return 0

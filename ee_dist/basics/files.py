@@ -23,3 +23,8 @@ def write_whole(path: Path, content: str | bytes) -> None:
         # What fails in writing, not in opening, knows no name.
         error.filename = error.filename or str(path)
         raise
+
+
+def real(path: str | Path) -> Path:
+    """Where a path leads; of a link that leads to itself the link, so that whoever opens it says what is wrong."""
+    return Path(os.path.realpath(path))

@@ -236,6 +236,8 @@ def effect(
     def register(transform: Transform) -> Transform:
         if name in EVERY and EVERY[name].transform.__module__ != transform.__module__:
             raise EffectError(f"an effect named {quoted(name)} exists already")
+        if not name.isidentifier():
+            raise EffectError(f"{quoted(name)} cannot be the name of an effect; expected a word such as my_friction")
         if family not in (*FAMILIES, *OTHER_FAMILIES):
             raise EffectError(f"{name}: no family {quoted(family)}; there are: {', '.join(FAMILIES)}")
         for p in parameters:

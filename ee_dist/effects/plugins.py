@@ -11,9 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.files import real
 from ee_dist.effects.catalogue import EffectError, registered
 from ee_dist.effects.laws import LAWS, TEXTS
 
+MOST_BYTES = 2**24
 _plugins: dict[str, str] = {}
 """The digest of each file's text as it was loaded last, by absolute path."""
 
@@ -43,7 +45,9 @@ def load_plugin(path: str | Path, text: str = "") -> None:
             spec.loader.exec_module(module)
             if not any(e.transform.__module__ == name for e in registered.values()):
                 raise EffectError("it registers no effect; decorate its transform with @effect(...)")
-    except (Exception, SystemExit) as error:
+    except (KeyboardInterrupt, MemoryError):
+        raise
+    except BaseException as error:
         said = f"{error}" if isinstance(error, EffectError) else f"{type(error).__name__}: {error}"
         if isinstance(error, SystemExit):
             said = f"sys.exit({error.code!r}) was called; a file of effects only defines them"
@@ -61,14 +65,16 @@ def text_of_plugin(path: str | Path) -> str:
 
     Of the file alone: what it imports from others is not in it. Raises EffectError where there is none.
     """
-    return _plugins.get(str(Path(path).resolve())) or _read(path)[1]
+    return _plugins.get(str(real(path))) or _read(path)[1]
 
 
 def _read(path: str | Path) -> tuple[Path, str]:
     """A file's absolute path and the digest of its text as it is now. Raises EffectError where there is none."""
-    file = Path(path).resolve()
+    file = real(path)
     if not file.is_file():
         raise EffectError(f"no such file of effects: {path}")
+    if file.stat().st_size > MOST_BYTES:
+        raise EffectError(f"plugins={path}: {file.stat().st_size} bytes; a file of effects has at most {MOST_BYTES:,}")
     return file, hashlib.sha256(file.read_bytes()).hexdigest()
 
 

@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.files import real
 from ee_dist.basics.names import listed
 from ee_dist.robots.describe import READERS
 from ee_dist.robots.instruments import MOTOR_TORQUE
@@ -99,7 +100,7 @@ def source_digests(source: Any, folder: str | Path = ".") -> dict[str, str]:
     if isinstance(source, Mapping):
         inside, folder = source, Path(folder)
     else:
-        path = (Path(folder) / str(source)).resolve()
+        path = real(Path(folder) / str(source))
         if not path.is_file():
             return {}
         found[str(path)] = _digest(path)
@@ -109,7 +110,7 @@ def source_digests(source: Any, folder: str | Path = ".") -> dict[str, str]:
         inside, folder = data if isinstance(data, Mapping) else {}, path.parent
     for kind in READERS:
         if kind in inside:
-            file = (folder / str(inside[kind])).resolve()
+            file = real(folder / str(inside[kind]))
             if file.is_file():
                 found[str(file)] = _digest(file)
     return found

@@ -28,6 +28,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.files import real
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.described import KEYS, near, robot_of_body
@@ -147,7 +148,7 @@ def robot_of(name: str, source: str | None = None, drives: str | None = None) ->
     path = Path(drives)
     data = dict(_yaml(path))
     if source is not None:
-        data[name] = str(Path(source).resolve())
+        data[name] = str(real(source))
     if not any(kind in data for kind in READERS):
         setting = "robot.urdf" if name == "urdf" else "robot.file"
         raise RobotError(f"{path}: names no {name.upper()}; add '{name}: FILE' or give {setting}=FILE")

@@ -11,6 +11,8 @@ from ee_dist.robots.model import COMMANDS, DRIVE_NUMBERS, Robot, RobotError
 
 Bounds = tuple[float, float]
 HUGE = 1e9
+MOST = 1000
+"""Parts, and sensors: far beyond any robot, and some seconds of work."""
 AT_LEAST_0: Bounds = (0.0, HUGE)
 ANY: Bounds = (-HUGE, HUGE)
 DRIVE: dict[str, Bounds] = dict.fromkeys(DRIVE_NUMBERS, AT_LEAST_0) | {
@@ -77,6 +79,9 @@ def checked(robot: Robot, where: str) -> Robot:
             f"{where}: time_step_s: {robot.time_step_s:g} s; expected more than 0 and at most {LONGEST_STEP_S:g} "
             "(seconds, not milliseconds)"
         )
+    for what, items in (("parts", robot.parts), ("sensors", robot.sensors)):
+        if len(items) > MOST:
+            raise RobotError(f"{where}: {len(items)} {what}; at most {MOST} can be simulated in a sensible time")
     for p in robot.parts:
         _within(p.mass_kg, AT_LEAST_0, f"{where}: part {quoted(p.name)}: mass_kg")
         for what, values in (("com_m", p.com_m), ("inertia_kg_m2", p.inertia_kg_m2)):

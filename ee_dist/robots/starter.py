@@ -66,7 +66,8 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         f"gravity_m_s2: {gravity:g}",
         None if body.gravity_m_s2 is not None else "straight down, in the frame of the root",
     )
-    drives = {j.name: _drive(j, body, _inertia(body)) for j in body.moving}
+    inertia = _inertia(body)
+    drives = {j.name: _drive(j, body, inertia) for j in body.moving}
     lines.append("drives:" if drives else "drives: {}")
     for name, (entry, guessed) in drives.items():
         known = [g for g in guessed if g in entry]

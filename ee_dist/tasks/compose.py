@@ -72,6 +72,9 @@ _ELSEWHERE = {"import": "ee_dist.tasks.import_", "workbench": "ee_dist.workbench
 _SWEEP = ("-m", "--multirun")
 MOST_RUNS = 10_000
 _RESUME = re.compile(r"^\+{0,2}resume=(?!null$)(.+)$")
+_OUTSIDE = re.compile(r"^[+~]{0,2}hydra\.output_subdir\b(?!=null$)")
+NEEDED = ("task", "robot", "engine", "evaluator", "metric", "budget", "repair")
+"""Groups without which the settings fall back to what nobody chose."""
 _NO_CHOICE = re.compile(r"^\+{0,2}(\w+)=(true|false|null|nan|[-+]?inf|[-+]?[0-9][0-9_.eE+-]*|[\[{].*)$", re.IGNORECASE)
 _AT_HOME = re.compile(r"^\+{0,2}([\w.]{1,80})=~(.*)$")
 _SCENARIO = re.compile(r"^(\+{0,2}scenario)=([-0-9, ]+)$")
@@ -107,6 +110,13 @@ def check_flags(arguments: list[str]) -> None:
         if not setting.lstrip("+~").partition("=")[0].strip():
             raise ConfigError(f"{short(setting)}: which setting? they are written key=value, and --help lists them")
         _check_choice(setting)
+        group = setting[1:].partition("=")[0] if setting.startswith("~") else ""
+        if group in NEEDED:
+            raise ConfigError(f"{short(setting)}: a run needs one; choose it with {group}=NAME, or say nothing of it")
+        if _OUTSIDE.match(setting):
+            raise ConfigError(
+                f"{short(setting)}: a run writes its settings itself, into the folder config; leave it out"
+            )
         at_home = _AT_HOME.match(setting)
         if at_home:
             key, rest = at_home.groups()

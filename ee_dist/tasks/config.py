@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
 from ee_dist.basics.names import did_you_mean
+from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import Hypothesis, from_dict
 from ee_dist.evaluation.jobs import Reduction, Travel
 from ee_dist.evolution.ga import Budget
@@ -234,8 +235,8 @@ KINETICS = "kinetics"
 """The engine of gene networks, and of nothing else."""
 
 
-def _at_least_0(value: Any) -> bool:
-    return isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0
+def _possible(value: Any) -> bool:
+    return isinstance(value, (int, float)) and 0.0 <= value <= 1e6
 
 
 @dataclass
@@ -253,7 +254,7 @@ class SystemConfig:
         one_of("system", self.name, ("gene_network",))
         one_of("system.network", self.network, ("dream4_size10_1",))
         for pair in self.levels:
-            if not isinstance(pair, list) or len(pair) != 2 or not all(_at_least_0(v) for v in pair):
+            if not isinstance(pair, list) or len(pair) != 2 or not all(_possible(v) for v in pair):
                 raise ConfigError(f"system.levels: {pair}; expected [hours, level] each, such as [[4, 0.3], [12, 0.6]]")
 
 
@@ -292,6 +293,11 @@ class Config:
             raise ConfigError(
                 f"hardware.address={self.hardware.address}: is for a robot; the cells of +system={self.system.name} are simulated"
             )
+        for name in self.plugins:
+            if not isinstance(name, str):
+                raise ConfigError(
+                    f"plugins={quoted(name)}: expected names of files, such as plugins=[mine.py,other.py]"
+                )
         if not 0 <= self.seed < 2**63:
             raise ConfigError(f"seed={self.seed}: must be a whole number from 0 to 2^63 - 1")
         if self.metric.name == "rolling_mean" and self.metric.header > self.budget.steps:

@@ -34,6 +34,7 @@ __all__ = (
     "hydra_message",
     "remove_orphans",
     "unasked_end",
+    "unforeseen",
     "when_lost",
 )
 
@@ -81,9 +82,14 @@ def unasked_end(error: BaseException) -> str:
     )
 
 
+def unforeseen(error: Exception) -> str:
+    """An error that nobody foresaw, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:_LONGEST]
+
+
 def defect(error: Exception, out: Path) -> str:
-    """An error that nobody foresaw in one line; its trace goes into ``out/error.txt``."""
-    said = " ".join(f"{type(error).__name__}: {error}".split())[:_LONGEST]
+    """The same of a run; its trace goes into ``out/error.txt``."""
+    said = unforeseen(error)
     trace = "".join(traceback.format_exception(error))
     path = out / "error.txt"
     try:

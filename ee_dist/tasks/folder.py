@@ -18,6 +18,7 @@ from hydra.experimental.callback import Callback
 from omegaconf import DictConfig, OmegaConf
 
 from ee_dist.basics.files import write_whole
+from ee_dist.basics.quoted import quoted
 from ee_dist.tasks.config import ConfigError
 
 LOCK = ".running"
@@ -68,14 +69,17 @@ class NotedFolders(Callback):
         above = {p for p in self._missing if p in (out, *out.parents)}
         if above:
             outermost = min(above, key=lambda p: len(p.parts))
-            above = {p for p in (out, *out.parents) if outermost in (p, *p.parents)}
+            within = {p: Path(os.path.normpath(p)) for p in (out, *out.parents)}
+            above |= {p for p, q in within.items() if outermost in (q, *q.parents)}
         _made = tuple(sorted(above, key=lambda p: -len(p.parts)))
 
 
 def missing(folder: Path) -> tuple[Path, ...]:
     """The folder and those above it that do not exist."""
-    folder = Path(os.path.abspath(folder))
-    return tuple(p for p in (folder, *folder.parents) if not os.path.exists(p))
+    folder = folder.absolute()  # with its '..': a folder on the way to one is made too
+    return tuple(
+        p for p in (folder, *folder.parents) if not os.path.exists(p) and not os.path.exists(os.path.normpath(p))
+    )
 
 
 def free_name(folder: Path) -> Path:
@@ -128,6 +132,15 @@ def forget_sweep() -> None:
     if _sweep is not None and held(_sweep) == [_SWEEP]:
         (_sweep / _SWEEP).unlink()
         remove_made()
+
+
+def check_file_name(key: str, name: str, example: str) -> None:
+    """Raises ConfigError for what is no plain name of a file with the suffix of the example."""
+    suffix = Path(example).suffix
+    if Path(name).name != name or Path(name).suffix != suffix or not name.isprintable():
+        raise ConfigError(
+            f"{key}={quoted(name)[1:-1]}: expected the name of a file that ends in {suffix}, such as {example}"
+        )
 
 
 def shown(folder: Path) -> str:

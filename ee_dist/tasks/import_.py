@@ -17,7 +17,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from ee_dist.basics.files import write_whole
+from ee_dist.basics.files import real, write_whole
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.folders import recordings_in
@@ -35,6 +35,7 @@ from ee_dist.robots.agree import SOURCES, sources_text
 from ee_dist.robots.describe import BUILT_IN, load_robot, robot_of
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError, one_of
+from ee_dist.tasks.folder import check_file_name
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
 
@@ -59,10 +60,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     EffectError, ConfigError.
     """
     watch, console = Stopwatch(), terminal()
-    if Path(options.output).name != options.output or Path(options.output).suffix != ".mcap":
-        raise ConfigError(
-            f"task.output={options.output}: expected the name of a file that ends in .mcap, such as measured.mcap"
-        )
+    check_file_name("task.output", options.output, "measured.mcap")
     hints = hints_of(options)
     proposal = None
     if options.mapping:
@@ -168,7 +166,7 @@ def robot_source(config: Config) -> Any:
         return robot.name
     named = [f for f in (robot.urdf, robot.drives) if f is not None] or [robot.name]
     # Where a description and its URDF are named apart, the settings of the command line go on saying which belong together.
-    return str(Path(named[0]).resolve()) if len(named) == 1 else None
+    return str(real(named[0])) if len(named) == 1 else None
 
 
 def robot_of_mapping(mapping: Mapping, config: Config) -> tuple[Robot, tuple[str, ...]]:
@@ -208,7 +206,7 @@ def files_of(measured: Any, kind: str | None = None) -> tuple[list[Path], list[s
             notes += remarks
         else:
             files.append(path)
-    twice = [f for k, f in enumerate(files) if f.resolve() in [g.resolve() for g in files[:k]]]
+    twice = [f for k, f in enumerate(files) if real(f) in [real(g) for g in files[:k]]]
     if twice:
         raise MeasurementError(f"measured={twice[0]}: the same file twice; name each once")
     return files, notes

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.files import real
 from ee_dist.basics.names import nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
@@ -144,14 +145,14 @@ def files_of(measured: Any) -> list[Path]:
         elif path.exists() and not path.is_file():
             raise ConfigError(f"measured={path}: not an ordinary file; name a recording (.mcap)")
         elif not path.is_file():
-            near = nearest(path.name, [p.name for p in path.parent.glob("*.mcap")], cutoff=0.3)
+            near = nearest(path.name, [p.name for p in path.parent.glob("*.mcap") if p.is_file()], cutoff=0.3)
             hint = f"; did you mean {' or '.join(near)}?" if near else ""
             raise ConfigError(f"measured={path}: no such file{hint}")
         elif path.suffix.lower() != ".mcap" and _of_others(path):
             raise ConfigError(f"measured={path}: not a recording; bring it in first: task=import measured={path}")
         else:
             found.append(path)
-    twice = [p for k, p in enumerate(found) if p.resolve() in [q.resolve() for q in found[:k]]]
+    twice = [p for k, p in enumerate(found) if real(p) in [real(q) for q in found[:k]]]
     if twice:
         # What is held out would be what was fitted.
         raise ConfigError(f"measured={twice[0]}: the same log twice; name each once")

@@ -15,13 +15,16 @@ from ee_dist.evaluation.jobs import Evaluator, Job, Travel
 from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recovery.repair import network
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import BudgetConfig, Config, ConfigError, ScenarioConfig
+from ee_dist.tasks.config import BudgetConfig, Config, ConfigError, ScenarioConfig, within
 from ee_dist.tasks.results.commands import command, simulated
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.wiring import build_robot, evaluator_of
 from ee_dist.viewing.report import Page, Section, write_page
 from ee_dist.viewing.study_figures import Curve, on_the_body
+
+MOST = 100_000
+"""Generations: far beyond use."""
 
 
 @dataclass
@@ -31,8 +34,8 @@ class Options:
     generations_after: int = 40
 
     def __post_init__(self) -> None:
-        if min(self.generations_before, self.generations_after) < 1:
-            raise ConfigError("task.generations_before and task.generations_after must be 1 or more")
+        within("task.generations_before", self.generations_before, 1, MOST)
+        within("task.generations_after", self.generations_after, 1, MOST)
 
 
 def run(config: Config, options: Options, out: Path) -> None:

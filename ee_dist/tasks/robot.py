@@ -18,6 +18,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import span
 from ee_dist.robots.starter import JOINT_COLUMNS, Starter, source_from, starter
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.folder import check_file_name
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.terminal import terminal
 from ee_dist.trials.log import Array, SensorLog, start_of
@@ -44,8 +45,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     given = [(kind, path) for kind, path in (("urdf", config.urdf), ("mjcf", config.mjcf)) if path]
     if len(given) != 1:
         raise ConfigError("task=robot looks at one file: urdf=FILE.urdf or mjcf=FILE.xml")
-    if Path(options.output).name != options.output or Path(options.output).suffix != ".yaml":
-        raise ConfigError(f"task.output={options.output}: expected the name of a file that ends in .yaml")
+    check_file_name("task.output", options.output, "robot.yaml")
     kind, path = given[0][0], Path(given[0][1])
     if path.is_file() and kind_of(path) != kind:
         raise ConfigError(

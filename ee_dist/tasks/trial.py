@@ -79,6 +79,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     hidden = hypothesis(config.hidden, robot, hidden_seed)
     apply(robot, hidden)
     plan = [parse(text) for text in options.excitations]
+    for excitation in plan:
+        excitation.steps(robot)  # too many are refused before the envelope is written
     body = hardware_of(config, robot)
     if body is not None and (hidden or any(e.fixture != "floor" for e in plan)):
         raise ConfigError(

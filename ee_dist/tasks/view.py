@@ -8,6 +8,7 @@ from pathlib import Path
 from ee_dist.recording.reader import ANY, read_run
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.terminal import terminal
+from ee_dist.viewing.headless import ViewerError, check_recording
 from ee_dist.viewing.scenes import write_scene
 from ee_dist.viewing.viewer import open_viewer
 
@@ -39,6 +40,10 @@ def find(path: Path, rebuild: bool, out: Path) -> Path:
             raise ConfigError(f"log={path}: no .mcap in this folder; name the folder of one run or an .mcap")
         path = logs[0]
     if path.suffix == ".rrd" and path.is_file():
+        try:
+            check_recording(path)
+        except ViewerError as error:
+            raise ConfigError(f"log={path}: {error}; name the folder of one run or an .mcap") from None
         return path
     beside = path.with_suffix(".rrd")
     if beside.is_file() and not rebuild:

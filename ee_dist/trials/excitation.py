@@ -111,6 +111,8 @@ def parse(text: str) -> Excitation:
         key, _, value = item.partition("=")
         if key not in ("seconds", "amplitude", "seed", "fixture"):
             raise ExcitationError(f"{text}: no setting {quoted(key)}; there are: seconds, amplitude, seed, fixture")
+        if key in values:
+            raise ExcitationError(f"{text}: {key} stands twice; say it once")
         try:
             values[key] = value if key == "fixture" else int(value) if key == "seed" else float(value)
         except ValueError:

@@ -66,6 +66,14 @@ def plugin(name: str, law: str = "", **changes: str) -> str:
     return PLUGIN.format(name=name, **(AS_IT_IS | changes)) + (LAW.format(name=name, torque=law) if law else "")
 
 
+def _chain(joints: int) -> str:
+    """A robot of many links, each of which hangs on the one before."""
+    link = '<link name="l{0}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
+    joint = '<joint name="j{0}" type="revolute"><parent link="l{1}"/><child link="l{0}"/><limit lower="0" upper="1"/></joint>'
+    links = "".join(link.format(k) for k in range(joints + 1))
+    return f'<robot name="c">{links}{"".join(joint.format(k, k - 1) for k in range(1, joints + 1))}</robot>'
+
+
 def urdf(**changes: str) -> str:
     return URDF.format(**(RIGHT | changes))
 
@@ -223,6 +231,20 @@ def texts() -> dict[str, str]:
         "import.py": "import nowhere_to_be_found\n",
         "known.py": plugin("motor_weak"),
         "robot_dir.py": "x = 1 / 0\n",
+        "ends.py": "raise GeneratorExit\n",
+        "break.py": plugin("my\\nname"),
+        "heights.xml": mjcf().replace(
+            "<worldbody>", '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset><worldbody>'
+        ),
+        "chain.urdf": _chain(1000),
+        "sensors.yaml": DRIVES % "{kp: 3}"
+        + "sensors:\n"
+        + "".join(f"- {{name: s{k}, kind: position, target: turn}}\n" for k in range(1001)),
+        "fine.yaml": DRIVES % "{kp: 3}" + "time_step_s: 1.0e-12\n",
+        "empty.rrd": "",
+        "wide.csv": ",".join(f"c{k}" for k in range(10001)) + 2 * ("\n" + ",".join(["1"] * 10001)) + "\n",
+        "large.map": MAPPING % "rad, scale: 1.0e+300" + COMMANDS,
+        "large.csv": table.replace("0.099833", "1e300"),
     }
 
 
@@ -237,6 +259,10 @@ def write(folder: Path) -> None:
     (folder / "cut.parquet").write_bytes((folder / "words.parquet").read_bytes()[:200])
     sqlite3.connect(folder / "tables.db3").execute("create table other (a int)").connection.commit()
     os.mkfifo(folder / "pipe.yaml")
+    for name in ("loop.py", "loop.csv", "loop.mcap", "loop.xml"):
+        (folder / name).symlink_to(name)
+    (folder / "sparse.py").touch()
+    os.truncate(folder / "sparse.py", 2**40)
     (folder / "folder.yaml").mkdir()
     (folder / "nothing").mkdir()
     for name, summary in runs().items():

@@ -14,6 +14,7 @@ from typing import Any
 
 import mujoco
 
+from ee_dist.basics.files import real
 from ee_dist.basics.quoted import quoted
 from ee_dist.engines.mujoco.warned import no_file_of_warnings
 from ee_dist.robots.model import RobotError
@@ -21,6 +22,8 @@ from ee_dist.robots.xml import XmlError, read_xml
 
 MOST_COPIES = 10_000
 """Elements that one of the elements that make copies may stand for, those around it multiplied."""
+MOST_HEIGHTS = 4_000_000
+"""Of a height field: MuJoCo takes memory for them while it reads."""
 COPIERS = ("replicate", "composite", "flexcomp")
 INCLUDES_DEEP = 20
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
@@ -56,7 +59,7 @@ def bare_model(path: str | Path) -> tuple[Any, Counter[int]]:
 
 def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> None:
     """Look through a file and all that it names before MuJoCo reads it. Raises XmlError."""
-    here = file.resolve()
+    here = real(file)
     if here in above or len(above) > INCLUDES_DEEP:
         raise XmlError(f"{above[0] if above else file}: {file.name} includes itself")
     root, _ = read_xml(file, "an MJCF")
@@ -69,9 +72,13 @@ def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> Non
             many *= _count(element)
             if many > MOST_COPIES:
                 raise XmlError(f"{file}: <{element.tag}> stands for more than {MOST_COPIES} elements")
+        if element.tag == "hfield" and _product(element, "nrow", "ncol") > MOST_HEIGHTS:
+            raise XmlError(
+                f"{file}: <hfield> of more than {MOST_HEIGHTS:g} heights, none of which says anything of a motion here"
+            )
         name = element.get("file")
         if element.tag in ("include", "model") and name:
-            if not (folder / name).resolve().is_relative_to(folder.resolve()):
+            if not real(folder / name).is_relative_to(real(folder)):
                 raise XmlError(
                     f"{file}: <{element.tag} file={quoted(name)}> lies outside of its folder; put it beside the file"
                 )
@@ -80,8 +87,12 @@ def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> Non
 
 
 def _count(element: ET.Element) -> int:
+    return _product(element, "count")
+
+
+def _product(element: ET.Element, *names: str) -> int:
     total = 1.0
-    for text in (element.get("count") or "1").split():
+    for text in " ".join(element.get(name) or "1" for name in names).split():
         try:
             total *= max(1.0, float(text))
         except ValueError:

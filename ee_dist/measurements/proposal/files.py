@@ -130,4 +130,6 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
     if left:
         more = f" and {len(left) - MOST_SHOWN} more" if len(left) > MOST_SHOWN else ""
         proposal.notes.append(f"columns not used: {', '.join(left[:MOST_SHOWN])}{more}")
+    for said in (proposal.notes, proposal.questions):  # names of columns may have line breaks
+        said[:] = [" ".join(text.split()) for text in said]
     return proposal

@@ -13,9 +13,11 @@ SINGLE = ("time", "supply", "enabled")
 
 def as_yaml(proposal: Proposal, robot: Any, sources: str) -> str:
     """The mapping, each line with how sure it is and why. ``robot`` is what goes to its key."""
-    lines = [f"# Proposed for {sources}. What follows each channel says how sure it is, and why; change what is wrong."]
-    lines += [f"# note: {n}" for n in proposal.notes]
-    lines += [f"# open: {q}" for q in proposal.questions]
+    lines = [
+        f"# Proposed for {_plain(sources)}. What follows each channel says how sure it is, and why; change what is wrong."
+    ]
+    lines += [f"# note: {_plain(n)}" for n in proposal.notes]
+    lines += [f"# open: {_plain(q)}" for q in proposal.questions]
     lines.append(f"robot: {_flow(robot)}")
     for key, value in proposal.head.items():
         lines.append(f"{key}: {_flow(value)}")
@@ -23,12 +25,12 @@ def as_yaml(proposal: Proposal, robot: Any, sources: str) -> str:
         found = [c for c in proposal.choices if c.group == group and c.entry is not None]
         if group in SINGLE:
             for c in found:
-                lines += [f"# {c.sure}: {c.why}", f"{group}: {_flow(c.entry)}"]
+                lines += [f"# {c.sure}: {_plain(c.why)}", f"{group}: {_flow(c.entry)}"]
             continue
         if group == "settings":
             lines += ["settings:"] * bool(found)
             for c in found:
-                lines += [f"  # {c.sure}: {c.why}", f"  - {_flow(c.entry)}"]
+                lines += [f"  # {c.sure}: {_plain(c.why)}", f"  - {_flow(c.entry)}"]
             continue
         if found or group == "sensors":
             lines.append(f"{group}:" if found else f"{group}: {{}}")
@@ -36,7 +38,7 @@ def as_yaml(proposal: Proposal, robot: Any, sources: str) -> str:
         for c in found:
             if said != (c.sure, c.why):
                 said = (c.sure, c.why)
-                lines.append(f"  # {c.sure}: {c.why}")
+                lines.append(f"  # {c.sure}: {_plain(c.why)}")
             lines.append(f"  {_flow(c.name)}: {_flow(c.entry)}")
     return "\n".join(lines) + "\n"
 
@@ -54,7 +56,16 @@ def _flow(value: Any) -> str:
         return value
     if isinstance(value, float):
         return repr(value)
-    return json.dumps(value, ensure_ascii=False, default=str)
+    return _shown(json.dumps(value, ensure_ascii=False, default=str))
+
+
+def _plain(text: str) -> str:
+    """A text behind a number sign: what would end the line, or is no sign that YAML knows, is not in it as it is."""
+    return _shown(" ".join(text.split()))
+
+
+def _shown(text: str) -> str:
+    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" if ord(c) < 2**16 else f"\\U{ord(c):08x}" for c in text)
 
 
 _WORDS = frozenset(["true", "false", "yes", "no", "on", "off", "null", "y", "n", "nan", "inf"])

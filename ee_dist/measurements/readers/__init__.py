@@ -30,6 +30,7 @@ READERS: dict[str, Reader] = {
     "mcap": read_mcap,
     "lerobot": read_lerobot,
 }
+MOST_COLUMNS = 10_000
 FORMATS = {
     ".csv": "csv",
     ".txt": "csv",
@@ -90,6 +91,11 @@ def read(path: str | Path, options: Options = Options()) -> tuple[Recorded, ...]
         raise MeasurementError(f"{file}: does not fit into memory; cut it into parts") from None
     except OSError as error:
         raise MeasurementError(f"{file}: cannot be read ({error.strerror or error})") from None
+    columns = max((len(t.columns) for r in found for t in r.tables), default=0)
+    if columns > MOST_COLUMNS:
+        raise MeasurementError(
+            f"{file}: {columns} columns; at most {MOST_COLUMNS} are read: leave out what is no channel"
+        )
     found = tuple(r for r in found if any(len(t) for t in r.tables))
     if not found:
         raise MeasurementError(f"{file}: no rows in it (zero length)")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
+from ee_dist.basics.files import real
 from ee_dist.robots.untrusted import yaml_of
 
 REPORT = "report.html"
@@ -40,6 +41,6 @@ def _asked(folder: Path) -> tuple[str, list[Path]]:
         asked, hydra = (yaml_of(folder / "config" / f"{name}.yaml") for name in ("config", "hydra"))
         where, measured = Path(hydra["hydra"]["runtime"]["cwd"]), asked["measured"] or []
         several = [measured] if isinstance(measured, str) else measured
-        return str(asked["task"]["name"]), [(where / str(m)).resolve() for m in several]
+        return str(asked["task"]["name"]), [real(where / str(m)) for m in several]
     except (OSError, ValueError, KeyError, TypeError):
         return "", []
