@@ -39,6 +39,11 @@ UNCOVERED = """(() => {
 CURVE = (
     "[...document.querySelectorAll('.js-plotly-plot')].find((p) => p.offsetParent && p.data?.[0]?.name === 'measured')"
 )
+UNIT = f"{CURVE}.layout.yaxis.title.text.match(/[(]([^)]*)[)]$/)[1]"
+POINTS = (
+    "[...document.querySelectorAll('.js-plotly-plot')].filter((p) => p.offsetParent && p.data?.[0]?.mode === 'markers')"
+    ".map((p) => p.layout.yaxis.title.text)"
+)
 ROWS = 500
 FOUND = "document.body.innerText.includes('Ranked, with 95 % intervals')"
 
@@ -86,6 +91,16 @@ def pointed_at(person: Person) -> None:
     person.evaluate("document.querySelector('iframe.robot').remove()")
 
 
+def another_channel(person: Person) -> None:
+    """By a key: the curves, and soon after them the points below, are of another channel."""
+    unit = person.evaluate(UNIT)
+    assert person.wait(f"{POINTS}.length > 2 && {POINTS}") == [f"residual ({unit})"] * 3
+    person.evaluate("document.activeElement.blur()")
+    person.key("ArrowDown", 40)
+    other = person.wait(f"{UNIT} !== '{unit}' && {UNIT}")
+    person.wait(f"{POINTS}.length === 3 && {POINTS}.every((title) => title === 'residual ({other})')")
+
+
 def slid(person: Person, bench: Bench) -> None:
     """A slider tells where it is let go of last, whatever it has not told by then, and stays under the hand."""
     found = person.evaluate(SLIDER % f"{bench.address}_nicegui/{__version__}/components/{Slider.component.key}")
@@ -131,6 +146,7 @@ def test_the_story(recording: Path, tmp_path: Path) -> None:
                 start = person.wait(NUMBER)
                 person.wait("document.querySelectorAll('.js-plotly-plot .main-svg').length > 4")
                 pointed_at(person)
+                another_channel(person)
                 # Nothing that was measured is offered to be sent elsewhere.
                 buttons = person.evaluate("[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title)")
                 assert set(buttons) == {"Zoom", "Pan", "Box Select", "Zoom in", "Zoom out", "Reset axes"}

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import numpy as np
-from nicegui import ui
+from nicegui import background_tasks, ui
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import by_trial
@@ -14,8 +15,11 @@ from ee_dist.workbench import charts
 from ee_dist.workbench.pages.curves import Curves
 from ee_dist.workbench.pages.plot import Plot
 from ee_dist.workbench.pages.robot import RobotPanel
-from ee_dist.workbench.pages.view import View, heading, of, quiet
+from ee_dist.workbench.pages.view import Latest, View, heading, of, quiet
 from ee_dist.workbench.sight import Cloud
+
+AFTER_S = 0.1
+"""By which points come after curves."""
 
 
 class CompareView(View):
@@ -43,6 +47,8 @@ class CompareView(View):
             self.cloud_note = quiet()
             self.clouds = ui.element("div").classes("clouds")
             self._parts: list[Cloud] = []
+            self._unit = ""
+            self.later = Latest[None](self._soon)
             self._plots: list[Any] = []
         self.robot = RobotPanel(self.page)
 
@@ -67,14 +73,25 @@ class CompareView(View):
             names = [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)]
             cells = by_trial(problem, np.nan_to_num(seen.residual, posinf=0.0))
             self.map.draw(charts.heat(cells, problem.channels, names, place))
-            self._parts = await of(session.do(sight.clouds, seen.residual, place))
         self.curves.draw(await of(session.do(sight.series, seen.terms, place)))
-        self._draw_clouds(problem.layout.units[place[1]])
+        if topics & {"seen", "place"}:
+            self._parts = await of(session.do(sight.clouds, seen.residual, place))
+            self._unit = problem.layout.units[place[1]]
+        if "seen" in topics:
+            self._draw_clouds()
+        else:
+            background_tasks.create(self.later.ask(None))
         if topics & {"kept", "seen", "place", "look"}:
             self.robot.draw(topics)
 
-    def _draw_clouds(self, unit: str) -> None:
-        figures = [charts.cloud(p, unit, self.page.span_s) for p in self._parts]
+    async def _soon(self, _: None) -> None:
+        """Thousands of points take a browser longer to draw than the curves, which a hand waits for."""
+        await asyncio.sleep(AFTER_S)
+        if not self.later.newer:
+            self._draw_clouds()
+
+    def _draw_clouds(self) -> None:
+        figures = [charts.cloud(p, self._unit, self.page.span_s) for p in self._parts]
         self.cloud_note.set_text(
             "What is in sight above is coloured; a box around points marks them above."
             if figures
