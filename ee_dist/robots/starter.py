@@ -86,8 +86,10 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         lines.insert(2, f"# time_step_s: {robot.time_step_s:g}  # assumed: {STEP}")
         assumed.append(f"time_step_s: {robot.time_step_s:g} s, {STEP}")
     text = "\n".join(lines) + "\n"
+    moved = {j.child for j in robot.joints}
+    heavy = sum(p.mass_kg for p in robot.parts if free or p.name in moved)
     read = (
-        f"{len(robot.parts)} parts, {sum(p.mass_kg for p in robot.parts):.4g} kg",
+        f"{len(robot.parts)} parts, {heavy:.4g} kg" + ("" if free else " of them move"),
         f"{len(body.moving) + 6 * free} degrees of freedom: {len(body.moving)} joints"
         + (", base free" if free else ", base bolted down"),
         f"{sum(_acted_on(body.drives[name]) for name in body.driven)} joints with a drive or passive forces in the file",

@@ -123,3 +123,9 @@ def _energy(q: np.ndarray, w: np.ndarray) -> float:
     height = m1 * (c1 - c1 * np.sin(a)) + m2 * (l1 + c2 - l1 * np.sin(a) - c2 * np.sin(b))
     moved = m1 * (c1 * wa) ** 2 + m2 * ((l1 * wa) ** 2 + (c2 * wb) ** 2 + 2 * l1 * c2 * wa * wb * np.cos(a - b))
     return float(9.81 * height + 0.5 * (moved + i * (wa**2 + wb**2)))
+
+
+def test_what_a_bolted_base_is_taken_to_weigh_is_not_told_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM)
+    begun = starter(read_body("urdf", tmp_path / "arm.urdf"), "urdf", "arm.urdf", "arm.urdf")
+    assert begun.read[0] == "3 parts, 0.7 kg of them move"
