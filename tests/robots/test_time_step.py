@@ -106,7 +106,8 @@ def test_links_that_swing_from_one_another_take_the_finest_step(
 
 def test_fingers_that_nobody_drives_leave_an_arm_its_step(tmp_path: Path) -> None:
     finger = """<link name="finger"><inertial><mass value="0.02"/>
-    <inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="f" type="prismatic"><parent link="lower"/><child link="finger"/><axis xyz="0 1 0"/>
+    <inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="f" type="prismatic"><parent link="lower"/><child link="finger"/><axis xyz="0 1 0"/>
     <limit lower="0" upper="0.04" effort="9" velocity="1"/></joint></robot>"""
     (tmp_path / "arm.urdf").write_text(ARM.replace("</robot>", finger))
     drive = {"kp": 18.0, "kd": 0.4, "torque_limit": 9.0, "speed_limit": 30.0, "rotor_inertia": 0.02}
