@@ -87,8 +87,10 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         lines.insert(2, f"# time_step_s: {robot.time_step_s:g}  # assumed: {STEP}")
         assumed.append(f"time_step_s: {robot.time_step_s:g} s, {STEP}")
     text = "\n".join(lines) + "\n"
+    moved = {j.child for j in robot.joints}
+    heavy = sum(p.mass_kg for p in robot.parts if free or p.name in moved)
     read = (
-        f"{len(robot.parts)} parts, {sum(p.mass_kg for p in robot.parts):.4g} kg",
+        f"{len(robot.parts)} parts, {heavy:.4g} kg" + ("" if free else " of them move"),
         f"{len(body.moving) + 6 * free} degrees of freedom: {len(body.moving)} joints"
         + (", base free" if free else ", base bolted down"),
         f"{sum(_acted_on(body.drives[name]) for name in body.driven)} joints with a drive or passive forces in the file",
@@ -101,7 +103,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         tuple(_row(robot, j) for j in body.moving),
         (*read, *said),
         tuple(assumed),
-        _missing(robot, any("rotor_inertia" in guessed for _, guessed in drives.values())),
+        _missing(robot, any("rotor_inertia" in guessed for _, guessed in drives.values())) + _trusted(robot),
     )
 
 
@@ -164,6 +166,19 @@ def _row(robot: Robot, joint: Joint) -> tuple[str, ...]:
     name = f"{joint.name} (slide)" if joint.kind == "slide" else joint.name
     rest = (f"{v:.3g}" if v else "" for v in (drive.viscous, drive.coulomb, drive.rotor_inertia))
     return name, *reach, drive.command, *(f"{v:.4g}" if v else "" for v in (drive.kp, drive.kd)), limit, *rest
+
+
+def _trusted(robot: Robot) -> tuple[str, ...]:
+    """What only the user knows of gains that the file states: each file that is simulated states some."""
+    led = [d.joint for d in robot.drives if d.command in ("position", "speed")]
+    stated = [j for j in led if j not in robot.assumed_joints("kp")]
+    if not stated:
+        return ()
+    more = f" and {len(stated) - 3} more" if stated[3:] else ""
+    return (
+        f"whether the file's gains of {', '.join(stated[:3])}{more} are the robot's: guesses that are marked so, "
+        "'assumed: [kp, kd]', are looked for first",
+    )
 
 
 def _missing(robot: Robot, guessed_rotors: bool) -> tuple[str, ...]:

@@ -90,6 +90,15 @@ CART = (
 TILTED = '<keyframe><key qpos="0.3 3"/></keyframe>'
 
 
+def test_gains_that_a_file_states_are_asked_about(tmp_path: Path) -> None:
+    """A file that is simulated has gains, whether anybody knew them or not."""
+    for kind, asked in (("position", True), ("motor", False)):
+        gain = ' kp="20"' if asked else ""
+        file = written(tmp_path, CART, f'<actuator><{kind} joint="x"{gain}/></actuator>')
+        made = starter(read_mjcf(file), "mjcf", file.name, str(file))
+        assert any(m.startswith("whether the file's gains of x are the robot's") for m in made.missing) == asked
+
+
 def test_joints_that_the_file_leaves_undriven_swing_from_where_they_start(tmp_path: Path) -> None:
     file = written(tmp_path, CART, f'<actuator><motor joint="x"/></actuator>{TILTED}')
     body = read_mjcf(file)

@@ -88,12 +88,31 @@ def test_a_link_too_light_for_its_gains_is_told_and_a_starter_never_has_one(tmp_
 
 
 @pytest.mark.parametrize(
-    "drives", [{}, {"a": {"command": "none"}, "b": {"command": "none"}}, {"a": {"kp": 18.0, "kd": 0.4}}]
+    ("drives", "step"),
+    [
+        ({}, SWING_S),
+        ({"a": {"command": "none"}, "b": {"command": "none"}}, SWING_S),
+        ({"a": {"command": "torque", "torque_limit": 5.0}}, SWING_S),
+        ({"a": {"kp": 18.0, "kd": 0.4}}, FINE_S),
+    ],
 )
-def test_links_that_swing_from_one_another_take_the_finest_step(tmp_path: Path, drives: dict[str, object]) -> None:
+def test_links_that_swing_from_one_another_take_the_finest_step(
+    tmp_path: Path, drives: dict[str, object], step: float
+) -> None:
     (tmp_path / "arm.urdf").write_text(ARM)
     robot, _ = load_robot({"urdf": str(tmp_path / "arm.urdf"), "drives": drives, "free_base": False})
-    assert robot.time_step_s == SWING_S
+    assert robot.time_step_s == step
+
+
+def test_fingers_that_nobody_drives_leave_an_arm_its_step(tmp_path: Path) -> None:
+    finger = """<link name="finger"><inertial><mass value="0.02"/>
+    <inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="f" type="prismatic"><parent link="lower"/><child link="finger"/><axis xyz="0 1 0"/>
+    <limit lower="0" upper="0.04" effort="9" velocity="1"/></joint></robot>"""
+    (tmp_path / "arm.urdf").write_text(ARM.replace("</robot>", finger))
+    drive = {"kp": 18.0, "kd": 0.4, "torque_limit": 9.0, "speed_limit": 30.0, "rotor_inertia": 0.02}
+    robot, _ = load_robot({"urdf": str(tmp_path / "arm.urdf"), "drives": {"a": drive, "b": drive}, "free_base": False})
+    assert robot.time_step_s == STEPS_S[0]
 
 
 def test_a_free_swing_of_two_links_loses_by_itself_far_less_than_in_steps_of_two_milliseconds(tmp_path: Path) -> None:
@@ -123,3 +142,9 @@ def _energy(q: np.ndarray, w: np.ndarray) -> float:
     height = m1 * (c1 - c1 * np.sin(a)) + m2 * (l1 + c2 - l1 * np.sin(a) - c2 * np.sin(b))
     moved = m1 * (c1 * wa) ** 2 + m2 * ((l1 * wa) ** 2 + (c2 * wb) ** 2 + 2 * l1 * c2 * wa * wb * np.cos(a - b))
     return float(9.81 * height + 0.5 * (moved + i * (wa**2 + wb**2)))
+
+
+def test_what_a_bolted_base_is_taken_to_weigh_is_not_told_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM)
+    begun = starter(read_body("urdf", tmp_path / "arm.urdf"), "urdf", "arm.urdf", "arm.urdf")
+    assert begun.read[0] == "3 parts, 0.7 kg of them move"

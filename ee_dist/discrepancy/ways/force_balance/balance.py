@@ -41,18 +41,18 @@ LEAST_SLOPE = 0.05
 """Least change of what is left over for one of the measured force, where a joint moves: a gear that rubs this much away hardly
 lets its motor through."""
 MOST_VALUES = 8_000_000
-"""Values that are kept of what joints leave: 64 MB."""
+"""Values that are kept of what joints leave, of all motions together: 128 MB, for each stands there twice."""
 
 
 class Balance:
-    """What models leave along one motion, every ``keep_every`` th row of it."""
+    """What models leave along one motion of ``motions``, every ``keep_every`` th row of it."""
 
-    def __init__(self, motion: Motion, keep_every: int) -> None:
+    def __init__(self, motion: Motion, keep_every: int, motions: int = 1) -> None:
         self.motion, self.keep_every = motion, keep_every
         self.rest = decimated(motion.rest.astype(float), keep_every) > 0.5
         """(rows, M): where a joint did not move."""
         self._kept: dict[tuple[object, ...], tuple[Array, Array] | None] = {}
-        self._most = max(MOST_VALUES * keep_every // max(len(motion.torque), 1), 64)
+        self._most = max(MOST_VALUES * keep_every // (motions * max(len(motion.torque), 1)), 64)
 
     def __call__(self, robot: Robot) -> tuple[Array, Array] | None:
         """(rows, M) of ``left_over``, decimated: with friction that holds what rests, and without it; None where a model
@@ -74,7 +74,10 @@ class Balance:
             kept = decimated(np.where(whole, held, 0.0), self.keep_every)
             loose = kept if free is held else decimated(np.where(whole, free, 0.0), self.keep_every)
             for i, k in enumerate(missing):
-                self._kept[keys[k]] = (kept[:, i], loose[:, i]) if whole[i] else None
+                # Not as a view: that would keep all rows of all joints, of which every tenth of one is wanted.
+                own = kept[:, i].copy()
+                other = own if loose is kept else loose[:, i].copy()
+                self._kept[keys[k]] = (own, other) if whole[i] else None
         columns = [c for key in keys if (c := self._kept[key]) is not None]
         if len(columns) < len(keys):
             return None

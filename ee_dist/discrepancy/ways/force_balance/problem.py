@@ -63,7 +63,7 @@ class ForceBalance(Problem):
             ready.size,
             ready.noise,
         )
-        self.balances = [Balance(m, self.processing.keep_every) for m in self.motions]
+        self.balances = [Balance(m, self.processing.keep_every, len(self.motions)) for m in self.motions]
         forces = [decimated(m.torque, self.processing.keep_every) for m in self.motions]
         self.let_through = ready.noise.first
         """(M,): variance of the force that noise of the positions makes, with the base model."""
