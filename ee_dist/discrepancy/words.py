@@ -83,9 +83,10 @@ def span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> 
     """An interval, with as many digits as its ends need to differ."""
     share = is_share(term.effect, key)
     unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
-    # One joint shares nothing: an interval that goes below what there is is told as it is.
-    alone = robot is not None and len(robot.motor_names) == 1 and _than(term, key, low, robot) == SHARED
-    if CATALOGUE[term.effect].parameter(key).on_top and low < 0 and not alone:
+    below = bool(CATALOGUE[term.effect].parameter(key).on_top) and low < 0
+    # One joint shares nothing: where its interval goes below what there is, it is told as it is.
+    alone = below and robot is not None and len(robot.motor_names) == 1 and _than(term, key, low, robot) == SHARED
+    if below and not alone:
         more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
         return f"{a.removeprefix('-')}{unit} less to {more}{_than(term, key, low, robot)}"
     return f"{a} to {b}{unit}"

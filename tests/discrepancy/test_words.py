@@ -240,6 +240,8 @@ def test_one_joint_alone_shares_nothing() -> None:
     stage = linear_stage()
     wide = term("coulomb_friction", "carriage", torque_nm=20.4)
     assert span(wide, "torque_nm", -26.7, 67.5, stage) == "-26.7 to 67.5 N"
+    aside = term("zero_offset", "carriage", offset_rad=-0.1)
+    assert span(aside, "offset_rad", -0.2, 0.1, stage) == "-0.2 to 0.1 m", "comes on top of nothing"
 
 
 @pytest.mark.parametrize(
