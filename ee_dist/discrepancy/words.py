@@ -79,14 +79,13 @@ def is_less(terms: Hypothesis) -> bool:
     return all(p and v and p[0].on_top and v[0][1] < 0 for p, v in main)
 
 
-def span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> str:
-    """An interval, with as many digits as its ends need to differ."""
+def span(term: Term, key: str, low: float, high: float, robot: Robot | None, *, interval: bool = False) -> str:
+    """From one value to another, with as many digits as they need to differ. An ``interval`` of one value that goes below what
+    there is is told as it is: no joint shares anything with itself."""
     share = is_share(term.effect, key)
     unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
     below = bool(CATALOGUE[term.effect].parameter(key).on_top) and low < 0
-    # One joint shares nothing: where its interval goes below what there is, it is told as it is.
-    alone = below and robot is not None and len(robot.motor_names) == 1 and _than(term, key, low, robot) == SHARED
-    if below and not alone:
+    if below and not (interval and _than(term, key, low, robot) == SHARED):
         more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
         return f"{a.removeprefix('-')}{unit} less to {more}{_than(term, key, low, robot)}"
     return f"{a} to {b}{unit}"
