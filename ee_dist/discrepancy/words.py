@@ -79,13 +79,13 @@ def is_less(terms: Hypothesis) -> bool:
     return all(p and v and p[0].on_top and v[0][1] < 0 for p, v in main)
 
 
-def span(term: Term, key: str, low: float, high: float, robot: Robot | None) -> str:
-    """An interval, with as many digits as its ends need to differ."""
+def span(term: Term, key: str, low: float, high: float, robot: Robot | None, *, interval: bool = False) -> str:
+    """From one value to another, with as many digits as they need to differ. An ``interval`` of one value that goes below what
+    there is is told as it is: no joint shares anything with itself."""
     share = is_share(term.effect, key)
     unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
-    # One joint shares nothing: an interval that goes below what there is is told as it is.
-    alone = robot is not None and len(robot.motor_names) == 1 and _than(term, key, low, robot) == SHARED
-    if CATALOGUE[term.effect].parameter(key).on_top and low < 0 and not alone:
+    below = bool(CATALOGUE[term.effect].parameter(key).on_top) and low < 0
+    if below and not (interval and _than(term, key, low, robot) == SHARED):
         more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
         return f"{a.removeprefix('-')}{unit} less to {more}{_than(term, key, low, robot)}"
     return f"{a} to {b}{unit}"

@@ -124,7 +124,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
         shown = parting(robot, models, result.closest, best, evaluator, every_s)
     out.mkdir(parents=True, exist_ok=True)
     write_whole(out / CSV, as_csv(robot, best))
-    trial = ["task=trial", *robot_settings(robot, out), setting("task.noise", f"{noise_share(robot):.3g}"),
+    trial = ["task=trial", *robot_settings(robot, out), f"task.noise={noise_share(robot):.3g}",
              setting("engine", found.config.engine.name), f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
     explanations = list(zip(names, models, strict=True))
     account = account_of(

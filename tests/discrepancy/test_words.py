@@ -236,10 +236,12 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     assert "Left out in the end, since these data do not tell them from neutral: rotor inertia at servo." in lines
 
 
-def test_one_joint_alone_shares_nothing() -> None:
+def test_an_interval_below_what_there_is_is_told_as_it_is() -> None:
     stage = linear_stage()
     wide = term("coulomb_friction", "carriage", torque_nm=20.4)
-    assert span(wide, "torque_nm", -26.7, 67.5, stage) == "-26.7 to 67.5 N"
+    assert span(wide, "torque_nm", -26.7, 67.5, stage, interval=True) == "-26.7 to 67.5 N"
+    aside = term("zero_offset", "carriage", offset_rad=-0.1)
+    assert span(aside, "offset_rad", -0.2, 0.1, stage, interval=True) == "-0.2 to 0.1 m", "comes on top of nothing"
 
 
 @pytest.mark.parametrize(

@@ -42,8 +42,9 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     before, outcome = run("task=explain", f"measured={first}", SUSPECTS, "task.rerun=false", *QUICK)
     assert set(tied(before)) == {"part_mass@arm", "command_gain@servo"}
     told = next(line for line in outcome.out.splitlines() if "task=plan" in line)
-    line = shlex.split(told.split(": ", 1)[1])
-    assert line[:3] == ["python", "-m", "ee_dist"] and told in (before / "report.html").read_text()
+    typed = told.split(": ", 1)[1]
+    line = shlex.split(typed)
+    assert line[:3] == ["python", "-m", "ee_dist"] and f"<code>{typed}</code>" in (before / "report.html").read_text()
 
     assert line[3] == "task=plan" and (outcome.folder / line[4].removeprefix("task.explained=")).samefile(before)
 
@@ -59,7 +60,7 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
 
     # The same file of commands as the trial that the line makes.
     line = shlex.join(found["command"])
-    assert line in outcome.out
+    assert line in outcome.out and " task.noise=0.001 " in line, "numbers need no quotes"
     second, _ = run(*shlex.split(line)[3:], HIDDEN)
     sent = pd.read_csv(plan / found["csv"])
     assert list(sent.columns) == ["time_s", "servo_command (rad)"]

@@ -133,7 +133,7 @@ def _ranges(found: Improvement, named_: Sequence[Term], robot: Robot) -> str:
     for p in found.parameters:
         term = found.terms[p.term]
         if term.name in told_of:
-            range_ = span(term, p.name, p.low, p.high, robot)
+            range_ = span(term, p.name, p.low, p.high, robot, interval=True)
             sure = not p.flag and np.isfinite(p.high - p.low)
             told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
     out = [
