@@ -12,8 +12,10 @@ from ee_dist.effects.catalogue import Term
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.tasks import trial
 from ee_dist.tasks.config import Config, EngineConfig, RobotConfig
+from ee_dist.tasks.results import sections
 from ee_dist.tasks.results.labels import excess_share, trial_name, worst_trials
 from ee_dist.tasks.results.tables import candidate_label
+from ee_dist.viewing.curves import Overlay
 
 
 def test_the_worst_trial_is_told_from_its_repeat() -> None:
@@ -46,3 +48,19 @@ def test_values_of_many_places_are_told_one_by_one_only_where_they_were_earned()
     each, short = (candidate_label(SimpleNamespace(terms=terms, earned=e), robot) for e in (True, False))  # type: ignore[arg-type]
     assert "each joint by itself" in each and "0.15 N.m" in each
     assert short == "coulomb friction at 3 joints (torque 0.1 to 0.2 N.m)"
+
+
+def test_what_only_makes_a_channel_rougher_is_shown_on_that_channel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Readings gain nothing by it: what gains is compared besides them."""
+    monkeypatch.setattr(sections, "span_of", lambda *_: (0.0, 1.0))
+    times = np.linspace(0, 1, 50)
+    overlays = [Overlay(c, "sway", "rad", times, times, times, times, 1.0) for c in ("a", "b")]
+    problem = SimpleNamespace(
+        channels=("a", "b"), segments=("sway@0.0s",), trials=("sway",), trial_of_segment=np.zeros(1, int),
+        segment_of=np.zeros(4, int), channel_of=np.array([0, 1, 0, 1]), floor=np.ones(4),
+        layout=SimpleNamespace(reading=np.array([True, True, False, False])),
+    )  # fmt: skip
+    before, after = np.array([1.0, 1.0, 1.0, 9.0]), np.ones(4)
+    models = [("model", ()), ("improved model", ())]
+    shown = sections.proof_section(problem, overlays, before, models, after)  # type: ignore[arg-type]
+    assert shown is not None and "most: b, in trial" in shown.heading
