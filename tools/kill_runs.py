@@ -74,10 +74,7 @@ class Bench:
         self.temporary.mkdir()
 
     def start(self, where: str, errors: Path) -> subprocess.Popen[bytes]:
-        # Ray makes its workers so nice that on a busy machine they hardly get on.
-        surroundings = {
-            **os.environ, MARK: str(self.folder), "TMPDIR": str(self.temporary), "RAY_worker_niceness": "0",
-        }  # fmt: skip
+        surroundings = {**os.environ, MARK: str(self.folder), "TMPDIR": str(self.temporary)}
         with errors.open("wb") as file:
             return subprocess.Popen(
                 [sys.executable, "-m", "ee_dist", *SETTINGS, *self.settings, where],

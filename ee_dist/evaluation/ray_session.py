@@ -30,6 +30,9 @@ class RayLostError(EvaluatorError):
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Workers are one process a core: numerical libraries must not start threads of their own in them."""
+NICENESS = "RAY_worker_niceness"
+"""Ray makes its workers give way to all else (15), so that beside other programs a search hardly gets on while a person waits
+for it: only where that is asked for."""
 PER_CORE = 8
 """More workers than this on each core only take memory."""
 LOOK_S = 0.5
@@ -76,7 +79,7 @@ def start_ray(address: str | None, workers: int, folder: str | None = None) -> N
             "_temp_dir": _guard.folder if _guard else folder,
         }
         # Inherited by the workers that Ray has ready: with a runtime_env it would start others, and a second later.
-        environment = {**ONE_THREAD, **(_guard.environment if _guard else {})}
+        environment = {**ONE_THREAD, NICENESS: os.environ.get(NICENESS, "0"), **(_guard.environment if _guard else {})}
     _started, _address = not address, None
     starter = _Starter(options)
     _heads = Heads()

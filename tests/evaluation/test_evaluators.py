@@ -86,6 +86,9 @@ def test_a_killed_worker_changes_nothing():
     serial.close()
     evaluator = RayEvaluator(PyBulletEngine, 2, 4)
     victim = evaluator.process_ids()[0]
+    assert os.getpriority(os.PRIO_PROCESS, victim) == os.getpriority(os.PRIO_PROCESS, 0), (
+        "no worker gives way by itself"
+    )
     died = threading.Event()
 
     def kill() -> None:
