@@ -19,8 +19,10 @@ def draw(robot: Robot, rng: np.random.Generator) -> tuple[Candidate, Term]:
     entry = entries[int(rng.integers(len(entries)))]
     targets = entry.proposed(robot)
     chosen = candidate(robot, entry, targets[int(rng.integers(len(targets)))])
-    if not possible(robot, (), [chosen]):
+    room = possible(robot, (), [chosen])
+    if not room:
         return draw(robot, rng)
+    chosen = room[0]
     u = []
     for low, high in zip(chosen.lower, chosen.upper, strict=True):
         side = float(rng.choice([s for s in (low, high) if s] or [0.0]))

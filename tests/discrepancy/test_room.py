@@ -61,4 +61,5 @@ def test_nothing_is_hidden_that_a_robot_has_no_room_for() -> None:
     rng = np.random.default_rng(0)
     assert "friction_asymmetry" not in {draw(robot, rng)[0].effect.name for _ in range(400)}
     rubbing = apply(robot, (term("coulomb_friction", "servo", torque_nm=0.1),))
-    assert "friction_asymmetry" in {draw(rubbing, rng)[0].effect.name for _ in range(400)}
+    drawn = [t for _, t in (draw(rubbing, rng) for _ in range(400)) if t.effect == "friction_asymmetry"]
+    assert drawn and max(abs(dict(t.values)["dry_nm"]) for t in drawn) < 0.1
