@@ -158,7 +158,7 @@ def cross_fit(
         if mask.all():
             continue
         count += int(mask.sum())
-        for i, fit in enumerate(fit_all(search, starts, mask, widths, prior, leading, near=True)):
+        for i, fit in enumerate(fit_all(search, starts, mask, widths, prior, leading)):
             residuals[i][~mask] = fit.residual[~mask]
             seen[i] += fit.energy
             fits[i].append(fit)

@@ -31,18 +31,15 @@ def fit_all(
     widths: Sequence[float] = WIDTHS,
     prior: float = 0.0,
     leading: Array | None = None,
-    near: bool = False,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given. ``leading``: known
     slopes of the first values (see slopes.py); where the error is rugged none are of use. Models of many values are
-    fitted by valley.py. ``near``: from a start that is good already, to be left only where slopes lead away from it."""
+    fitted by valley.py."""
     chosen = search.everything if mask is None else mask
     large = [i for i, (_, u) in enumerate(starts) if leading is None and len(u) >= LARGE and not sticky(search)]
     if large:
         small = [i for i in range(len(starts)) if i not in large]
-        found = dict(
-            zip(small, fit_all(search, [starts[i] for i in small], mask, widths, prior, near=near), strict=True)
-        )
+        found = dict(zip(small, fit_all(search, [starts[i] for i in small], mask, widths, prior), strict=True))
         far = len(widths) > 2
         count = ITERATIONS if far else SHORT
         fits = follow_valley(search, [starts[i] for i in large], chosen, prior, count, widths[:1], settled=not far)
@@ -50,7 +47,7 @@ def fit_all(
         return [found[i] for i in range(len(starts))]
     if not search.problem.rugged:
         return follow_slopes(search, starts, chosen, widths, prior, leading)
-    return _rugged(search, starts, chosen, len(widths), prior, near)
+    return _rugged(search, starts, chosen, len(widths), prior)
 
 
 def sticky(search: Search) -> bool:
@@ -59,16 +56,10 @@ def sticky(search: Search) -> bool:
 
 
 def _rugged(
-    search: Search,
-    starts: Sequence[tuple[Model, Array]],
-    mask: Mask,
-    iterations: int,
-    prior: float,
-    near: bool,
+    search: Search, starts: Sequence[tuple[Model, Array]], mask: Mask, iterations: int, prior: float
 ) -> list[Fit]:
     """Slopes from the start and from half way to neutral; then, for a robot of few joints, a cloud from where the better of
-    them ended: slopes go far for few rollouts, and stop at the first ridge. Not so ``near`` a good start: of valleys that a
-    part of the data does not tell apart a cloud takes any, and what was held out would be foretold by chance."""
+    them ended: slopes go far for few rollouts, and stop at the first ridge."""
     halves = [(m, 0.5 * np.asarray(u, float)) for m, u in starts]
     few = sticky(search)
     count = ITERATIONS if iterations > 2 else SHORT
@@ -78,7 +69,7 @@ def _rugged(
         found = follow_valley(search, [*starts, *halves], mask, prior, count)
     pairs = zip(found[: len(starts)], found[len(starts) :], strict=True)
     best = [min(pair, key=lambda f: _cost(f, prior)) for pair in pairs]
-    if not few or near:
+    if not few:
         return best
     generations, seeds = effort_of(iterations, search.problem.effort)
     clouds = follow_cloud(search, [(f.model, f.u) for f in best], mask, generations, seeds, prior=prior)
