@@ -64,8 +64,14 @@ def drive_law(name: str) -> Callable[[LawFunction], LawFunction]:
 
 def speed_law(name: str) -> Callable[[LawFunction], LawFunction]:
     """Register a law of the speed that a controller knows. Raises LawError."""
-    SPEED_LAWS.add(name)
-    return drive_law(name)
+
+    def register(function: LawFunction) -> LawFunction:
+        found = drive_law(name)(function)
+        # Only now: a name that is taken by a law of torques stays one.
+        SPEED_LAWS.add(name)
+        return found
+
+    return register
 
 
 def text_of_law(name: str) -> str:

@@ -14,7 +14,7 @@ import pytest
 from effect_robots import MASS_KG, Bench, slider
 
 from ee_dist.effects import CATALOGUE, EffectError, apply, load_plugin, loaded_plugins, term
-from ee_dist.effects.laws import LAWS, LawError, drive_law, find_law
+from ee_dist.effects.laws import LAWS, SPEED_LAWS, LawError, drive_law, find_law, speed_law
 from ee_dist.effects.plugins import text_of_plugin
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -172,6 +172,9 @@ def test_a_name_of_ours_cannot_be_taken(tmp_path: Path) -> None:
 def test_a_law_whose_name_is_taken_is_refused() -> None:
     with pytest.raises(LawError, match="'cogging' exists already"):
         drive_law("cogging")(lambda joint: joint.position)
+    with pytest.raises(LawError, match="'cogging' exists already"):
+        speed_law("cogging")(lambda joint: joint.position)
+    assert "cogging" not in SPEED_LAWS, "it goes on as the law of torques that it is"
 
 
 def test_a_law_that_is_not_registered_is_named(bench: Bench) -> None:

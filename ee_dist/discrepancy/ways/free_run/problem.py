@@ -338,7 +338,6 @@ def _noise(piece: Piece, columns: Sequence[int]) -> float:
         return 0.0
     rough = np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2])
     found = float(np.median(rough) / np.sqrt(6.0)) / MEDIAN_ABSOLUTE
-    every = piece.log.sensors[
-        :, list(columns)
-    ]  # of the rows between, too: the finer they are, the less motion is in them
+    # Of the rows between, too: the finer they are, the less motion is in them.
+    every = piece.log.sensors[:, list(columns)]
     return float(np.mean(without_motion(np.full(len(columns), found), piece.log.times_s, every))) * MEAN_ABSOLUTE
