@@ -134,7 +134,7 @@ class Bench:
         known = replace(self.known, trials=tuple(trials))
         # What was simulated for another case is of no use for this one.
         close_evaluators()
-        return way_of(known, by).make(known, self.config)
+        return way_of(known, by).make(known, self.config).searched
 
     def calibrate(self) -> None:
         """As ``task=improve task.calibrate=true`` does it, on an untouched robot of the other engine."""

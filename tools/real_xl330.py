@@ -11,11 +11,11 @@ import numpy as np
 from real_tables import Page
 
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Effort
-from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.improve import MOST, improve
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate
-from ee_dist.discrepancy.search.cloud import follow_cloud
+from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Search
@@ -90,13 +90,14 @@ def _held_out(
             f"--hold {hold}: no recording at that gain; there are: {sorted({_gain(t) for t in trials})}"
         )
     evaluator = SerialEvaluator(OneJointEngine(1024), 1024)
-    problem = FreeRun([t for t in trials if _gain(t) != hold], model.robot, evaluator, 5, effort=0.1 if quick else 1.0)
-    held = FreeRun(own, model.robot, evaluator, 5, effort=0.1 if quick else 1.0)
+    problem = FreeRun([t for t in trials if _gain(t) != hold], model.robot, evaluator, 5)
+    held = FreeRun(own, model.robot, evaluator, 5)
     page.text(
         f"## kp {hold} held out", "", f"error: {problem.natural_name} over free runs, every recording counting the same"
     )
     effort = Effort(first=6, second=3, final=2, starts=1) if quick else STANDARD_EFFORT
-    ladder = improve(problem, pool_of(problem), model.terms, effort=effort, most=1 if quick else 4)
+    searched = problem.searched
+    ladder = improve(searched, pool_of(searched), model.terms, effort=effort, most=1 if quick else MOST)
     _ladder(hold, ladder, problem, held, page)
     notes = [f"found by tools/real_data.py xl330 with kp {hold} held out"]
     write_model(out / f"model_hold_{hold}.yaml", model.source, model.folder, ladder.terms, notes)
@@ -156,7 +157,7 @@ def _structures(problem: FreeRun, held: FreeRun, model: ModelFile, page: Page) -
     for added in STRUCTURES.values():
         parts = Model((*base, *(candidate(model.robot, e, JOINT) for e in added)))
         starts.append((parts, np.where(parts.upper > 0, 0.02, 0.0)))
-    fits = follow_cloud(Search(problem), starts, Search(problem).everything, generations=45, seeds=(1, 2))
+    fits = fit_all(Search(problem.searched), starts)
     rows = [
         (name, f"{_mrad(problem, f.hypothesis):.1f}", f"{_mrad(held, f.hypothesis):.1f}")
         for name, f in zip(STRUCTURES, fits, strict=True)
@@ -172,7 +173,7 @@ def _further(fit: Fit, problem: FreeRun, held: FreeRun, model: ModelFile, page: 
     extra = [candidate(model.robot, n, "supply" if n == "supply_sag" else JOINT) for n in names]
     starts = [(fit.model, fit.u)]
     starts += [(Model((*fit.model.parts, c)), np.concatenate([fit.u, np.where(c.upper > 0, 0.02, 0.0)])) for c in extra]
-    fits = follow_cloud(Search(problem), starts, Search(problem).everything, generations=30, seeds=(1,), sigma=0.04)
+    fits = fit_all(Search(problem.searched), starts)
     before = [_mrad(p, fits[0].hypothesis) for p in (problem, held)]
     rows = [("(the same refit, nothing added)", f"{before[0]:.1f}", "", f"{before[1]:.1f}", "", "")]
     for f in fits[1:]:

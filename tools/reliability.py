@@ -120,7 +120,7 @@ def one(index: int, drawn: Drawn) -> Case | str:
         known = Measurements(robot, tuple(trials), (), (), robot.name, Path())
         close_evaluators()
         config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
-        problem = way_of(known, AUTO).make(known, config)
+        problem = way_of(known, AUTO).make(known, config).searched
         base, true = problem.residuals([(), hidden])
         mark = float(((base - true) ** 2).sum()) if np.isfinite(true).all() else float("inf")
         pool = [c for c in pool_of(problem) if kind != WITHHELD or c.effect.name != hidden[-1].effect]

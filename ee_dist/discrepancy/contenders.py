@@ -30,11 +30,8 @@ class Field:
 def contenders(problem: Problem, explanations: Sequence[Hypothesis], progress: Progress = quiet) -> Field:
     """Explanations, each with all terms of its model, fitted to the measurements once more.
 
-    Where fits would search for minutes (a rugged problem), values are taken as they are, and as certain. Of models with
-    many values only those are free in which the explanations differ; of calibrated ones too.
+    Of models with many values only those are free in which the explanations differ; of calibrated ones too.
     """
-    if problem.rugged:
-        return Field(tuple(Contender(h) for h in explanations), 1.0)
     common = {t.name for t in explanations[0]}.intersection(*({t.name for t in h} for h in explanations[1:]))
     count = max(sum(len(t.values) for t in h) for h in explanations)
     search = Search(problem, progress=progress)

@@ -20,13 +20,12 @@ from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, no_m
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
-from ee_dist.discrepancy.search.fit import rough
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.scan import Scanned, scan
 from ee_dist.discrepancy.search.screen import Screened, screen
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import WIDTHS, slopes_at
+from ee_dist.discrepancy.search.slopes import WIDTHS, follow_slopes, slopes_at
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.groups import WHOLE
@@ -104,7 +103,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     calm = calm_trials(problem, base)
     # What the model has already moves little when one effect is added: its slopes are taken once for all proposals.
     leading = None
-    if len(current.u) and not problem.rugged:
+    if len(current.u):
         leading = slopes_at(search, Model(current.parts), current.u)
     refit, busy = Refit(leading), busiest(problem, base, calm)
     screened = screen(now.among(busy), pool, effort.shares, refit)
@@ -248,7 +247,7 @@ def _quick(
     """The better of a few quick fits of each candidate with the model so far, on all data: it only chooses who is judged."""
     tasks = [(i, s.candidate, u) for i, s in enumerate(scanned) for u in s.starts[:starts]]
     models = [(Model((*current.parts, c)), np.concatenate([current.u, u])) for _, c, u in tasks]
-    fits = rough(search, models, WIDTHS[1:3], leading)
+    fits = follow_slopes(search, models, search.everything, WIDTHS[1:3], leading=leading)
     best: dict[int, Fit] = {}
     for (i, _, _), fit in zip(tasks, fits, strict=True):
         if i not in best or fit.energy < best[i].energy:

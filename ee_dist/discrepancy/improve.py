@@ -26,7 +26,7 @@ from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import told_only, without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, on_top_of, values_of
-from ee_dist.discrepancy.search.fit import fit_all, fit_one, sticky
+from ee_dist.discrepancy.search.fit import fit_all, fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
@@ -90,7 +90,7 @@ def improve(
         while sum(bool(r.added) for r in ladder) < most:
             has = (*search.fixed, *current.hypothesis)
             others = on_top_of(problem.robot, has, _offered(pool, current, ladder))
-            last = _examined(search, current, others, effort)
+            last = examine(search, current, others, effort)
             if own and len(current.parts) == own:
                 kept = as_it_was(search, last, before, as_it_is, others, effort)
                 if kept is not None:
@@ -108,9 +108,7 @@ def improve(
                     continue
             if best is None:
                 exchanged = None
-                # Where fits search rather than follow slopes, a look ahead costs minutes.
-                few = not problem.rugged and len(current.u) < LARGE
-                if exchanges < EXCHANGES and few and leftovers(problem, last.base):
+                if exchanges < EXCHANGES and len(current.u) < LARGE and leftovers(problem, last.base):
                     exchanges += 1
                     exchanged = _exchanged(search, current, ladder, own, pool, effort)
                 if exchanged is not None:
@@ -126,7 +124,7 @@ def improve(
             if len(model.parts) == len(best.proposal.parts):
                 # It was judged on top of a model that stayed as it was.
                 model, start = Model((*current.parts, *model.parts)), np.concatenate([current.u, start])
-            fit = fit_one(search, model, [start], None, WIDTHS if problem.rugged else WIDTHS[2:])
+            fit = fit_one(search, model, [start], None, WIDTHS[2:])
             current = Current(model.parts, fit.u)
             rung = _rung(search, best, [j.name for j in last.tied[1:]])
             # Shown are the values of a fit of all data, which the model keeps; the errors are those of data held out.
@@ -136,10 +134,10 @@ def improve(
             current, rung.dropped = without_useless(
                 search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool)
             )
-            if len(current.u) >= LARGE and not problem.rugged:
+            if len(current.u) >= LARGE:
                 _as_thoroughly(search, current, best.outcome.cut, rung)
             climb(rung)
-        if spread or (len(current.parts) - own > 1 and not problem.rugged):
+        if spread or len(current.parts) - own > 1:
             # Of two that leave the same mark the values may be anything, and one of them says it all.
             current, gone = told_only(search, current, own, _cut(problem), len(pool), not spread)
             if gone:
@@ -155,19 +153,13 @@ def _offered(pool: Sequence[Candidate], current: Current, ladder: Sequence[Rung]
     return [c for c in pool if c.name not in names and dropped[c.name] < RETURNS]
 
 
-def _examined(search: Search, current: Current, pool: Sequence[Candidate], effort: Effort) -> Examined:
-    """Where fits search rather than follow slopes, a model of many values stays as it is while effects are judged on it."""
-    if search.problem.rugged and len(current.u) >= LARGE:
-        return examine(search.on(current.hypothesis), Current(), pool, effort)
-    return examine(search, current, pool, effort)
-
-
 def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
     """Whether much is left although the search had its chance with few effects; or, where it is known to be ``spread`` over
     many places, anything when no single one is left that stands out."""
     best = found.best
-    # Windows of a single motion say nothing about so many values.
-    if sticky(search) or not travelling(search.problem) or (best is not None and added < FEW):
+    # Windows of a single motion say nothing about so many values, and on a single joint there are no many places.
+    one = len(search.problem.robot.drives) == 1
+    if one or not travelling(search.problem) or (best is not None and added < FEW):
         return False
     energy = float((found.base**2).sum()) if best is None else float(best.held.sum())
     enough = NEAR if spread and best is None else FAR

@@ -14,7 +14,7 @@ from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands, Driver, Network
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
-from ee_dist.trials.log import Array, SensorLog, State
+from ee_dist.trials.log import Array, SensorLog
 
 SMOOTHED = 15
 """Rows that a parabola is laid through to smooth a noisy speed."""
@@ -73,13 +73,6 @@ def released(commands: Array) -> tuple[Array, Array | None]:
     return np.nan_to_num(commands[np.maximum(np.maximum.accumulate(rows), first)]), (~gone).astype(float)
 
 
-def start_of(log: SensorLog, robot: Robot) -> State | None:
-    """Where a measured robot on a fixed base began; None where it stood at position zero, or that is not known."""
-    if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
-        return None
-    return State(log.joints[0].copy(), speeds_of(log, robot)[0])
-
-
 def evenly_read(log: SensorLog) -> SensorLog:
     """The log at the rate of its readings, where rows between them were filled in; straight lines between uneven ones."""
     if log.filled is None:
@@ -129,22 +122,52 @@ def read_every(log: SensorLog, every_s: float) -> SensorLog:
 
 
 def speeds_of(log: SensorLog, robot: Robot) -> Array:
-    """Measured speeds (T, M); differences of the positions where a joint has no sensor for it. Of a sensor that is known to
+    """Measured speeds (T, M); slopes of the positions where a joint has no sensor for it. Of a sensor that is known to
     be noisy, a smooth course: a start that is off by the noise of one row goes on for seconds."""
+    return read_speeds(log, speed_sensors(robot))
+
+
+SpeedSensors = tuple[tuple[int, int, bool], ...]
+"""Joint, channel, and whether it is noisy, of each sensor of a speed."""
+
+
+def speed_sensors(robot: Robot) -> SpeedSensors:
+    """Those of a robot's joints."""
     place = {motor: k for k, motor in enumerate(robot.motor_names)}
-    read = tuple(
+    return tuple(
         (place[s.target], c, bool(s.noise))
         for c, s in enumerate(robot.sensors)
         if s.kind == "velocity" and s.target in place
     )
-    return _speeds(log, read)
+
+
+AT_REST = 1.5
+"""Steps' changes of speed up to which a joint that began to move had been at rest."""
+SMOOTH = 0.5
+"""Share of half a step's change of a speed by which it differs from row to row: acceleration does by less, noise by more."""
+
+
+def _slopes(joints: Array, step_s: float) -> Array:
+    """(T, M) speeds from positions (T, M). A simulation moves a joint in each step by the speed that it has at its end: where
+    positions are exact enough to tell, that is the speed of a row, and not that about it."""
+    about = np.gradient(joints, step_s, axis=0)
+    if len(joints) < 4:
+        return np.asarray(about)
+    moved = np.diff(joints, axis=0) / step_s
+    # What has the speed of a single step was at rest before it.
+    change = moved[1:2] - moved[:1]
+    first = np.where(np.abs(moved[:1]) <= AT_REST * np.abs(change), 0.0, moved[:1] - change)
+    behind = np.concatenate([first, moved])
+    half = behind - about
+    exact = np.abs(np.diff(half, axis=0)).mean(axis=0) < SMOOTH * np.abs(half).mean(axis=0)
+    return np.where(exact, behind, about)
 
 
 @lru_cache(maxsize=32)
-def _speeds(log: SensorLog, read: tuple[tuple[int, int, bool], ...]) -> Array:
-    """``read``: (joint, channel, whether it is noisy) of each sensor of a speed. Kept: a search asks for it with every model."""
+def read_speeds(log: SensorLog, read: SpeedSensors) -> Array:
+    """The same of known sensors. Kept: a search asks for it with every model."""
     assert log.joints is not None
-    out = np.gradient(log.joints, float(np.median(np.diff(log.times_s))), axis=0)
+    out = _slopes(log.joints, float(np.median(np.diff(log.times_s))))
     for k, c, noisy in read:
         seen = log.sensors[:, c]
         out[:, k] = scipy.signal.savgol_filter(seen, SMOOTHED, 2) if noisy and len(seen) > SMOOTHED else seen

@@ -100,10 +100,6 @@ class Problem(ABC):
     """Families of effects that can show in this way of comparing."""
     switches: bool = True
     """Whether effects without a parameter (a part that is lost) can be told in this way of comparing."""
-    rugged: bool = False
-    """Whether the error jumps with its parameters, so that a fit must search rather than follow a slope."""
-    effort: float = 1.0
-    """Scales the length of a search where the error is rugged."""
     gained: float = 0.0
     """Energy that the most promising effect took off an untouched robot (from calibration)."""
     calibrated: bool = False
@@ -160,6 +156,10 @@ class Problem(ABC):
         """What this way alone can say about what a model leaves, in lines for people."""
         return []
 
+    def other_errors(self, *models: Hypothesis) -> list[str]:
+        """Errors of a model, or of one and another made from it, as this way counts them elsewhere, in lines for people."""
+        return []
+
     @property
     def notes(self) -> list[str]:
         """What of these measurements is not compared, or not as it was recorded, and why: every verb says so."""
@@ -173,6 +173,11 @@ class Problem(ABC):
     @cached_property
     def trials(self) -> tuple[str, ...]:
         return tuple(t.name for t in self.measured)
+
+    @property
+    def searched(self) -> Problem:
+        """What a search fits and judges by: itself, unless another view of the same measurements tells more."""
+        return self
 
     @property
     def looped(self) -> tuple[int, ...]:

@@ -164,7 +164,7 @@ def told_only(
         keep = [k for k in range(len(told)) if k not in least]
         values = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
         current = Current(tuple(current.parts[k] for k in keep), values)
-    # Slopes of a rugged error may mislead.
+    # Slopes may mislead where a joint sticks.
     while gone and not _as_good(search, models[0], models[len(gone)], cut, tried):
         gone = gone[: len(gone) // 2]
     return models[len(gone)], tuple(name for names in gone for name in names)

@@ -7,13 +7,15 @@ positions and its own lag explain, it is taken.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy
 
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read, speeds_of
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, SpeedSensors, evenly_read, read_speeds, speed_sensors
 from ee_dist.discrepancy.slow_noise import slow_noise
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, State
 
 AROUND, CUBIC = (9, 5), 3
 """Readings that the curve is laid through, and fewer, which part from the first where it is too stiff; its order."""
@@ -21,18 +23,31 @@ BEYOND = 3.0
 """Standard deviations of what the curve's own errors explain."""
 
 
+def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
+    """Where a measured robot on a fixed base began; None where it stood at position zero, or that is not known."""
+    log = trial.log
+    if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
+        return None
+    return State(log.joints[0].copy(), starting_speeds(trial, robot)[0].copy())
+
+
 def starting_speeds(trial: MeasuredTrial, robot: Robot) -> Array:
     """(T, M) with which a simulation from each row is to begin. Of a simulated log, what its sensors read. Of a robot, the best
     that is known, half a step before: the speed that a step begins with is that of half a step ago (see ``steps``)."""
-    speeds = speeds_of(trial.log, robot)
+    return _starting(trial, speed_sensors(robot))
+
+
+@lru_cache(maxsize=64)
+def _starting(trial: MeasuredTrial, read: SpeedSensors) -> Array:
+    speeds = read_speeds(trial.log, read)
     if not trial.commands_held or len(trial.log) < 2:
         return speeds
-    known = _through_positions(trial, robot, speeds)
+    known = _through_positions(trial, read, speeds)
     return np.concatenate([known[:1] - (known[1:2] - known[:1]) / 2, (known[:-1] + known[1:]) / 2])
 
 
-def _through_positions(trial: MeasuredTrial, robot: Robot, read: Array) -> Array:
-    """(T, M): speeds as they were ``read`` (T, M), and of joints whose positions know better, or alone, from these."""
+def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> Array:
+    """(T, M): speeds as ``sensors`` ``read`` them (T, M), and of joints whose positions know better, or alone, from these."""
     even = evenly_read(trial.log)
     if even.joints is None or len(even) < AROUND[0]:
         return read
@@ -41,8 +56,8 @@ def _through_positions(trial: MeasuredTrial, robot: Robot, read: Array) -> Array
     weights = scipy.signal.savgol_coeffs(AROUND[0], CUBIC, deriv=1, delta=step_s)
     own = np.hypot(slow_noise(even.times_s, even.joints) * np.linalg.norm(weights), _size(stiff - supple))
     sensed = np.stack([np.interp(even.times_s, trial.log.times_s, v) for v in read.T], axis=1)
-    alone = {*robot.motor_names} - {s.target for s in robot.sensors if s.kind == "velocity"}
-    better = (_size(sensed - stiff) > BEYOND * own) | np.isin(robot.motor_names, sorted(alone))
+    alone = np.isin(np.arange(read.shape[1]), [joint for joint, _, _ in sensors], invert=True)
+    better = (_size(sensed - stiff) > BEYOND * own) | alone
     slopes = np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in stiff.T], axis=1)
     return np.where(better, slopes, read)
 

@@ -29,7 +29,8 @@ class Rollout:
     ``seed`` feeds the noise of the sensors, if they have any. ``pose`` asks for body pose, joint positions and torques
     at every row. ``supply_v`` (steps,) is the measured supply voltage. ``enabled`` (steps,) is 0 where the drives are
     released: open circuit, no torque. ``external`` (steps, M) is a known torque on each drive's joint that is not the drive's
-    (a force for a slide): a stage pushed by a measured disturbance.
+    (a force for a slide): a stage pushed by a measured disturbance. ``again`` are rows at which the joints are put to another
+    state, that of a measured motion. What drives hold within them (delayed commands, integrals, play) goes on.
     """
 
     model: Any
@@ -41,6 +42,7 @@ class Rollout:
     pose: bool = False
     enabled: Array | None = None
     external: Array | None = None
+    again: tuple[tuple[int, State], ...] = ()
 
     @property
     def key(self) -> str:
@@ -49,6 +51,9 @@ class Rollout:
         parts = [self.model.digest, self.driver.key, str(self.steps), str(seed), str(self.pose)]
         for a in (self.supply_v, self.enabled, self.external, *_arrays(self.start)):
             parts.append("-" if a is None else hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest())
+        for row, state in self.again:
+            values = np.concatenate([state.joints, state.speeds])
+            parts.append(f"{row}:{hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()}")
         # A robot names its laws. What a law of the user's own does is in their file, which may change between two runs.
         laws = {law.name for law in getattr(self.model, "laws", ())}
         parts.extend(text for name in sorted(laws) if (text := text_of_law(name)))
@@ -87,6 +92,9 @@ class Bodies(Protocol):
         ``give`` (B, M), N.m.s/rad: torques fall by this times what the speed gains in the step, in an engine that can do that;
         others are not asked to.
         """
+
+    def put(self, row: int, state: State) -> None:
+        """Joint positions and speeds of one of them, from here on. Joints that it lost stay lost."""
 
     def close(self) -> None:
         """The batch is over; what it held may be used again."""

@@ -70,7 +70,13 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     torques = np.empty((steps, count, motors)) if pose else None
     begin: Array | None = None
     torque = np.zeros((count, motors))
+    again: dict[int, list[tuple[int, State]]] = {}
+    for i, r in enumerate(rollouts):
+        for row, state in r.again:
+            again.setdefault(row, []).append((i, state))
     for step in range(steps):
+        for i, state in again.get(step, ()):
+            bodies.put(i, state)
         last = step == steps - 1
         truth = bodies.read(touch, always_pose or step == 0 or last, twist)
         if begin is None:

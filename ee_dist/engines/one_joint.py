@@ -19,7 +19,7 @@ from ee_dist.engines.loop import in_batches, up_to
 from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.kinematics import compose, part_poses
 from ee_dist.robots.model import NO_TURN, Drive, Robot, Shape
-from ee_dist.trials.log import Array, SensorLog
+from ee_dist.trials.log import Array, SensorLog, State
 
 _PLAIN = Drive("", kp=0.0, ki=0.0, kd=0.0, torque_limit=0.0, speed_limit=1.0)
 
@@ -90,6 +90,10 @@ class OneJointBodies:
         inertia = self.inertia if give is None else self.inertia + self.dt * give
         self.qd = self.qd + self.dt * (torques - load) / inertia
         self.q = self.q + self.dt * self.qd
+
+    def put(self, row: int, state: State) -> None:
+        self.q, self.qd = self.q.copy(), self.qd.copy()
+        self.q[row], self.qd[row] = state.joints, state.speeds
 
     def close(self) -> None:
         """Nothing is held."""

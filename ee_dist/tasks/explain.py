@@ -57,7 +57,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         console.print(remark, highlight=False, markup=False)
     with SearchProgress(console, told) as progress:
         progress("weighing the measurements", 0.0)
-        problem = way.make(measured, config)
+        problem = way.make(measured, config).searched
         progress("weighing the measurements", 1.0)
         pool = chosen(problem, options.without, options.only)
         count = len(measured.trials)
@@ -74,7 +74,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             robot, every_s = with_known_noise(measured), reading_s(measured.trials)
             ahead = next(iter(next_trials(robot, tied, evaluator_of(config), every_s=every_s)), None)
     share = confidence(problem.way, found)
-    account = explain_account(problem, found, ahead, planning(out, problem.robot), share)
+    also = problem.other_errors(found.before, found.after) if found.best else ()
+    account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also)
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))

@@ -76,7 +76,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
     with SearchProgress(console, told) as progress:
         progress("weighing the measurements", 0.0)
-        problem = way.make(measured, config)
+        problem = way.make(measured, config).searched
         progress("weighing the measurements", 1.0)
         pool = chosen(problem, options.without, options.only)
         calibration = None
@@ -87,7 +87,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             found = improve(
                 problem, pool, measured.model, wanted, most=options.most, progress=progress, climbed=climbed
             )
-    account = improve_account(problem, found, planning(out, problem.robot))
+    also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
+    account = improve_account(problem, found, planning(out, problem.robot), also)
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
     write_model(path, measured.source, measured.folder, found.terms, account.words)

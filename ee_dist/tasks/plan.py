@@ -105,7 +105,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     with SearchProgress(console) as progress:
         way = way_of(measured, found.way)
         progress("weighing the measurements", 0.0)
-        problem = way.make(measured, found.config)
+        problem = way.make(measured, found.config).searched
         progress("weighing the measurements", 1.0)
         tied = [terms for _, terms in found.explanations[:MOST_TIED]]
         if way.name == OpenLoop.way:

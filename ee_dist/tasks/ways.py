@@ -11,11 +11,10 @@ from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
-from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
+from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun, led
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.engines.one_joint import fits
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError, one_of
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.wiring import ONE_JOINT, evaluator_of
@@ -61,13 +60,8 @@ def open_loop(measured: Measurements, config: Config) -> OpenLoop:
 def _free_run(measured: Measurements, config: Config) -> Problem:
     """On torques alone a simulation drifts away within a second, whatever the model: it is started anew so often."""
     robot = measured.robot
-    windows_s = None if _led(robot) else RESTART_S
+    windows_s = None if led(robot) else RESTART_S
     return FreeRun(measured.trials, robot, evaluator_of(config, ONE_JOINT if fits(robot) else ""), windows_s=windows_s)
-
-
-def _led(robot: Robot) -> bool:
-    """Whether controllers hold the joints to what is commanded."""
-    return any(d.command in ("position", "speed") for d in robot.drives)
 
 
 def _force_balance(measured: Measurements, config: Config) -> Problem:
@@ -129,9 +123,9 @@ def way_of(measured: Measurements, by: str) -> Way:
         torques = all(
             t.log.joints is not None and motor_torques(t.log, measured.robot) is not None for t in measured.trials
         )
-        led = _led(measured.robot) or measured.robot.free_base
-        by = "open_loop" if (driven and led) or not torques else "force_balance"
-        if driven and not led and _seen(measured):
+        held = led(measured.robot) or measured.robot.free_base
+        by = "open_loop" if (driven and held) or not torques else "force_balance"
+        if driven and not held and _seen(measured):
             # A controller may stand behind recorded torques (an arm's currents), so forces are balanced where they were measured
             # and tell anything.
             weak = _weak(measured) if torques else ""

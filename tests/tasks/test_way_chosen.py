@@ -44,11 +44,11 @@ def test_what_was_commanded_says_what_is_compared(command: str, way: str) -> Non
     assert way_of(measured(command), AUTO).name == way
 
 
-def test_where_torques_lead_the_model_starts_anew_and_slopes_are_trusted() -> None:
+def test_where_torques_lead_the_model_starts_anew_and_is_searched_as_it_is() -> None:
     config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
     free, held = (way_of(measured(c), "free_run").make(measured(c), config) for c in ("torque", "position"))
     assert isinstance(free, FreeRun) and isinstance(held, FreeRun)
-    assert not free.rugged and held.rugged
+    assert free.searched is free and held.searched is not held
     assert len(free.pieces) > 1 and len(held.pieces) == 1
     assert max(len(p.log) for p in free.pieces) * free.robot.time_step_s <= RESTART_S + 0.1
 

@@ -48,9 +48,10 @@ def explain_account(
     ahead: PlannedTrial | None,
     planner: str = "",
     confidence: float | None = None,
+    also: Sequence[str] = (),
 ) -> Account:
     """The verdict, what it is, what speaks for it, what stays open, what to do next; ``planner`` is said where something is tied
-    that another trial might tell apart, ``confidence`` is that of confidence.py."""
+    that another trial might tell apart, ``confidence`` is that of confidence.py, ``also`` is said first."""
     robot, best = problem.robot, found.best
     rest: Sequence[Leftover] = found.left
     lines = [
@@ -129,7 +130,7 @@ def explain_account(
         head,
         error,
         sure,
-        (*lines, *problem.notes),
+        (*also, *lines, *problem.notes),
         good,
         advised(problem, advice),
         planner if tied else "",

@@ -43,8 +43,9 @@ NAMED = 3
 """Effects that a headline names."""
 
 
-def improve_account(problem: Problem, found: Improvement, planner: str = "") -> Account:
-    """What was done, how good it is, and what is left; ``planner`` is said where what was added is tied."""
+def improve_account(problem: Problem, found: Improvement, planner: str = "", also: Sequence[str] = ()) -> Account:
+    """What was done, how good it is, and what is left; ``planner`` is said where what was added is tied, ``also`` is
+    said first of what speaks for it."""
     robot, first, last = problem.robot, found.ladder[0], found.ladder[-1]
     steps = [r for r in found.ladder if r.added]
     lines = []
@@ -94,7 +95,7 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "") -> 
     tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
     good = settled and not warnings and not unsure and not any(ties.values())
-    more = (*lines, *problem.notes)
+    more = (*also, *lines, *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
 
 

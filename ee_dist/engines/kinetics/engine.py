@@ -113,7 +113,10 @@ def _shape_of(rollout: Rollout) -> Hashable:
         raise EngineError(
             f"kinetics simulates gene networks; {model.name} is a robot: engine=pybullet or engine=mujoco"
         )
-    if any(a is not None for a in (rollout.start, rollout.supply_v, rollout.enabled, rollout.external)):
+    if any(
+        a is not None
+        for a in (rollout.start, rollout.supply_v, rollout.enabled, rollout.external, rollout.again or None)
+    ):
         raise EngineError(f"kinetics: {model.name} is driven by its stimuli alone, from its own rest")
     sensors = tuple((s.kind, s.target) for s in model.sensors)
     return structure_key(model), tuple(d.strongest for d in model.drives), sensors, model.time_step_s, rollout.steps

@@ -13,7 +13,7 @@ from ee_dist.engines.contract import Rollout, Truth
 from ee_dist.engines.mujoco.contact import LEAST_FRICTION, contact
 from ee_dist.engines.mujoco.model import OWN, Model, scalar_first
 from ee_dist.engines.per_robot import per_robot
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, State
 
 Index = slice | NDArray[np.intp]
 Places = NDArray[np.intp]
@@ -87,8 +87,7 @@ class Group:
             for name, at in model.undriven:
                 self.positions[i, at] = r.model.joint(name).start
             if start is not None:
-                self.positions[i, model.qpos] = np.asarray(start.joints, dtype=float)[model.motors]
-                self.speeds[i, model.dof] = np.asarray(start.speeds, dtype=float)[model.motors]
+                self.put(i, start)
                 if self.free_base and start.base_pose is not None:
                     self.pose[i] = start.base_pose
                     if start.base_twist is not None:
@@ -120,6 +119,12 @@ class Group:
             twist[:, 3:] = _turned(turn, self.speeds[:, 3:6])
             twist[:, :3] = self.speeds[:, :3] + _cross(twist[:, 3:], _turned(turn, self.com))
         return twist
+
+    def put(self, i: int, state: State) -> None:
+        """Joint positions and speeds of one robot, from here on."""
+        model = self.model
+        self.positions[i, model.qpos] = np.asarray(state.joints, dtype=float)[model.motors]
+        self.speeds[i, model.dof] = np.asarray(state.speeds, dtype=float)[model.motors]
 
     def step(self) -> None:
         """Advance under the torques and forces that were set."""
@@ -170,6 +175,11 @@ class MuJoCoBodies:
             if force is not None:
                 group.force[:] = force[rows]
             group.step()
+
+    def put(self, row: int, state: State) -> None:
+        for rows, group in self.groups:
+            for i in np.flatnonzero(rows == row):
+                group.put(int(i), state)
 
     def close(self) -> None:
         self.groups = []

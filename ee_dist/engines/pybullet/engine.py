@@ -15,7 +15,7 @@ from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.pybullet.native import interface
 from ee_dist.engines.pybullet.reading import NativeReading, PublicReading, Reading
 from ee_dist.engines.pybullet.world import World, structure_key
-from ee_dist.trials.log import Array, SensorLog
+from ee_dist.trials.log import Array, SensorLog, State
 
 WORLD_SIZES = (8, 4, 2, 1)
 """Robots a world. Eight share the cost of a call well; more cost Bullet's collision pairs."""
@@ -117,6 +117,7 @@ class BulletBodies:
     def __init__(self, engine: PyBulletEngine, placed: list[tuple[World, list[int]]], batch: Sequence[Rollout]) -> None:
         self.engine = engine
         self.worlds = [world for world, _ in placed]
+        self.places = {row: (w, body) for w, rows in placed for row, body in zip(rows, w.bodies, strict=True)}
         motors = len(batch[0].model.drives)
         found = interface() if engine.native else None
         self.reading: Reading = PublicReading(placed, motors) if found is None else NativeReading(found, placed, motors)
@@ -168,6 +169,10 @@ class BulletBodies:
             p.applyExternalForce(body, link, lift, centre, p.WORLD_FRAME, physicsClientId=client)
         for world in self.worlds:
             simulate(world.client)
+
+    def put(self, row: int, state: State) -> None:
+        world, body = self.places[row]
+        world.put(body, state)
 
     def close(self) -> None:
         self.engine.give_back(self.worlds)

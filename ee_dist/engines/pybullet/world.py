@@ -197,9 +197,7 @@ class World:
 
     def _place(self, body: int, robot: Robot, start: State) -> None:
         c = self.client
-        for k, link in enumerate(self.links):
-            if link >= 0:
-                p.resetJointState(body, link, float(start.joints[k]), float(start.speeds[k]), physicsClientId=c)
+        self.put(body, start)
         if start.base_pose is not None and robot.free_base:
             turn = [float(v) for v in start.base_pose[3:]]
             position = [float(v) for v in start.base_pose[:3]]
@@ -208,6 +206,13 @@ class World:
             if start.base_twist is not None:
                 twist = [float(v) for v in start.base_twist]
                 p.resetBaseVelocity(body, twist[:3], twist[3:], physicsClientId=c)
+
+    def put(self, body: int, state: State) -> None:
+        """Joint positions and speeds of one robot, from here on."""
+        for k, link in enumerate(self.links):
+            if link >= 0:
+                joint, speed = float(state.joints[k]), float(state.speeds[k])
+                p.resetJointState(body, link, joint, speed, physicsClientId=self.client)
 
     def close(self) -> None:
         p.disconnect(self.client)

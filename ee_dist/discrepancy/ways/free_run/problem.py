@@ -16,12 +16,13 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
-from ee_dist.discrepancy.problem import Layout, Problem, Series, error, joints_of
+from ee_dist.discrepancy.problem import Index, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.slow_noise import slow_noise, without_motion
 from ee_dist.discrepancy.starting import starting_speeds
 from ee_dist.effects.catalogue import Hypothesis, apply
@@ -50,7 +51,13 @@ class ToPositions:
 
 
 RESTART_S = 0.5
-"""Length of windows that start anew from the measured state."""
+"""Length of windows that start anew from the measured state, of a robot whose joints nobody leads: on torques alone a simulation
+drifts away within a second, whatever the model,"""
+LED_RESTART_S = 1.0
+"""and of one that is held by controllers: long enough for them to bring a joint to where friction lets it rest."""
+RUN_UP = 20
+"""Rows before a window from which it is simulated: as long as the longest delay that a drive may have. What drives hold within
+them when it begins (commands on their way, play) comes from there."""
 MEAN_ABSOLUTE, MEDIAN_ABSOLUTE = math.sqrt(2 / math.pi), 0.6745
 """Of normal noise with a standard deviation of 1."""
 FINEST = 2.0**-20
@@ -64,8 +71,7 @@ class FreeRun(Problem):
 
     ``every``: rows of a log from one residual value to the next; where sensors were read more seldom than rows are simulated,
     their readings are taken instead. ``windows_s`` starts the model anew from the measured
-    state so often, and makes segments of the windows; None runs each trial through, in BLOCKS segments. ``effort``
-    scales the length of a search.
+    state so often, and makes segments of the windows; None runs each trial through, in BLOCKS segments.
     """
 
     way = "free_run"
@@ -80,11 +86,8 @@ class FreeRun(Problem):
         evaluator: Evaluator,
         every: int = 3,
         windows_s: float | None = None,
-        effort: float = 1.0,
     ) -> None:
-        self.effort = effort
-        # Over a whole record errors jump where a joint sticks or slips: fits search rather than follow a slope.
-        self.rugged = windows_s is None
+        self.windows_s = windows_s
         self.robot, self.measured, self.evaluator, self.every = robot, tuple(trials), evaluator, every
         columns = [k for k, s in enumerate(robot.sensors) if s.kind == "position"]
         if not columns:
@@ -100,6 +103,8 @@ class FreeRun(Problem):
         self.units = tuple(by_unit)
         self.natural_unit = self.units[0] if len(by_unit) == 1 else "times the noise"
         how = "free runs of the whole record" if windows_s is None else f"windows of {windows_s:g} s"
+        if windows_s is not None:
+            self.natural_name = f"mean absolute position error over {windows_s:g} s"
         self.error_definition = (
             f"square root of the mean absolute position error over {how}, every trial counting the same, in units of the "
             f"noise of the readings ({', '.join(f'{noise:.2g} {unit}' for unit, noise in by_unit.items())})"
@@ -116,9 +121,11 @@ class FreeRun(Problem):
         seg: list[Array] = []
         time: list[Array] = []
         for p, count in zip(self.pieces, rows, strict=True):
-            cut = min(blocks, max(1, count // 10))
-            block = np.arange(count) * cut // count
-            at = p.start_s + p.times_s
+            block, at = p.window, p.start_s + p.times_s
+            cut = int(block.max()) + 1
+            if cut == 1:
+                cut = min(blocks, max(1, count // 10))
+                block = np.arange(count) * cut // count
             seg.append(np.repeat(len(names) + block, width))
             time.append(np.repeat(at, width))
             names += [f"{self.measured[p.trial].name}@{at[np.argmax(block == b)]:.1f}s" for b in range(cut)]
@@ -206,16 +213,36 @@ class FreeRun(Problem):
                 out.append(Series(p.trial, c, self.layout.units[c], times, measured[:, c], measured[:, c] - off[:, c]))
         return out
 
+    @cached_property
+    def searched(self) -> Problem:
+        """The same by windows. Over a whole record errors jump where a joint sticks or slips: fits are caught, and what is
+        foretold of another motion depends on which of many equal ones was found."""
+        return self if self.windows_s is not None else self._by(LED_RESTART_S)
+
+    def _by(self, windows_s: float | None) -> FreeRun:
+        return FreeRun(self.measured, self.robot, self.evaluator, self.every, windows_s)
+
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
-        again = FreeRun(self.measured, self.robot, self.evaluator, self.every, RESTART_S)
-        left, anew = f"Re-started from the measured state every {RESTART_S:g} s", again.residuals([hypothesis])[0]
-        if len(self.units) == 1:
-            return [f"{left}: {again.told(error(anew))}."]
-        whole = self.told_by_unit(self.residuals([hypothesis])[0])
-        return [f"Mean absolute position error: {whole}.", f"{left}: {again.told_by_unit(anew)}."]
+        return self.other_errors(hypothesis)
+
+    def other_errors(self, *models: Hypothesis) -> list[str]:
+        out = []
+        if len(self.units) > 1:
+            out += [f"Mean absolute position error: {_listed([self.told_by_unit(r) for r in self.residuals(models)])}."]
+        if led(self.robot):
+            other = self._by(LED_RESTART_S if self.windows_s is None else None)
+            how = "Run through without starting anew"
+            if other.windows_s is not None:
+                how = f"Started anew from the measured state every {other.windows_s:g} s"
+            rows = other.residuals(models)
+            each = [other.told(error(r)) if len(self.units) == 1 else other.told_by_unit(r) for r in rows]
+            out += [f"{how}: {_listed(each)}."]
+        return out
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
-        """Of the first stretch of each trial, which is the whole trial where it is run through."""
+        """Of the first stretch of each trial; of a robot that is led, the whole trial."""
+        if self.windows_s is not None and led(self.robot):
+            return self._by(None).simulated(hypothesis)
         first = {p.trial: p for p in reversed(self.pieces)}
         jobs = []
         for k, p in sorted(first.items()):
@@ -227,6 +254,16 @@ class FreeRun(Problem):
         """(trials,) mean absolute position error of each trial, in ``natural_unit``."""
         residual = self.residuals([hypothesis])[0]
         return np.array([self.natural(self.trial_error(residual, k)) for k in range(len(self.measured))])
+
+
+def led(robot: Robot) -> bool:
+    """Whether controllers hold the joints to what is commanded."""
+    return any(d.command in ("position", "speed") for d in robot.drives)
+
+
+def _listed(each: Sequence[str]) -> str:
+    """Of one model, or of one and of another made from it."""
+    return each[0] if len(each) == 1 else f"model {each[0]}, improved model {each[-1]}"
 
 
 def noiseless(robot: Robot) -> Robot:
@@ -245,6 +282,14 @@ class Piece:
     commands: Array
     enabled: Array | None
     start: State
+    again: tuple[tuple[int, State], ...] = ()
+    """Rows at which it starts anew from the measured state."""
+
+    @property
+    def window(self) -> Index:
+        """(R,) which of the windows between the rows at which it starts anew each compared row is in."""
+        found = np.searchsorted([k for k, _ in self.again], np.asarray(self.rows), side="right")
+        return np.unique(found, return_inverse=True)[1].astype(np.int64)
 
     @property
     def times_s(self) -> Array:
@@ -266,6 +311,7 @@ class Piece:
             supply_v=self.log.supply_v,
             enabled=enabled,
             external=self.log.external,
+            again=self.again,
         )
 
 
@@ -289,24 +335,30 @@ def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | N
     speeds = starting_speeds(trial, robot)
     commands, enabled = released(trial.obeyed(log.commands))
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
+    # An integral is what a controller made of all that came before.
+    remembers = any(d.ki > 0 for d in robot.drives)
     found = []
-    for first in range(0, len(log), length):
-        last = min(first + length, len(log))
+    for first in range(0, len(log), len(log) if remembers else length):
+        last = len(log) if remembers else min(first + length, len(log))
         if last - first < min(length, len(log)) // 2:
             break
-        part = log.part(first, last)
-        rows = range(0, len(part), every) if log.filled is None else tuple(part.readings.tolist())
+        begin = max(0, first - RUN_UP)
+        anew = range(first + length, last - length // 2, length) if first == begin else [first]
+        part = log.part(begin, last)
+        seen = range(first - begin, len(part), every)
+        rows = seen if log.filled is None else tuple(r for r in part.readings.tolist() if r >= first - begin)
         if not rows:
             continue  # a gap in the log
         found.append(
             Piece(
                 index,
-                first * dt,
+                begin * dt,
                 part,
                 rows,
-                commands[first:last],
-                None if enabled is None else enabled[first:last],
-                State(log.joints[first].copy(), speeds[first].copy()),
+                commands[begin:last],
+                None if enabled is None else enabled[begin:last],
+                State(log.joints[begin].copy(), speeds[begin].copy()),
+                tuple((k - begin, State(log.joints[k].copy(), speeds[k].copy())) for k in anew),
             )
         )
     return found

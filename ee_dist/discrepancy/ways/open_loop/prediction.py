@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, released, start_of
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
+from ee_dist.discrepancy.starting import start_of
 from ee_dist.discrepancy.steps import centred
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands, Controllers, Network, command_scaling
@@ -148,7 +149,7 @@ def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) ->
     """The physics of a model on the trial's own commands, with clean sensors (``bare``: the model as it is simulated, if that is
     at hand already)."""
     commands, enabled = released(wired_commands(trial, model).values)
-    start = start_of(trial.log, model)
+    start = start_of(trial, model)
     return Rollout(
         bare or trial.simulated(clean(model)),
         Commands(commands),

@@ -1,0 +1,93 @@
+"""A free run that starts anew: the truth is at the noise floor whatever a drive holds within it, and a search goes by it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from way_samples import evaluator_for, measure, samples
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.ways.free_run.problem import LED_RESTART_S, RESTART_S, FreeRun
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
+from ee_dist.robots.linear_stage import linear_stage
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import SensorLog
+
+
+def trial_of(robot: Robot, seconds: float = 4.0) -> MeasuredTrial:
+    """A quick motion, measured without noise."""
+    steps = round(seconds / robot.time_step_s)
+    t = np.arange(steps) * robot.time_step_s
+    top = robot.joint(robot.drives[0].joint).upper
+    size = 0.4 * min(top, 1.0)
+    sent = size * (np.sin(2 * np.pi * 0.9 * t) + 0.4 * np.sign(np.sin(2 * np.pi * 1.7 * t)))[:, None]
+    commands = np.repeat(sent, len(robot.drives), axis=1)
+    evaluator = evaluator_for(robot)
+    (log,) = evaluator.engine.rollout([Rollout(robot, Commands(commands), steps, pose=True)])  # type: ignore[attr-defined]
+    assert isinstance(log, SensorLog)
+    return MeasuredTrial("quick", log, Commands(commands))
+
+
+def quiet(robot: Robot) -> Robot:
+    return replace(robot, sensors=tuple(replace(s, noise=0.0) for s in robot.sensors))
+
+
+@pytest.mark.parametrize("held", [{}, {"delay_s": 0.012}, {"ki": 30.0}, {"backlash": 0.03}, {"compliance": 0.02}])
+def test_what_a_drive_holds_goes_on_where_a_window_begins(held: dict[str, float]) -> None:
+    robot = quiet(samples()["pendulum"].robot)
+    robot = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, **held))
+    trial = trial_of(robot)
+    whole = FreeRun((trial,), robot, evaluator_for(robot))
+    windows = whole.searched
+    assert isinstance(windows, FreeRun) and windows.windows_s == LED_RESTART_S
+    assert len(windows.segments) == 4
+    range_ = float(np.ptp(trial.log.sensors[:, 0]))
+    off = np.abs(windows.raw(windows.residuals([()])[0]))
+    # Play and twist of a transmission come back within the run-up but for what they were in the middle of.
+    assert off.mean() < (1e-6 if held.keys() <= {"delay_s", "ki"} else 2e-3) * range_
+
+
+def test_a_stage_without_a_sensor_of_speed_starts_with_the_speed_that_it_had() -> None:
+    """Its controller saturates: a start that is off by half a step goes on for the whole record."""
+    robot = quiet(linear_stage())
+    trial = trial_of(robot, 1.0)
+    assert not any(s.kind == "velocity" for s in robot.sensors)
+    problem = FreeRun((trial,), robot, evaluator_for(robot))
+    for p in (problem, problem.searched):
+        assert np.abs(p.raw(p.residuals([()])[0])).max() < 1e-6 * np.ptp(trial.log.sensors[:, 0])
+
+
+def test_where_positions_are_noisy_a_slope_is_that_about_a_row() -> None:
+    robot = quiet(linear_stage())
+    trial = trial_of(robot, 1.0)
+    assert trial.log.joints is not None
+    dt = robot.time_step_s
+    behind = np.diff(trial.log.joints[:, 0]) / dt
+    assert speeds_of(trial.log, robot)[1:, 0] == pytest.approx(behind)
+    noisy = trial.log.joints + 1e-4 * np.random.default_rng(0).standard_normal(trial.log.joints.shape)
+    found = speeds_of(replace(trial.log, joints=noisy), robot)
+    np.testing.assert_allclose(found, np.gradient(noisy, dt, axis=0))
+
+
+def test_a_search_goes_by_windows_and_says_what_the_whole_record_gives() -> None:
+    sample = samples()["pendulum"]
+    whole = FreeRun(measure(sample, sample.hidden), sample.robot, evaluator_for(sample.robot))
+    windows = whole.searched
+    assert windows.searched is windows and windows is whole.searched
+    assert windows.natural_name == "mean absolute position error over 1 s"
+    (line,) = windows.other_errors((), sample.hidden)
+    before, after = (whole.told(error(r)) for r in whole.residuals([(), sample.hidden]))
+    assert line == f"Run through without starting anew: model {before}, improved model {after}."
+    (log, *_) = windows.simulated(())
+    assert log is not None and len(log) == len(whole.measured[0].log), "seen is the whole motion"
+
+
+def test_a_robot_that_nobody_leads_is_started_anew_and_searched_as_it_is() -> None:
+    robot = quiet(samples()["pendulum"].robot)
+    loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque"))
+    problem = FreeRun((trial_of(loose, 2.0),), loose, evaluator_for(loose), windows_s=RESTART_S)
+    assert problem.searched is problem and problem.other_errors(()) == []
