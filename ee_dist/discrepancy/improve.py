@@ -17,7 +17,7 @@ from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import everywhere, stands_out
 from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
-from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, least_energy, no_more_than_noise
+from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, no_more_than_noise, surely_better
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_be_noise
 from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
@@ -42,6 +42,8 @@ OFTEN = 1
 """How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it."""
 EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
+ROOMS = 3
+"""How often bounds that depend on other values are set anew."""
 RETURNS = 2
 """How often an effect may have been dropped and yet be looked at again: what came later may be dropped in turn."""
 MOST = 24
@@ -124,8 +126,8 @@ def improve(
             if len(model.parts) == len(best.proposal.parts):
                 # It was judged on top of a model that stayed as it was.
                 model, start = Model((*current.parts, *model.parts)), np.concatenate([current.u, start])
-            fit = fit_one(search, model, [start], None, WIDTHS[2:])
-            current = Current(model.parts, fit.u)
+            fit = _with_room(search, fit_one(search, model, [start], None, WIDTHS[2:]))
+            current = Current(fit.model.parts, fit.u)
             rung = _rung(search, best, [j.name for j in last.tied[1:]])
             # Shown are the values of a fit of all data, which the model keeps; the errors are those of data held out.
             rung.terms = (*search.fixed, *current.hypothesis)
@@ -143,6 +145,22 @@ def improve(
             if gone:
                 climb(_refitted(search, current, "without what these data do not tell from neutral", gone))
     return _finish(search, current, ladder, as_it_is, stopped, last)
+
+
+def _with_room(search: Search, fit: Fit) -> Fit:
+    """A joint may have less of what all share by as much as that is. Where it has taken off all that was there when it was looked
+    for, and all share more by now, it may take off that too."""
+    robot = search.problem.robot
+    for _ in range(ROOMS):
+        parts, terms = fit.model.parts, fit.hypothesis
+        now = on_top_of(robot, (*search.fixed, *terms), parts)
+        at_end = [np.any(fit.u[p] <= c.lower + 1e-6) for p, c in zip(fit.model.places, parts, strict=True)]
+        less = [end and w.bounds < c.bounds for end, w, c in zip(at_end, now, parts, strict=True)]
+        if not any(less):
+            break
+        wider = tuple(w if more else c for more, w, c in zip(less, now, parts, strict=True))
+        fit = fit_one(search, Model(wider), [values_of(wider, terms)], None, WIDTHS[2:])
+    return fit
 
 
 def _offered(pool: Sequence[Candidate], current: Current, ladder: Sequence[Rung]) -> list[Candidate]:
@@ -259,17 +277,21 @@ def _exchanged(
         return None
     cut = _cut(problem)
     now, *others = cross_fit(search, models, cut, WIDTHS[1:])
-    energy = float((now.residual**2).sum())
-    enough = energy - least_energy(len(pool)) * max(1.0, energy / len(problem.floor))
     order = sorted(range(len(options)), key=lambda i: float((others[i].residual ** 2).sum()))
     for i in order[:LOOKED_AT]:
         (k, proposal), (model, start), held = options[i], models[1 + i], others[i]
-        alone = float((held.residual**2).sum())
         changed = Current(model.parts, fit_one(search, model, [start], None, WIDTHS[1:]).u)
-        if alone >= enough:
+        if not surely_better(problem, now, held, len(pool)):
             names = {c.name for c in changed.parts}
             beside = examine(search, changed, [c for c in pool if c.name not in names], effort).best
-            if beside is None or float(beside.held.sum()) >= enough:
+            if beside is None:
+                continue
+            if beside.outcome.cut.name == cut.name:
+                both = beside.outcome
+            else:
+                # Errors on motions and on settings that were not fitted do not compare.
+                both = cross_fit(search, [(beside.model, beside.u)], cut, WIDTHS[1:])[0]
+            if not surely_better(problem, now, both, len(pool)):
                 continue
         rung = Rung(
             proposal.name,

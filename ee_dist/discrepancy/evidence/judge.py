@@ -155,6 +155,21 @@ def judge(
     )
 
 
+def surely_better(problem: Problem, one: HeldOut, other: HeldOut, tried: int) -> bool:
+    """Whether of two models judged under one cut the ``other`` is better by what a new effect must be worth. Where much is left,
+    some model always does a little better by chance."""
+    cut, before, after = one.cut, per_segment(problem, one.residual), per_segment(problem, other.residual)
+    gained = cut.by_unit(before - after)
+    gain, energy = float(gained.sum()), float(before.sum())
+    if not np.isfinite(gain) or gain < least_energy(tried) * max(1.0, energy / len(problem.floor)):
+        return False
+    if cut.name == WINDOWS:
+        return True
+    low, _ = bootstrap(gained, groups=cut.groups)
+    sure = low > 0 or lost(gained) <= LOST_SHARE * gain
+    return sure and gain >= WORTH * (energy - float(problem.floor.sum()))
+
+
 def _worth(problem: Problem, cut: Cut, proposal: Proposal, held: Array) -> float:
     """Share of what is above the noise that a proposal must take off; nothing where no more than noise is left with it."""
     if cut.name != WINDOWS:

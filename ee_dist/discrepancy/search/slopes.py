@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ee_dist.discrepancy.problem import Mask
+from ee_dist.discrepancy.problem import Mask, Problem
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.trials.log import Array
@@ -20,6 +20,10 @@ LENGTHS = (1.0, 0.5, 0.2)
 """How far along the Gauss-Newton step to look."""
 WIDTHS = (0.12, 0.06, 0.03, 0.012)
 """Finite differences of the iterations, as shares of a parameter's room."""
+FINER, NARROWER = 6, 3.0
+"""More iterations at most, by how much narrower each,"""
+STILL, DOWN_TO = 0.8, 1.2
+"""as long as one leaves less than this share of the energy, and that is more than this many times what noise leaves."""
 
 
 @dataclass(eq=False)
@@ -67,9 +71,11 @@ def follow_slopes(
         run.energy, run.residual = value, r
     moving = [run for run in runs if len(run.u)]
     for step, width in enumerate(widths):
-        _slopes(moving, width, mask, evaluate, known)
+        _slopes(moving, width, mask, evaluate, whole.problem, known)
         _steps(moving, mask, evaluate, prior)
         search.progress("fitting", (step + 1) / len(widths))
+    if len(widths) > 1:
+        _finer(moving, widths[-1], mask, evaluate, whole.problem, known, prior)
     out = []
     if search is not whole:
         for run, r in zip(runs, whole.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
@@ -82,7 +88,44 @@ def follow_slopes(
     return out
 
 
-def _slopes(runs: Sequence[_Run], width: float, mask: Mask, evaluate: Evaluate, leading: Array | None = None) -> None:
+def _finer(
+    runs: Sequence[_Run],
+    width: float,
+    mask: Mask,
+    evaluate: Evaluate,
+    problem: Problem,
+    known: Array | None,
+    prior: float,
+) -> None:
+    """Finer steps for those that still come much nearer by them: where sensors are precise and one effect is all that is missing,
+    the last width is coarser than what data tell. Half fitted, an explanation loses to one that stands in for it."""
+    floor = float(problem.floor[mask].sum())
+    for _ in range(FINER):
+        width = width / NARROWER
+        runs = [run for run in runs if np.isfinite(run.energy) and run.energy > DOWN_TO * floor]
+        before = [run.energy for run in runs]
+        _slopes(runs, width, mask, evaluate, problem, known)
+        _steps(runs, mask, evaluate, prior)
+        runs = [run for run, energy in zip(runs, before, strict=True) if run.energy < STILL * energy]
+        if not runs:
+            break
+
+
+def weighed(problem: Problem, residual: Array) -> tuple[Array, Array]:
+    """The residual (n,) before it is softened, and the weights (n,) with which squares of it count as the energy counts them: how
+    robust losses are minimised (Huber 1981, "Robust Statistics", section 7.8)."""
+    smooth = problem.smooth(residual)
+    return smooth, np.minimum(np.abs(residual) / np.maximum(np.abs(smooth), 1e-12), 1.0)
+
+
+def _slopes(
+    runs: Sequence[_Run],
+    width: float,
+    mask: Mask,
+    evaluate: Evaluate,
+    problem: Problem,
+    leading: Array | None = None,
+) -> None:
     """Derivatives over ``width`` (narrower for a small value), towards the inside; a better point found is taken. Those of
     the first values may be known (``leading``)."""
     points = []
@@ -99,16 +142,19 @@ def _slopes(runs: Sequence[_Run], width: float, mask: Mask, evaluate: Evaluate, 
         assert run.residual is not None
         columns = [] if leading is None else list(leading.T)
         best = (run.energy, run.u, run.residual)
+        smooth, weights = weighed(problem, run.residual)
         for k in range(first, len(run.u)):
             (value, r), (_, u) = found[at], points[at]
             at += 1
             gap = u[k] - run.u[k]
             usable = np.isfinite(value) and np.isfinite(run.energy) and abs(gap) > 1e-12
-            columns.append((r - run.residual)[mask] / gap if usable else np.zeros(int(mask.sum())))
+            columns.append(
+                (weights * (problem.smooth(r) - smooth))[mask] / gap if usable else np.zeros(int(mask.sum()))
+            )
             if value < best[0]:
                 best = (value, u, r)
         run.slopes = np.stack(columns, axis=1)
-        run.origin = (run.u, run.residual)
+        run.origin = (run.u, weights * smooth)
         run.energy, run.u, run.residual = best
 
 
@@ -142,9 +188,10 @@ def slopes_at(search: Search, model: Model, u: Array, width: float = WIDTHS[2]) 
         moved = u.copy()
         moved[k] += width if u[k] + width <= model.upper[k] else -width
         points.append(moved)
-    rows = search.residuals([model.hypothesis(v) for v in points])
+    rows, problem = search.residuals([model.hypothesis(v) for v in points]), search.problem
+    smooth, weights = weighed(problem, rows[0])
     columns = [
-        (r - rows[0]) / (v[k] - u[k]) if np.isfinite(r).all() else np.zeros(len(r))
+        weights * (problem.smooth(r) - smooth) / (v[k] - u[k]) if np.isfinite(r).all() else np.zeros(len(r))
         for k, (v, r) in enumerate(zip(points[1:], rows[1:], strict=True))
     ]
     return np.stack(columns, axis=1) if columns else np.zeros((rows.shape[1], 0))
