@@ -70,7 +70,7 @@ def run(data: Path, out: Path, page: Page, holds: Sequence[int], quick: bool) ->
     mapping = read_mapping(EXAMPLES / "xl330.yaml")
     found = [import_file(f, mapping, model.robot, i) for i, f in enumerate(files)]
     (out / "import.txt").write_text(describe([r for _, r in found]) + "\n", encoding="utf-8")
-    trials = [MeasuredTrial(r.name, r.log, setup=r.believed) for r, _ in found]
+    trials = [MeasuredTrial(r.name, r.log, setup=r.believed, commands_held=True) for r, _ in found]
     page.text(f"{len(trials)} recordings read; what was done to each: {out / 'import.txt'}")
     summary = [_held_out(hold, trials, model, out, page, quick) for hold in holds]
     page.table(
