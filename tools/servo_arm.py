@@ -43,7 +43,7 @@ from ee_dist.robots.starter import starter
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.progress_line import SearchProgress
-from ee_dist.tasks.ways import way_of
+from ee_dist.tasks.ways import AUTO, WAYS, way_of
 from ee_dist.trials.log import Array
 
 N = len(LINKS)
@@ -193,7 +193,7 @@ def write(out: Path, seed: int, described: str, rate_hz: float = RATE_HZ) -> dic
     return files
 
 
-def problem(out: Path, use: str, files: Sequence[str]) -> Problem:
+def problem(out: Path, use: str, files: Sequence[str], by: str) -> Problem:
     """The logs imported as a user would, by the way that the program chooses."""
     where = out / use
     settings = [
@@ -208,7 +208,7 @@ def problem(out: Path, use: str, files: Sequence[str]) -> Problem:
     config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
     config = replace(config, measured=str(where / "measured.mcap"))
     measured = load(config)
-    return way_of(measured, "auto").make(measured, config)
+    return way_of(measured, by).make(measured, config)
 
 
 def mrad(compared: Problem, terms: Hypothesis) -> float:
@@ -248,15 +248,16 @@ def main() -> int:
     parser.add_argument(
         "--rate", type=float, default=RATE_HZ, help="Hz of the log; other than 100: uneven, as LeRobot's 30"
     )
+    parser.add_argument("--by", default=AUTO, choices=(AUTO, *WAYS), help="way of comparing that the search goes by")
     parser.add_argument("--out", type=Path, default=Path("logs/servo_arm"))
     args = parser.parse_args()
     out = args.out.resolve()
     files = write(out, args.seed, args.described, args.rate)
-    seen, unseen = (problem(out, use, files[use]) for use in ("fitted", "held"))
+    seen, unseen = (problem(out, use, files[use], args.by) for use in ("fitted", "held"))
     shared = by_hand(seen)
     began = time.process_time()
     with SearchProgress(Console(), quiet) as progress:
-        found = improve(seen, pool_of(seen), progress=progress)
+        found = improve(seen.searched, pool_of(seen), progress=progress)
     print(f"\n{'':58s}  values  fitted  never seen (mrad)")
     rows = [(r.name, r.terms) for r in found.ladder]
     rows += [("improve, in the end", found.terms), (f"{len(shared)} shared numbers by least squares", shared)]
