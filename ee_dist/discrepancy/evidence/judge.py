@@ -38,6 +38,8 @@ ALONE = 0.3
 """The same where a single motion is all the evidence, but for what a robot's description leaves open (friction, rotors and gains
 of the drives). Windows of one motion share what a model gets wrong in it, and something always takes part of that: on a real arm
 without a load (UR10e) a payload takes 21 %, and a heavier last link as much."""
+FULLER = 0.8
+"""Share of what a law leaves above the noise that the same with a further term must leave at most, to go before it in a tie."""
 LUCK = "its gain on held-out data is no more than luck"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes too little of what is above the noise"
@@ -62,6 +64,8 @@ class Judged:
     residual: Array
     outcome: HeldOut
     dispersion: float
+    sure: float = 0.0
+    """What of the energy is noise beyond doubt."""
     why_not: str = ""
     vague: bool = False
     """Whether it has several numbers of which these data tell none from neutral: it patches what others say plainly."""
@@ -150,6 +154,7 @@ def judge(
         residual=found.residual,
         outcome=found,
         dispersion=dispersion if math.isfinite(dispersion) else 1.0,
+        sure=float(problem.sure.sum()),
         why_not=why,
         vague=_vague(problem, found, proposal),
     )
@@ -236,6 +241,7 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
             if j.name in first.tied_with and j.proposal.guess and j.proposal.size <= first.proposal.size
         ]
         first = min((first, *asked), key=_least_said)
+        first = min((j for j in ordered if j.name in first.tied_with and _fuller(j, first)), key=_left, default=first)
         if first is not best:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
@@ -245,6 +251,19 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
     for k, j in enumerate(ordered):
         j.rank = k + 1
     return ordered
+
+
+def _left(j: Judged) -> float:
+    """Share of what is above the noise that is left with it."""
+    return 1.0 - j.explained
+
+
+def _fuller(j: Judged, first: Judged) -> bool:
+    """Whether it is the same and more, and takes off a part of what that leaves. With a handful of motions nothing is sure: the
+    further term may be none, and yet foretells better on the whole."""
+    names, fewer = ({c.name for c in x.proposal.parts} for x in (j, first))
+    above = float(first.held.sum()) > NEAR**2 * first.sure
+    return j.earned and fewer < names and above and _left(j) <= FULLER * _left(first)
 
 
 def _least_said(j: Judged) -> tuple[int, bool, int]:
