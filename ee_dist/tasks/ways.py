@@ -131,7 +131,23 @@ def way_of(measured: Measurements, by: str) -> Way:
             weak = _weak(measured) if torques else ""
             if weak or not torques:
                 return _possible(replace(WAYS["free_run"], why=weak or WAYS["free_run"].why), measured)
+        if by == "open_loop" and _only_motion(measured):
+            return _possible(replace(WAYS["free_run"], why=ONLY_MOTION), measured)
     return _possible(WAYS[by], measured)
+
+
+ONLY_MOTION = "of a real robot, positions and commands were recorded: the model runs freely from the measured state"
+
+
+def _only_motion(measured: Measurements) -> bool:
+    """Whether the log is of a real robot, or may be, that is bolted down, and has nothing but the motion of its joints. Open loop
+    does as well, but where a joint sticks or the first moments are off: what went wrong once is in all that follows."""
+    robot = measured.robot
+    real = all(t.commands_held is not False for t in measured.trials)
+    return real and not robot.free_base and _seen(measured) and all(s.kind in MOTION for s in robot.sensors)
+
+
+MOTION = frozenset({"position", "velocity"})
 
 
 def _weak(measured: Measurements) -> str:

@@ -220,9 +220,8 @@ def test_a_guess_goes_before_as_many_numbers_that_it_is_tied_with(
     """Though not with what is best of all, which has more numbers and is tied with those."""
 
     def judged(name: str, size: int, guess: bool, left: float) -> SimpleNamespace:
-        return SimpleNamespace(
-            name=name, proposal=SimpleNamespace(size=size, guess=guess), vague=False, earned=True, held=np.array([left])
-        )
+        proposal = SimpleNamespace(parts=(), size=size, guess=guess)
+        return SimpleNamespace(name=name, proposal=proposal, vague=False, earned=True, held=np.array([left]))
 
     found = [judged("most", 12, False, 1.0), judged("each", 6, False, 1.2), judged("guess", size, True, 1.3)]
     monkeypatch.setattr(judge, "tied", lambda one, other: {one.name, other.name} != {"most", "guess"})

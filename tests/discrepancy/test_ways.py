@@ -96,7 +96,7 @@ def test_what_a_way_alone_can_say_is_said_in_words() -> None:
     regimes = {r.name: r for r in balance.remains(()).regimes}
     assert regimes["cruising up"].mean > 15 and regimes["cruising down"].mean < -15, "20 N of friction"
     (line,) = free.remarks(())
-    assert line.startswith("Started anew from the measured state every 1 s: ")
+    assert line.startswith("Started anew from the measured state every 0.5 s: ")
     off = free.mean_absolute(())
     assert off.shape == (2,) and (off > free.mean_absolute(samples()["pendulum"].hidden)).all()
     again = FreeRun(measured("pendulum"), free.robot, free.evaluator, windows_s=0.5)

@@ -10,7 +10,7 @@ from way_samples import evaluator_for, measure, samples
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.ways.free_run.problem import LED_RESTART_S, RESTART_S, FreeRun
+from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.robots.linear_stage import linear_stage
@@ -43,8 +43,8 @@ def test_what_a_drive_holds_goes_on_where_a_window_begins(held: dict[str, float]
     trial = trial_of(robot)
     whole = FreeRun((trial,), robot, evaluator_for(robot))
     windows = whole.searched
-    assert isinstance(windows, FreeRun) and windows.windows_s == LED_RESTART_S
-    assert len(windows.segments) == 4
+    assert isinstance(windows, FreeRun) and windows.windows_s == RESTART_S
+    assert len(windows.segments) == 8
     range_ = float(np.ptp(trial.log.sensors[:, 0]))
     off = np.abs(windows.raw(windows.residuals([()])[0]))
     # Play and twist of a transmission come back within the run-up but for what they were in the middle of.
@@ -78,7 +78,7 @@ def test_a_search_goes_by_windows_and_says_what_the_whole_record_gives() -> None
     whole = FreeRun(measure(sample, sample.hidden), sample.robot, evaluator_for(sample.robot))
     windows = whole.searched
     assert windows.searched is windows and windows is whole.searched
-    assert windows.natural_name == "mean absolute position error over 1 s"
+    assert windows.natural_name == "mean absolute position error over 0.5 s"
     (line,) = windows.other_errors((), sample.hidden)
     before, after = (whole.told(error(r)) for r in whole.residuals([(), sample.hidden]))
     assert line == f"Run through without starting anew: model {before}, improved model {after}."

@@ -262,8 +262,9 @@ def _fuller(j: Judged, first: Judged) -> bool:
     """Whether it is the same and more, and takes off a part of what that leaves. With a handful of motions nothing is sure: the
     further term may be none, and yet foretells better on the whole."""
     names, fewer = ({c.name for c in x.proposal.parts} for x in (j, first))
-    above = float(first.held.sum()) > NEAR**2 * first.sure
-    return j.earned and fewer < names and above and _left(j) <= FULLER * _left(first)
+    if not j.earned or not fewer < names:
+        return False
+    return float(first.held.sum()) > NEAR**2 * first.sure and _left(j) <= FULLER * _left(first)
 
 
 def _least_said(j: Judged) -> tuple[int, bool, int]:

@@ -51,10 +51,7 @@ class ToPositions:
 
 
 RESTART_S = 0.5
-"""Length of windows that start anew from the measured state, of a robot whose joints nobody leads: on torques alone a simulation
-drifts away within a second, whatever the model,"""
-LED_RESTART_S = 1.0
-"""and of one that is held by controllers: long enough for them to bring a joint to where friction lets it rest."""
+"""Length of windows that start anew from the measured state."""
 RUN_UP = 20
 """Rows before a window from which it is simulated: as long as the longest delay that a drive may have. What drives hold within
 them when it begins (commands on their way, play) comes from there."""
@@ -217,7 +214,7 @@ class FreeRun(Problem):
     def searched(self) -> Problem:
         """The same by windows. Over a whole record errors jump where a joint sticks or slips: fits are caught, and what is
         foretold of another motion depends on which of many equal ones was found."""
-        return self if self.windows_s is not None else self._by(LED_RESTART_S)
+        return self if self.windows_s is not None else self._by(RESTART_S)
 
     def _by(self, windows_s: float | None) -> FreeRun:
         return FreeRun(self.measured, self.robot, self.evaluator, self.every, windows_s)
@@ -230,7 +227,7 @@ class FreeRun(Problem):
         if len(self.units) > 1:
             out += [f"Mean absolute position error: {_listed([self.told_by_unit(r) for r in self.residuals(models)])}."]
         if led(self.robot):
-            other = self._by(LED_RESTART_S if self.windows_s is None else None)
+            other = self._by(RESTART_S if self.windows_s is None else None)
             how = "Run through without starting anew"
             if other.windows_s is not None:
                 how = f"Started anew from the measured state every {other.windows_s:g} s"
