@@ -144,8 +144,8 @@ def test_every_verb_by_every_way(cli, imported, by):
 
 def test_auto_takes_the_first_way_that_the_channels_allow(cli, imported):
     found, said = run(cli, "task=compare", f"measured={imported}", "task.rerun=false", *QUICK)
-    assert json.loads((found / "summary.json").read_text())["way"] == "open_loop"
-    assert "By open_loop: commands were recorded" in said.out
+    assert json.loads((found / "summary.json").read_text())["way"] == "free_run"
+    assert "By free_run: of a real robot, positions and commands were recorded" in said.out
 
 
 def test_a_log_of_torques_without_commands_is_compared_and_explained(cli, record, tmp_path):

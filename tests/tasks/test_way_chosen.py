@@ -44,6 +44,20 @@ def test_what_was_commanded_says_what_is_compared(command: str, way: str) -> Non
     assert way_of(measured(command), AUTO).name == way
 
 
+def test_of_a_real_robot_with_nothing_but_its_motion_a_free_run_tells_most() -> None:
+    """Of a simulation, of a robot with another sensor, and of one that walks off, open loop."""
+    simulated = measured("position")
+    real = replace(simulated, trials=tuple(replace(t, commands_held=True) for t in simulated.trials))
+    assert {s.kind for s in real.robot.sensors} == {"position", "velocity"}
+    assert way_of(real, AUTO).name == "free_run" and way_of(simulated, AUTO).name == "open_loop"
+    unknown = replace(real, trials=tuple(replace(t, commands_held=None) for t in real.trials))
+    assert way_of(unknown, AUTO).name == "free_run"
+    heated = replace(real.robot, sensors=(replace(real.robot.sensors[0], name="load", kind="motor_torque"),))
+    assert way_of(replace(real, robot=heated), AUTO).name == "open_loop"
+    blind = tuple(replace(t, log=replace(t.log, joints=None)) for t in real.trials)
+    assert way_of(replace(real, trials=blind), AUTO).name == "open_loop"
+
+
 def test_where_torques_lead_the_model_starts_anew_and_is_searched_as_it_is() -> None:
     config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
     free, held = (way_of(measured(c), "free_run").make(measured(c), config) for c in ("torque", "position"))

@@ -1,0 +1,81 @@
+"""Fits of precise data come down to the noise, and of explanations that are tied the fuller goes first where much is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from linear_problem import ROBOT, Linear
+
+from ee_dist.discrepancy.evidence.holdout import HeldOut, travelling, windows
+from ee_dist.discrepancy.evidence.judge import judge, ranked, surely_better
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
+from ee_dist.discrepancy.search.fit import fit_all
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.trials.log import Array
+
+WEAK = candidate(ROBOT, "motor_weak", "knee_front_left")
+SPREAD, SOFTNESS = 4000.0, 3.0
+
+
+class Precise(Linear):
+    """Sensors so precise that a quarter of a value is thousands of standard deviations, and residuals softened beyond a few."""
+
+    def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+        bent = [np.tanh(self.shift(h) / 3.0) for h in hypotheses]
+        return np.array([SOFTNESS * np.arcsinh((self.exact - SPREAD * b) / SOFTNESS) for b in bent])
+
+    @property
+    def exact(self) -> Array:
+        noise = np.random.default_rng(3).standard_normal(len(self.data))
+        return noise + SPREAD * np.tanh(self.shift((term("motor_weak", "knee_front_left", loss=0.4137),)) / 3.0)
+
+    def smooth(self, residual: Array) -> Array:
+        return np.asarray(SOFTNESS * np.sinh(residual / SOFTNESS))
+
+
+def test_precise_data_are_fitted_down_to_their_noise() -> None:
+    problem = Precise(())
+    (fit,) = fit_all(Search(problem), [(Model((WEAK,)), np.array([0.1]))])
+    assert dict(fit.hypothesis[0].values)["loss"] == pytest.approx(0.4137, abs=1e-4)
+    assert fit.energy < 1.1 * problem.floor.sum()
+
+
+def held_out(problem: Linear, residual: Array, whole: bool, parts: tuple[Candidate, ...] = ()) -> HeldOut:
+    cut = travelling(problem)[0] if whole else windows(problem)
+    everywhere = np.ones(len(residual), dtype=bool)
+    fit = Fit(Model(parts), np.zeros(len(parts)), 1.0, residual, np.ones((len(residual), len(parts))), everywhere)
+    return HeldOut(cut, residual, 1.0, (fit,))
+
+
+def test_an_exchange_pays_as_much_as_a_new_effect_on_motions_that_were_not_fitted() -> None:
+    problem = Linear((), motions=4)
+    unit = np.sign(problem.data)
+    before = held_out(problem, 10.0 * unit, True)
+    little, much = (held_out(problem, size * unit, True) for size in (9.7, 7.0))
+    assert not surely_better(problem, before, little, 100) and surely_better(problem, before, much, 100)
+    uneven = np.where(problem.trial_of == 0, 17.0, 5.0) * unit
+    assert not surely_better(problem, before, held_out(problem, uneven, True), 100), "one motion is far worse"
+    near = [held_out(problem, size * unit, False) for size in (1.2, 1.0)]
+    assert surely_better(problem, near[0], near[1], 10), "windows of one motion: more than luck is enough"
+
+
+@pytest.mark.parametrize(("fuller", "first"), [(6.0, 2), (9.5, 1)])
+def test_the_same_law_with_a_further_term_goes_first_where_it_takes_a_fifth(fuller: float, first: int) -> None:
+    problem = Linear((), motions=4)
+    unit, size = np.sign(problem.data), np.array([10.0, 10.0, 10.0, 10.0])
+    other = candidate(ROBOT, "motor_weak", "hip_rear_left")
+    base, simple = 20.0 * unit, size[problem.trial_of] * unit
+    # One motion is worse with it, so that the two are tied.
+    worse = np.where(problem.trial_of == 0, 12.0, fuller) * unit
+    models = [Proposal((WEAK,)), Proposal((WEAK, other))]
+    found = [
+        judge(problem, base, held_out(problem, r, True, p.parts), p, Model(p.parts), 10)
+        for p, r in zip(models, (simple, worse), strict=True)
+    ]
+    order = ranked(found)
+    assert order[0].tied_with == [order[1].name]
+    assert len(order[0].proposal.parts) == first
