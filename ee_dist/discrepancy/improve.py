@@ -175,9 +175,8 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
     """Whether much is left although the search had its chance with few effects; or, where it is known to be ``spread`` over
     many places, anything when no single one is left that stands out."""
     best = found.best
-    # Windows of a single motion say nothing about so many values, and on a single joint there are no many places.
-    one = len(search.problem.robot.drives) == 1
-    if one or not travelling(search.problem) or (best is not None and added < FEW):
+    # Windows of a single motion say nothing about so many values.
+    if not travelling(search.problem) or (best is not None and added < FEW):
         return False
     energy = float((found.base**2).sum()) if best is None else float(best.held.sum())
     enough = NEAR if spread and best is None else FAR
