@@ -40,6 +40,8 @@ FEW = 1
 """Effects that the search adds before it looks whether much is a little wrong everywhere, if the next one does not do."""
 OFTEN = 1
 """How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it."""
+REFUSED = 1
+"""How often that may not earn its place before it is not looked for any more: it takes as long as all the rest."""
 EXCHANGES, LOOKED_AT = 2, 2
 """How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
 ROOMS = 3
@@ -87,7 +89,7 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))
     else:
-        exchanges, looked, spread, anew = 0, -1, 0, 0
+        exchanges, looked, spread, anew, refused = 0, -1, 0, 0, 0
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             has = (*search.fixed, *current.hypothesis)
@@ -100,7 +102,7 @@ def improve(
             best = last.best
             special = any(stands_out(problem.robot, c) for c in current.parts[own:])
             ready = len(current.parts) != looked and anew < OFTEN and (not spread or special)
-            if ready and _many(search, last, len(current.parts) - own, spread > 0):
+            if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 found = everywhere(search, current, own, pool, travelling(problem), again=spread > 0)
                 looked, anew = len(current.parts), anew + (spread > 0)
                 if found is not None:
@@ -108,6 +110,7 @@ def improve(
                     for rung in found.rungs:
                         climb(rung)
                     continue
+                refused += 1
             if best is None:
                 exchanged = None
                 if exchanges < EXCHANGES and len(current.u) < LARGE and leftovers(problem, last.base):
