@@ -136,7 +136,10 @@ def way_of(measured: Measurements, by: str) -> Way:
     return _possible(WAYS[by], measured)
 
 
-ONLY_MOTION = "of a real robot, positions and commands were recorded: the model runs freely from the measured state"
+ONLY_MOTION = (
+    "of a real robot, positions and commands were recorded: the model runs freely from the measured state (faults of sensors "
+    "are told by task.by=open_loop alone)"
+)
 
 
 def _only_motion(measured: Measurements) -> bool:
