@@ -66,9 +66,9 @@ def test_an_exchange_pays_as_much_as_a_new_effect_on_motions_that_were_not_fitte
 @pytest.mark.parametrize(("fuller", "first"), [(6.0, 2), (9.5, 1)])
 def test_the_same_law_with_a_further_term_goes_first_where_it_takes_a_fifth(fuller: float, first: int) -> None:
     problem = Linear((), motions=4)
-    unit, size = np.sign(problem.data), np.array([10.0, 10.0, 10.0, 10.0])
+    unit = np.sign(problem.data)
     other = candidate(ROBOT, "motor_weak", "hip_rear_left")
-    base, simple = 20.0 * unit, size[problem.trial_of] * unit
+    base, simple = 20.0 * unit, 10.0 * unit
     # One motion is worse with it, so that the two are tied.
     worse = np.where(problem.trial_of == 0, 12.0, fuller) * unit
     models = [Proposal((WEAK,)), Proposal((WEAK, other))]

@@ -135,7 +135,7 @@ def judge(
     why = ""
     if not np.isfinite(gain) or gain < enough:
         why = LUCK
-    elif low <= 0 and lost(gained) > LOST_SHARE * gain:
+    elif _may_be_zero(gained, low):
         why = MAY_BE_ZERO
     elif gain < LEAST_SHARE * total or gain < _worth(problem, cut, proposal, held) * above:
         why = TOO_LITTLE
@@ -171,8 +171,7 @@ def surely_better(problem: Problem, one: HeldOut, other: HeldOut, tried: int) ->
     if cut.name == WINDOWS:
         return True
     low, _ = bootstrap(gained, groups=cut.groups)
-    sure = low > 0 or lost(gained) <= LOST_SHARE * gain
-    return sure and gain >= WORTH * (energy - float(problem.floor.sum()))
+    return not _may_be_zero(gained, low) and gain >= WORTH * (energy - float(problem.floor.sum()))
 
 
 def _worth(problem: Problem, cut: Cut, proposal: Proposal, held: Array) -> float:
@@ -198,6 +197,11 @@ def _vague(problem: Problem, found: HeldOut, proposal: Proposal) -> bool:
         if (np.abs(fit.u[-proposal.size :]) > half).any():
             return False
     return True
+
+
+def _may_be_zero(gained: Array, low: float) -> bool:
+    """Whether what pieces of evidence gained may be nothing. ``low``: the lower end of the interval of their sum."""
+    return low <= 0 and lost(gained) > LOST_SHARE * float(gained.sum())
 
 
 def lost(gained: Array) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import weighed
 from ee_dist.trials.log import Array
 
 LARGE = 10
@@ -110,9 +111,7 @@ def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
     rows = iter(search.residuals([run.model.hypothesis(v) for run, v in points]))
     smooth_of, at = search.problem.smooth, 0
     for run in runs:
-        here = run.residual[mask]
-        smooth = smooth_of(run.residual)[mask]
-        weight = np.minimum(np.abs(here) / np.maximum(np.abs(smooth), 1e-12), 1.0)
+        smooth, weight = (values[mask] for values in weighed(search.problem, run.residual))
         columns = []
         for k in range(len(run.u)):
             row, gap = next(rows), points[at][1][k] - run.u[k]

@@ -211,10 +211,15 @@ class FreeRun(Problem):
         return out
 
     @cached_property
-    def searched(self) -> Problem:
+    def searched(self) -> FreeRun:
         """The same by windows. Over a whole record errors jump where a joint sticks or slips: fits are caught, and what is
         foretold of another motion depends on which of many equal ones was found."""
         return self if self.windows_s is not None else self._by(RESTART_S)
+
+    @cached_property
+    def _whole(self) -> FreeRun:
+        """The same run through."""
+        return self if self.windows_s is None else self._by(None)
 
     def _by(self, windows_s: float | None) -> FreeRun:
         return FreeRun(self.measured, self.robot, self.evaluator, self.every, windows_s)
@@ -227,7 +232,7 @@ class FreeRun(Problem):
         if len(self.units) > 1:
             out += [f"Mean absolute position error: {_listed([self.told_by_unit(r) for r in self.residuals(models)])}."]
         if led(self.robot):
-            other = self._by(RESTART_S if self.windows_s is None else None)
+            other = self.searched if self.windows_s is None else self._whole
             how = "Run through without starting anew"
             if other.windows_s is not None:
                 how = f"Started anew from the measured state every {other.windows_s:g} s"
@@ -239,7 +244,7 @@ class FreeRun(Problem):
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         """Of the first stretch of each trial; of a robot that is led, the whole trial."""
         if self.windows_s is not None and led(self.robot):
-            return self._by(None).simulated(hypothesis)
+            return self._whole.simulated(hypothesis)
         first = {p.trial: p for p in reversed(self.pieces)}
         jobs = []
         for k, p in sorted(first.items()):
