@@ -35,6 +35,7 @@ from ee_dist.measurements.trials import trials_of
 from ee_dist.measurements.units import TURN, UNITS, factor
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.robots.model import Robot
+from ee_dist.robots.reached import told
 from ee_dist.trials.log import Array, SensorLog
 
 SAME_RATE = 1e-3
@@ -335,6 +336,11 @@ class _Import:
                 self._judge(
                     unit_suspicion(s.name, self.channels[s.name], joint.lower, joint.upper, s.unit, unit), column
                 )
+                at = self.channels[s.name]
+                self.report.suspicious += [
+                    f"{s.name}: {words}: is the description's zero another one, or its stop elsewhere?"
+                    for words in told(joint, float(at.min()), float(at.max()), s.noise)
+                ]
             elif s.kind == "velocity" and s.target in position_of:
                 self._judge(speed_suspicion(s.name, self.channels[s.name], position_of[s.target], self.step_s), column)
         for k, drive in enumerate(self.robot.drives):

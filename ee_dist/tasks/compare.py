@@ -45,13 +45,11 @@ def run(config: Config, options: Options, out: Path) -> tuple[Problem, Compariso
     note_nothing()  # it is over in seconds
     console, watch, measured = terminal(), Stopwatch(), load(config)
     way = way_of(measured, options.by)
-    for remark in measured.remarks:
-        console.print(remark, highlight=False, markup=False)
     problem = way.make(measured, for_few(config))
     residual = residual_as_it_is(problem, measured.model)
     found = compare(problem, residual)
     left = leftovers(problem, residual)
-    account = compare_account(problem, found, left)
+    account = compare_account(problem, found, left).warned(measured.remarks)
     remarks = problem.remarks(measured.model)
     digest = hashlib.sha256(np.ascontiguousarray(residual).tobytes()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)

@@ -76,6 +76,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     share = confidence(problem.way, found)
     also = problem.other_errors(found.before, found.after) if found.best else ()
     account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also)
+    account = account.warned(measured.remarks)
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))

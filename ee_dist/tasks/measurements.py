@@ -22,6 +22,7 @@ from ee_dist.recording.records import HARDWARE, RunRecord
 from ee_dist.robots.agree import agreed, changed_sources, differences
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
+from ee_dist.robots.reached import with_room
 from ee_dist.robots.untrusted import json_of, yaml_of
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.trials.excitation import Excitation
@@ -83,12 +84,14 @@ def load(config: Config) -> Measurements:
         more = f", and {len(short) - 1} more as short" if len(short) > 1 else ""
         remarks.append(f"Left out: {_too_short(*short[0])}{more}.")
     if config.model is None:
+        robot = _with_room(robot, trials, remarks)
         # By name only where the name says all: a log may bring sensors of its own, or a body with other numbers.
         named = robot.name in BUILT_IN and not differences(BUILT_IN[robot.name](), robot)
         source = robot.name if named else robot
         return Measurements(robot, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks))
     believed = read_model(config.model)
     robot, different = agreed(believed.robot, robot, f"model={config.model}")
+    robot = _with_room(robot, trials, remarks)
     if different:
         remarks.append(f"The model's robot is used; it has otherwise than the log's: {'; '.join(different[:SHOWN])}")
     apply(robot, believed.terms)
@@ -105,6 +108,16 @@ def load(config: Config) -> Measurements:
         by,
         tuple(remarks),
     )
+
+
+def _with_room(robot: Robot, trials: Sequence[MeasuredTrial], remarks: list[str]) -> Robot:
+    """The robot without the stops that real trials pass, which goes into the ``remarks``."""
+    robot, passed = with_room(robot, [t.log.sensors for t in trials if t.commands_held is not False])
+    remarks += [
+        f"{line}; the model's stop is moved there. Is the description's zero another one, or its stop elsewhere?"
+        for line in passed
+    ]
+    return robot
 
 
 def _commands_held(run: RunRecord) -> bool | None:

@@ -130,7 +130,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     account = account_of(
         robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED,
         every_s,
-    )  # fmt: skip
+    ).warned(measured.remarks)  # fmt: skip
     digest = digest_of([(t.excitation, [round(s, 9) for s in t.separations]) for t in result.trials])
     rest = of_plan(result, explanations, found.folder, measured.files, options.limits, account)
     rest |= {"reading_s": every_s or robot.time_step_s, "csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}

@@ -106,3 +106,26 @@ def test_a_real_stage_is_the_same_with_and_without_a_mapping(tmp_path: Path, com
     (a,), (b,) = (read_logs(tmp_path / n / "measured.mcap") for n in "ab")
     assert np.array_equal(a.log.sensors, b.log.sensors)
     assert np.array_equal(a.log.commands, b.log.commands)
+
+
+def test_a_stop_that_the_log_passes_is_suspicious_and_stands_in_no_comparison(tmp_path: Path, command: Command) -> None:
+    """The import says so, and the model's joint follows its robot to where the description has a wall."""
+    described = samples.robot_file(tmp_path)
+    urdf = tmp_path / "chain.urdf"
+    first = '<limit lower="-1.7" upper="1.7"'
+    assert first in urdf.read_text()
+    log = samples.rosbag2_mcap(tmp_path)
+    errors = []
+    for upper in ("1.7", "0.1"):
+        urdf.write_text(urdf.read_text().replace(first, f'<limit lower="-1.7" upper="{upper}"', 1))
+        out = tmp_path / upper
+        status, said, _ = command(
+            f"measured={log}", "robot=urdf", f"robot.drives={described}", f"hydra.run.dir={out / 'in'}"
+        )
+        assert (status, "beyond the stop" in said) == (0, upper == "0.1")
+        compared = (f"measured={out / 'in'}", "engine=mujoco", "evaluator=serial", f"hydra.run.dir={out / 'off'}")
+        status, said, _ = command("task=compare", *compared)
+        found = json.loads((out / "off" / "summary.json").read_text())
+        assert status == 0 and any("beyond the stop at 0.1" in w for w in found["words"]) == (upper == "0.1")
+        errors.append(found["error"])
+    assert errors[1] == pytest.approx(errors[0], rel=0.02)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.problem import Problem
@@ -59,6 +59,10 @@ class Account:
         before = PLAN_OTHERS if self.advice.endswith(NO_MOTION_TRIED) else PLAN
         planned = f"{before} {self.planner}" if self.planner else ""
         return [line for line in (*self.warnings, self.error, self.sure, self.advice, planned) if line]
+
+    def warned(self, warnings: Sequence[str]) -> Account:
+        """The same, and before its own warnings these: what to know of the measurements before any result is read."""
+        return replace(self, warnings=(*warnings, *self.warnings))
 
     @property
     def lead(self) -> str:
