@@ -24,7 +24,7 @@ from engine_robots import (
 
 from ee_dist.engines.contract import Engine, Rollout
 from ee_dist.engines.drivers import Commands
-from ee_dist.robots.model import Robot, Sensor
+from ee_dist.robots.model import Robot, Sensor, Shape, World
 from ee_dist.robots.quadruped import FOOT_M, LOWER_M, quadruped
 from ee_dist.trials.log import SensorLog
 
@@ -120,6 +120,20 @@ def test_the_rotor_of_a_slide_is_inertia_and_no_weight(
     # Held by a spring it sags by the weight of the part alone.
     held = run(engine, robot.with_drive("joint", spring=1000.0, viscous=180.0), 3001).channel("position")
     assert held[-1] == pytest.approx(pull * MASS_KG / 1000.0, rel=1e-3)
+
+
+def test_what_is_bolted_down_may_stand_on_the_floor(engine: Engine) -> None:
+    """A post with shapes in the floor moves nothing and is moved by nothing: its joint swings as without a floor."""
+    bare = one_joint("hinge", (0.0, 1.0, 0.0))
+    post = replace(bare.parts[0], shapes=(Shape("box", (0.05, 0.05, 0.05)), Shape("sphere", (0.02,), (0.0, 0.0, -0.01))))
+    standing = replace(
+        bare, parts=(post, bare.parts[1]), world=World(has_floor=True), start_position_m=(0.0, 0.0, 0.6)
+    )
+    sunk = replace(standing, parts=(replace(post, shapes=(Shape("sphere", (0.7,)),)), bare.parts[1]))
+    lifted = replace(bare, start_position_m=standing.start_position_m)
+    free, *others = (run(engine, r, 200, at([0.5], [0.0])) for r in (lifted, standing, sunk))
+    for log in others:
+        assert log.sensors == pytest.approx(free.sensors, abs=1e-9)
 
 
 def test_coulomb_friction_stops_a_slide_where_the_formula_says_and_never_reverses_it(engine: Engine) -> None:

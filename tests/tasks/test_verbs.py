@@ -263,3 +263,14 @@ def test_a_log_is_looked_at(cli, imported):
     outcome = cli("task=view", f"log={copy}", "task.open=false")
     assert outcome.status == 0, outcome.err
     assert "rerun recording:" in outcome.out
+
+
+@pytest.mark.parametrize(("verb", "by"), [("explain", "free_run"), ("improve", "open_loop")])
+def test_one_digest_of_a_search_wherever_its_models_are_simulated(cli, imported, verb, by):
+    asked = [f"task={verb}", f"measured={imported}", f"task.by={by}", "task.only=[coulomb_friction]", "engine=mujoco"]
+    asked += ["effect=auto", "task.most=1"] if verb == "improve" else []
+    serial = ["evaluator=serial"], ["evaluator=serial", "evaluator.cache=false", "evaluator.chunk=3"]
+    elsewhere = ["evaluator=ray", "evaluator.workers=2", "evaluator.chunk=1"]
+    digests = [json.loads((run(cli, *asked, *extra)[0] / "summary.json").read_text()) for extra in (*serial, elsewhere)]
+    assert "friction" in digests[0]["headline"], "something was found, and fitted"
+    assert len({d["result_digest"] for d in digests}) == 1

@@ -53,7 +53,9 @@ def contact(time_step_s: float, compliance_m_n: Array, accelerated: Array) -> Co
     hard_k = UNDONE / (IMPEDANCE * h**2)
     soft = 1.0 / (h * (h + SPRING_DAMPING_S))
     # 1 / (h^2 K + h C) = give / (h (h + SPRING_DAMPING_S))
-    d = np.clip(accelerated / (accelerated + give * soft), 1e-4, IMPEDANCE)
+    felt = accelerated + give * soft
+    # A part that is bolted down is accelerated by nothing: whatever its shapes have is right.
+    d = np.clip(np.divide(accelerated, felt, out=np.ones_like(felt), where=felt > 0), 1e-4, IMPEDANCE)
     k = np.where(give > 0, soft, hard_k) + np.zeros_like(d)
     impedance = np.empty((*d.shape, 5))
     impedance[..., 0] = impedance[..., 1] = d
