@@ -340,7 +340,9 @@ def main() -> int:
         parser.error(f"--untouched {args.untouched}: every which robot? 1 or more")
     bench = Bench(args)
     if not bench.robot.drives:
-        parser.error(f"--robot {args.robot}: has no drives, so that nothing moves it; name a description (.yaml) that does")
+        parser.error(
+            f"--robot {args.robot}: has no drives, so that nothing moves it; name a description (.yaml) that does"
+        )
     cases: list[Case] = []
     if args.cross_engine:
         bench.calibrate()

@@ -22,7 +22,7 @@ from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_
 from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
-from ee_dist.discrepancy.ladder import Improvement, Rung
+from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import told_only, without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, on_top_of, values_of
@@ -188,7 +188,7 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
 
 def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:
     e = error(residual)
-    return Rung(name, (), terms, e, e, per_segment(problem, residual), "nothing was fitted")
+    return Rung(name, (), terms, e, e, per_segment(problem, residual), UNFITTED)
 
 
 def _cut(problem: Problem) -> Cut:

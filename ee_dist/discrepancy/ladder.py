@@ -13,6 +13,9 @@ from ee_dist.discrepancy.search.candidates import Proposal
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
+UNFITTED = "nothing was fitted"
+"""What is held out of a model that is taken as it is."""
+
 
 @dataclass(eq=False)
 class Rung:
@@ -56,6 +59,11 @@ class Improvement:
     odd: list[OddOne] = field(default_factory=list)
     worth: Worth | None = None
     unsure: list[str] = field(default_factory=list)
+
+    @property
+    def cuts(self) -> list[str]:
+        """What was held out at the steps that were fitted, each once, in their order."""
+        return list(dict.fromkeys(r.held_out for r in self.ladder if r.held_out != UNFITTED))
 
     def ties(self, step: int) -> list[str]:
         """What the measurements do not tell from the effect that step ``step`` (from 1) of ``effect=auto`` added."""

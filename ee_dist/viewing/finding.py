@@ -64,6 +64,8 @@ class Rung:
     label: str
     error_heldout: float
     error_fit: float | None = None
+    held_out: str = ""
+    """What was held out."""
 
 
 @dataclass(frozen=True, eq=False)

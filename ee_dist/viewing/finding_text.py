@@ -82,10 +82,11 @@ def ladder_table(found: Finding) -> list[str]:
     if not found.ladder:
         return []
     largest = max(r.error_heldout for r in found.ladder)
-    lines = [f"| # | model | error held out{_unit(found)} | | in the fit |", "|---|---|---|---|---|"]
+    lines = [f"| # | model | error held out{_unit(found)} | | in the fit | held out |", "|---|---|---|---|---|---|"]
     for k, rung in enumerate(found.ladder):
         fit = "" if rung.error_fit is None else f"{rung.error_fit:.3g}"
-        lines.append(f"| {k} | {rung.label} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} |")
+        lines.append(f"| {k} | {rung.label} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} "
+                     f"| {rung.held_out} |")  # fmt: skip
     if found.floor is not None:
-        lines.append(f"| | *noise alone* | {found.floor:.3g} | {bar(found.floor, largest)} | |")
+        lines.append(f"| | *noise alone* | {found.floor:.3g} | {bar(found.floor, largest)} | | |")
     return lines

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 import plotly.graph_objects as go
@@ -179,25 +180,36 @@ def ladder(
     names: Sequence[str],
     fit: Sequence[float],
     heldout: Sequence[float],
+    held_out: Sequence[str],
     floor: float,
     label: str = "error (standard deviations)",
 ) -> go.Figure:
-    """Error of each model from the first to the last, and the noise floor."""
+    """Error of each model from the first to the last, and the noise floor. ``held_out``: what was held out of each; a line
+    joins neighbours of which that was the same, and the model that was taken as it is."""
     figure = go.Figure()
     figure.add_scatter(
         x=[wrapped(n, 18) for n in names], y=list(fit), name="fitted", mode="lines+markers",
         line={"color": PREDICTED, "dash": "dot"},
     )  # fmt: skip
-    figure.add_scatter(
-        x=[wrapped(n, 18) for n in names],
-        y=list(heldout),
-        name="held out",
-        mode="lines+markers+text",
-        line={"color": MEASURED, "width": 3},
-        marker={"size": 10},
-        text=[f"{v:.3g}" for v in heldout],
-        textposition="top center",
-    )
+    # The model as it is was fitted to nothing, so that it goes with whatever comes next.
+    same = [held_out[min(1, len(held_out) - 1)], *held_out[1:]]
+    first = 0
+    for judged_on, steps in groupby(same):
+        part = slice(first, first + len(list(steps)))
+        first = part.stop
+        figure.add_scatter(
+            x=[wrapped(n, 18) for n in names[part]],
+            y=list(heldout[part]),
+            name="held out",
+            legendgroup="held out",
+            showlegend=part.start == 0,
+            mode="lines+markers+text",
+            line={"color": MEASURED, "width": 3},
+            marker={"size": 10},
+            text=[f"{v:.3g}" for v in heldout[part]],
+            textposition="top center",
+            hovertemplate=f"%{{y:.4g}} on {judged_on}<extra></extra>",
+        )
     figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
                      annotation_position="bottom left")  # fmt: skip
     styled(figure, 340)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ee_dist.discrepancy.ladder import UNFITTED
 from ee_dist.discrepancy.problem import Series, error
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.words import placed
@@ -163,7 +164,7 @@ class Session:
         self.seen = self.sight.seen(self.bench.terms)
         if not self.bench.ladder:
             off = self.seen.found.error
-            self.bench = self.bench.stepped(Step("the model as it was", off, off, "nothing was fitted"))
+            self.bench = self.bench.stepped(Step("the model as it was", off, off, UNFITTED))
             self._note("compare", self.bench.terms)
         self._save()
         self.tell("seen")

@@ -125,10 +125,10 @@ def test_the_rotor_of_a_slide_is_inertia_and_no_weight(
 def test_what_is_bolted_down_may_stand_on_the_floor(engine: Engine) -> None:
     """A post with shapes in the floor moves nothing and is moved by nothing: its joint swings as without a floor."""
     bare = one_joint("hinge", (0.0, 1.0, 0.0))
-    post = replace(bare.parts[0], shapes=(Shape("box", (0.05, 0.05, 0.05)), Shape("sphere", (0.02,), (0.0, 0.0, -0.01))))
-    standing = replace(
-        bare, parts=(post, bare.parts[1]), world=World(has_floor=True), start_position_m=(0.0, 0.0, 0.6)
+    post = replace(
+        bare.parts[0], shapes=(Shape("box", (0.05, 0.05, 0.05)), Shape("sphere", (0.02,), (0.0, 0.0, -0.01)))
     )
+    standing = replace(bare, parts=(post, bare.parts[1]), world=World(has_floor=True), start_position_m=(0.0, 0.0, 0.6))
     sunk = replace(standing, parts=(replace(post, shapes=(Shape("sphere", (0.7,)),)), bare.parts[1]))
     lifted = replace(bare, start_position_m=standing.start_position_m)
     free, *others = (run(engine, r, 200, at([0.5], [0.0])) for r in (lifted, standing, sunk))

@@ -57,7 +57,11 @@ def full_page() -> Page:
             Section("All", "curves", browser=browser(curves, ["model", "improved"])),
             Section("Clouds", figures=clouds, legend=[("before", "red")]),
             Section("Heat", figure=figures.heat_map(heat, windows, channels)),
-            Section("Ladder", figure=figures.ladder(["as it was", LONG], [2.0, 1.0], [2.1, 1.1], 0.9), folded=True),
+            Section(
+                "Ladder",
+                figure=figures.ladder(["as it was", LONG], [2.0, 1.0], [2.1, 1.1], ["", "windows"], 0.9),
+                folded=True,
+            ),
             Section("Bars", figure=figures.bars(channels, list(range(12)), "error", 0.9, list(range(12)))),
         ],
         [("compare", "../compare/report.html")],

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from ee_dist.discrepancy.accounts.of_compare import CLOSE
 from ee_dist.discrepancy.compare import Comparison, RegimeReport
-from ee_dist.discrepancy.ladder import Rung
+from ee_dist.discrepancy.ladder import UNFITTED, Rung
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import percent, phrase, placed
 from ee_dist.trials.log import Array
@@ -38,7 +38,7 @@ def axis_of(problem: Problem) -> str:
 
 def step_name(r: Rung) -> str:
     """A step of the ladder: what was added, or, of the first, the model itself."""
-    return placed(r.name) if r.added or r.held_out != "nothing was fitted" else f"the {MODEL}"
+    return placed(r.name) if r.added or r.held_out != UNFITTED else f"the {MODEL}"
 
 
 def step_phrase(r: Rung, problem: Problem) -> str:

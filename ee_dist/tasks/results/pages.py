@@ -114,10 +114,13 @@ def improve_page(
             steps,
             [drawn(problem, r.error_fit) for r in found.ladder],
             [drawn(problem, r.error_heldout) for r in found.ladder],
+            [r.held_out for r in found.ladder],
             drawn(problem, found.noise_floor),
             axis_of(problem),
         )
-        caption = f"Error of each model on {last.held_out}. Everything is fitted anew at each step."
+        caption = f"Error of each model on {', then on '.join(found.cuts)}. Everything is fitted anew at each step."
+        if len(found.cuts) > 1:
+            caption += " A line joins what was judged on the same: from one to the next errors cannot be compared."
         page.sections.append(Section("The ladder", caption, figure))
     _add(page, parts.values_section(kinds_of(found.terms, found.parameters, problem.robot)))
     page.sections.append(parts.browser_section(overlays, models))

@@ -53,7 +53,8 @@ def improve_scene(
     """Before, after, and the ladder between them."""
     finding = _finding(problem, compare(problem, found.base), account, model, following)
     ladder = tuple(
-        drawn.Rung(step_name(r), in_unit(problem, r.error_heldout), in_unit(problem, r.error_fit)) for r in found.ladder
+        drawn.Rung(step_name(r), in_unit(problem, r.error_heldout), in_unit(problem, r.error_fit), r.held_out)
+        for r in found.ladder
     )
     better = said(problem, IMPROVED, found.terms)
     write_improve_rrd(replace(finding, ladder=ladder, better=better), path)

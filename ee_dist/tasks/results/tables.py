@@ -81,8 +81,15 @@ def standing(c: Judged, best: Judged) -> str:
 
 
 def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
-    rows = [(step_phrase(r, problem), problem.told(r.error_fit), problem.told(r.error_heldout)) for r in found.ladder]
-    table = _table(f"The ladder: {problem.natural_name}", (("step", False), ("fitted", True), ("held out", True)), rows)
+    # Errors on motions that were not fitted are no continuation of those on other windows of the same ones.
+    several = len(found.cuts) > 1
+    rows = [
+        (step_phrase(r, problem), problem.told(r.error_fit), problem.told(r.error_heldout), *([r.held_out] * several))
+        for r in found.ladder
+    ]
+    columns = (("step", False), ("fitted", True), ("held out", True), *([("what was held out", False)] * several))
+    of = f"; held out: {found.cuts[0]}" if len(found.cuts) == 1 else ""
+    table = _table(f"The ladder: {problem.natural_name}{of}", columns, rows)
     table.add_section()
     table.add_row("noise floor", "", problem.told(found.noise_floor))
     console.print(table)

@@ -1,0 +1,49 @@
+"""Errors held out on motions are no continuation of those held out on windows: table and picture keep them apart."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
+from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.tasks.results.tables import show_ladder
+from ee_dist.viewing.report_figures import ladder
+
+
+def improved(*held_out: str) -> Improvement:
+    rungs = [
+        Rung(f"step {k}", (), (), 3.0 - k, 3.1 - k, np.zeros(1), name) for k, name in enumerate((UNFITTED, *held_out))
+    ]
+    nothing = np.zeros(1)
+    return Improvement("better_not_explained", 0.5, rungs, (), [], nothing, nothing, 0.9, "", [], "")
+
+
+def shown(found: Improvement) -> str:
+    problem = SimpleNamespace(natural_name="error", robot=servo_pendulum(), told=lambda e: f"{e:.3g}")
+    console = Console(width=100, record=True)
+    show_ladder(console, problem, found)  # type: ignore[arg-type]
+    return console.export_text()
+
+
+def test_one_cut_stands_in_the_title_and_several_at_their_steps() -> None:
+    one = shown(improved(MOTIONS, MOTIONS))
+    assert f"held out: {MOTIONS}" in " ".join(one.split()) and "what was held out" not in one
+    both = shown(improved(WINDOWS, MOTIONS))
+    said = " ".join(both.split())
+    assert "what was held out" in said and "other windows" in said and "motions that were not" in said
+
+
+@pytest.mark.parametrize(
+    ("held_out", "lines"),
+    [((UNFITTED, WINDOWS, WINDOWS), [3]), ((UNFITTED, WINDOWS, MOTIONS, MOTIONS), [2, 2]), ((UNFITTED,), [1])],
+)
+def test_a_line_joins_what_was_judged_on_the_same(held_out: tuple[str, ...], lines: list[int]) -> None:
+    count = len(held_out)
+    figure = ladder([f"step {k}" for k in range(count)], [1.0] * count, [2.0] * count, held_out, 0.5)
+    assert [len(t.x) for t in figure.data if t.name == "held out"] == lines
+    assert sum(bool(t.showlegend) for t in figure.data if t.name == "held out") == 1
