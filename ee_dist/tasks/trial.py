@@ -103,7 +103,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     }
     tried = {name: remembered(name, body or simulated, robot) for name, simulated in hardware.items()}
     path, sums = out / "trial.mcap", hashlib.sha256()
-    what = "of your own" if body else "hidden change sealed"
+    what = "of your own" if body else "nothing hidden" if config.hidden is None else "hidden change sealed"
     table = Table(title=f"Trials of {robot.name}, {what}", title_justify="left")
     for column in ("trial", "what was done", "seconds", "rows"):
         table.add_column(column)
