@@ -98,7 +98,10 @@ def test_motions_and_settings_are_held_out_whole() -> None:
     assert travelling(Linear((), motions=6))[0].folds == 2, "more take turns in two groups"
     for k in range(4):
         assert len(set(motions.fold_of[problem.trial_of_segment == k])) == 1
-    heavy = (term("on_stand"),)
+    held = tuple(replace(t, setup=(term("on_stand"),) if k < 2 else ()) for k, t in enumerate(problem.measured))
+    problem.measured = held
+    assert len(travelling(problem)) == 1, "how a robot was held is no setting of it"
+    heavy = (term("part_mass", "arm", change=0.5),)
     problem.measured = tuple(replace(t, setup=heavy if k < 2 else ()) for k, t in enumerate(problem.measured))
     _, settings = travelling(problem)
     assert settings.name == SETTINGS

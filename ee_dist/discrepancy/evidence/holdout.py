@@ -16,6 +16,7 @@ from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.effects.catalogue import CATALOGUE
 from ee_dist.trials.log import Array
 
 WINDOWS, MOTIONS, SETTINGS = (
@@ -96,7 +97,8 @@ def travelling(problem: Problem) -> list[Cut]:
     """Ways of holding out that a motion or a setting takes part in as a whole; none where there is only one."""
     trial = np.asarray(problem.trial_of_segment)
     kinds = _kinds(problem)
-    settings = [t.setup for t in problem.measured]
+    # How a robot was held is no setting of it: on a stand nothing says how the floor lies, and nothing there speaks against it.
+    settings = [tuple(t for t in m.setup if CATALOGUE[t.effect].searchable) for m in problem.measured]
     cuts = []
     for name, of_trial in ((MOTIONS, kinds), (SETTINGS, settings)):
         different = list(dict.fromkeys(of_trial))
