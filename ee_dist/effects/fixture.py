@@ -8,13 +8,15 @@ from dataclasses import replace
 from ee_dist.effects.catalogue import effect
 from ee_dist.robots.model import Robot
 
+STAND = "on_stand"
+
 
 def _whole(robot: Robot) -> tuple[str, ...]:
     return ("",)
 
 
 @effect(
-    "on_stand",
+    STAND,
     family="world",
     targets=_whole,
     physics="The robot's body is clamped to a level stand and its limbs hang free: nothing touches the floor.",

@@ -16,7 +16,7 @@ from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS
-from ee_dist.effects.catalogue import CATALOGUE
+from ee_dist.effects.fixture import STAND
 from ee_dist.trials.log import Array
 
 WINDOWS, MOTIONS, SETTINGS = (
@@ -98,7 +98,7 @@ def travelling(problem: Problem) -> list[Cut]:
     trial = np.asarray(problem.trial_of_segment)
     kinds = _kinds(problem)
     # How a robot was held is no setting of it: on a stand nothing says how the floor lies, and nothing there speaks against it.
-    settings = [tuple(t for t in m.setup if CATALOGUE[t.effect].searchable) for m in problem.measured]
+    settings = [tuple(t for t in m.setup if t.effect != STAND) for m in problem.measured]
     cuts = []
     for name, of_trial in ((MOTIONS, kinds), (SETTINGS, settings)):
         different = list(dict.fromkeys(of_trial))
