@@ -127,20 +127,23 @@ def speeds_of(log: SensorLog, robot: Robot) -> Array:
     return read_speeds(log, speed_sensors(robot))
 
 
-SpeedSensors = tuple[tuple[int, int, bool], ...]
-"""Joint, channel, and whether it is noisy, of each sensor of a speed."""
+SpeedSensors = tuple[tuple[int, int, float], ...]
+"""Joint, channel, and declared noise (as the channel counts), of each sensor of a speed."""
 
 
 def speed_sensors(robot: Robot) -> SpeedSensors:
     """Those of a robot's joints."""
     place = {motor: k for k, motor in enumerate(robot.motor_names)}
     return tuple(
-        (place[s.target], c, bool(s.noise))
+        (place[s.target], c, s.noise)
         for c, s in enumerate(robot.sensors)
         if s.kind == "velocity" and s.target in place
     )
 
 
+SUDDEN = 4.0
+"""Standard deviations of its noise by which a reading of a speed parts from the smooth course of its neighbours by sudden
+motion alone."""
 AT_REST = 1.5
 """Steps' changes of speed up to which a joint that began to move had been at rest."""
 SMOOTH = 0.5
@@ -168,8 +171,13 @@ def read_speeds(log: SensorLog, read: SpeedSensors) -> Array:
     """The same of known sensors. Kept: a search asks for it with every model."""
     assert log.joints is not None
     out = _slopes(log.joints, float(np.median(np.diff(log.times_s))))
-    for k, c, noisy in read:
+    for k, c, noise in read:
         seen = log.sensors[:, c]
-        out[:, k] = scipy.signal.savgol_filter(seen, SMOOTHED, 2) if noisy and len(seen) > SMOOTHED else seen
+        if not noise or len(seen) <= SMOOTHED:
+            out[:, k] = seen
+            continue
+        smooth = scipy.signal.savgol_filter(seen, SMOOTHED, 2)
+        # Where a joint starts or stops within a few rows it is the curve that is wrong, and by more than any noise.
+        out[:, k] = np.where(np.abs(smooth - seen) > SUDDEN * noise, seen, smooth)
     out.setflags(write=False)
     return out

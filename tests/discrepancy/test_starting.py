@@ -71,6 +71,28 @@ def test_what_a_simulation_reads_is_what_it_starts_with() -> None:
     assert np.array_equal(starting_speeds(trial, arm()), speeds_of(trial.log, arm()))
 
 
+def noisy_arm(noise: float) -> Robot:
+    sensors = tuple(replace(s, noise=noise if s.kind == "velocity" else 0.0) for s in arm().sensors)
+    return replace(arm(), sensors=sensors)
+
+
+def test_a_joint_that_was_at_rest_begins_at_rest_although_it_jumped_in_the_next_step() -> None:
+    """A smooth course through its noisy speeds has it under way before it was."""
+    t, noise = np.arange(300) * STEP_S, 0.0075
+    speeds = np.where(t > 0, -20.0 * np.exp(-t / 0.005), 0.0)[:, None] * np.ones(2)
+    seen = speeds + noise * np.random.default_rng(2).standard_normal(speeds.shape)
+    trial = trial_of(noisy_arm(noise), np.cumsum(speeds, axis=0) * STEP_S, seen, real=False)
+    assert np.abs(starting_speeds(trial, noisy_arm(noise))[0]).max() < 5 * noise
+
+
+def test_of_a_noisy_sensor_of_speed_a_smooth_course_is_taken() -> None:
+    t, noise = np.arange(300) * STEP_S, 0.2
+    joints, speeds = course(t)
+    seen = speeds + noise * np.random.default_rng(3).standard_normal(speeds.shape)
+    trial = trial_of(noisy_arm(noise), joints, seen, real=False)
+    assert parted(starting_speeds(trial, noisy_arm(noise)), speeds) < 0.5 * parted(seen, speeds)
+
+
 def test_a_swing_is_foretold_although_its_speed_was_read_late() -> None:
     """One link in true time: what is left is a tenth of what the sensor's own lateness makes of it."""
     robot = samples()["pendulum"].robot
