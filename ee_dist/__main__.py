@@ -28,6 +28,7 @@ from ee_dist.tasks.compose import check_flags, check_sweep, check_used, config_f
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.errors import (
     USER_ERRORS,
+    RayGoneError,
     RayLostError,
     abandon_evaluators,
     defect,
@@ -81,7 +82,7 @@ def run(composed: DictConfig) -> None:
         ):
             module.run(config, options, out)
         _jobs.well += 1
-    except RayLostError as error:
+    except (RayLostError, RayGoneError) as error:
         remove_made()
         _lost(str(error), out)
     except USER_ERRORS as error:

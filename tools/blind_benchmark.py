@@ -4,11 +4,12 @@
 
 Every tenth robot is untouched (``--untouched``). An effect whose whole mark on the logs is below the noise is said to be
 too small and is left out of the scores. ``--withhold`` takes the drawn effect out of the catalogue: right is then
-``unexplained``, or an effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``.
+``unexplained``, or an effect with the rest flagged. ``--two`` hides two effects and runs ``improve effect=auto``: both are
+found where the model that it ends with has them, and within ties where it has what it says cannot be told from them.
 ``--robot`` and ``--by`` take another robot and another way of comparing. ``--by every`` judges each case by every way, of the
 same trials: effects are then drawn among those that all of them can tell.
 ``--cross-engine`` tries the robot in the other engine, after calibrating the model on an untouched robot there.
-``--workers`` runs cases side by side; a case is the same whoever runs it.
+``--workers`` runs cases side by side; a case is the same whoever runs it. ``--only`` repeats some of them, by number.
 """
 
 from __future__ import annotations
@@ -85,6 +86,7 @@ class Case:
     named: list[str] = field(default_factory=list)
     first: bool = False
     within: bool = False
+    both: bool = False
     flagged: bool = False
     ratio: float = float("nan")
     beside: float = float("nan")
@@ -211,8 +213,10 @@ class Bench:
         result = improve(problem, pool_of(problem), self.before, None, most=4)
         found.named = [t.name for t in result.terms]
         errors = [r.error_heldout for r in result.ladder]
-        found.within = set(names) <= set(found.named)
-        found.first = found.within and len(found.named) == 2
+        kept = set(found.named)
+        twins = {t for rung in result.ladder if kept & {a.name for a in rung.added} for t in rung.tied_with}
+        found.both, found.within = set(names) <= kept, set(names) <= kept | twins
+        found.first = found.both and len(found.named) == 2
         found.verdict = f"{len(found.named)} effects"
         found.ratio = errors[-1] / result.noise_floor
         found.flagged = all(b < a for a, b in pairwise(errors))
@@ -265,18 +269,17 @@ def scored(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
         right = len(real) - len(silent)
         print(f"of the {seen} that left something to be flagged: {right / seen if seen else float('nan'):.0%}")
         for c in silent:
-            print(f"  {c.index}: {c.shown} -> {c.verdict} {', '.join(c.named)} (mark {c.mark:.0f}, beside the truth "
+            print(f"  {c.index + 1}: {c.shown} -> {c.verdict} {', '.join(c.named)} (mark {c.mark:.0f}, beside the truth "
                   f"{c.beside:.0f}, error/floor {c.ratio:.2f})")  # fmt: skip
     if args.two:
-        both, falls = share([c.within for c in real]), share([c.flagged for c in real])
+        both, falls = share([c.both for c in real]), share([c.flagged for c in real])
         print(f"two effects: both found {both:.0%}, ladder falls at each step {falls:.0%}")
     if not args.withhold:
         print("missed:")
         for c in real:
             if not c.within:
-                print(
-                    f"  {c.index}: {c.shown} -> {c.verdict} {', '.join(c.named)} (mark {c.mark:.0f}, error/floor {c.ratio:.2f})"
-                )
+                print(f"  {c.index + 1}: {c.shown} -> {c.verdict} {', '.join(c.named)} "
+                      f"(mark {c.mark:.0f}, error/floor {c.ratio:.2f})")  # fmt: skip
     return {
         "within_ties": share([c.within for c in real]),
         "first": share([c.first for c in real]),
@@ -287,15 +290,20 @@ def scored(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def numbers_of(args: argparse.Namespace) -> list[int]:
+    """The cases that are run, counted from 0."""
+    return [k - 1 for k in args.only] if args.only else list(range(args.cases))
+
+
 def run(bench: Bench) -> Iterator[list[Case] | str]:
     """All cases in their order; for one that cannot be simulated or compared, what was said of it."""
-    count = bench.args.cases
+    numbers = numbers_of(bench.args)
     if bench.args.workers < 2:
-        yield from (attempt(bench, k) for k in range(count))
+        yield from (attempt(bench, k) for k in numbers)
         return
     settings = (bench.args, bench.known)
     with ProcessPoolExecutor(bench.args.workers, get_context("spawn"), _start, settings) as pool:
-        yield from pool.map(_attempt, range(count))
+        yield from pool.map(_attempt, numbers)
 
 
 def attempt(bench: Bench, index: int) -> list[Case] | str:
@@ -322,6 +330,7 @@ def _attempt(index: int) -> list[Case] | str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--cases", type=int, default=20)
+    parser.add_argument("--only", type=int, nargs="+", metavar="K", help="of the cases these, counted from 1")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", type=float, default=0.02, help="share of each channel's range")
     parser.add_argument("--untouched", type=int, default=10, metavar="K", help="every K-th robot is untouched (1: all)")
@@ -338,6 +347,8 @@ def main() -> int:
     args = parser.parse_args()
     if args.untouched < 1:
         parser.error(f"--untouched {args.untouched}: every which robot? 1 or more")
+    if min(numbers_of(args), default=0) < 0:
+        parser.error("--only: cases are counted from 1")
     bench = Bench(args)
     if not bench.robot.drives:
         parser.error(
@@ -347,12 +358,13 @@ def main() -> int:
     if args.cross_engine:
         bench.calibrate()
     began = time.monotonic()
-    for k, found in enumerate(run(bench)):
+    numbers = numbers_of(args)
+    for done, (k, found) in enumerate(zip(numbers, run(bench), strict=True), 1):
         if isinstance(found, str):
             print(f"{k + 1:4d}/{args.cases}  skipped: {found}", flush=True)
             continue
         cases += found
-        left = (time.monotonic() - began) / (k + 1) * (args.cases - k - 1)
+        left = (time.monotonic() - began) / done * (len(numbers) - done)
         for case in found:
             mark = "small" if case.too_small else "first" if case.first else "tied" if case.within else case.verdict
             print(f"{k + 1:4d}/{args.cases}  {case.shown or 'untouched':<78.78}  {case.by:<13} {mark:<16} {case.ratio:5.2f} x "

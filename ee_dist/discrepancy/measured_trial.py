@@ -135,9 +135,7 @@ def speed_sensors(robot: Robot) -> SpeedSensors:
     """Those of a robot's joints."""
     place = {motor: k for k, motor in enumerate(robot.motor_names)}
     return tuple(
-        (place[s.target], c, s.noise)
-        for c, s in enumerate(robot.sensors)
-        if s.kind == "velocity" and s.target in place
+        (place[s.target], c, s.noise) for c, s in enumerate(robot.sensors) if s.kind == "velocity" and s.target in place
     )
 
 

@@ -24,7 +24,7 @@ from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.jobs import Counts, Job
 from ee_dist.evaluation.ray_folder import Guard
 from ee_dist.evaluation.ray_process import DONE, FAILED, LOST
-from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError, knock
+from ee_dist.evaluation.ray_session import EvaluatorError, RayGoneError, RayLostError, knock
 from ee_dist.evaluation.ray_watch import LOOK_S, Heads, Watch
 
 BEGIN = (
@@ -92,7 +92,7 @@ class _Process:
         self.why: str | None = None
         threading.Thread(target=self._listen, daemon=True, name="ray answers").start()
         self.address, self.heads = address, Heads(self.process.pid)
-        self.watch = Watch(self._gone, RayLostError, _say_farewell, KNOCK_S if address else LOOK_S)
+        self.watch = Watch(self._gone, RayGoneError, _say_farewell, KNOCK_S if address else LOOK_S)
         self.watch.start()
 
     def _listen(self) -> None:

@@ -28,6 +28,11 @@ class RayLostError(EvaluatorError):
     """Ray was there and is gone, or did not come up."""
 
 
+class RayGoneError(BaseException):
+    """The same, said to a run in the midst of something else. No library that swallows what goes wrong in it may swallow this:
+    rerun's makes a warning of every ``Exception``, and a broken picture of what it was at."""
+
+
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Workers are one process a core: numerical libraries must not start threads of their own in them."""
 NICENESS = "RAY_worker_niceness"

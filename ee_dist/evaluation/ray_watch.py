@@ -59,7 +59,7 @@ class Watch(threading.Thread):
     def __init__(
         self,
         find: Callable[[], str | None],
-        error: Callable[[str], Exception],
+        error: Callable[[str], BaseException],
         farewell: Callable[[str], None],
         look_s: float = LOOK_S,
     ) -> None:

@@ -17,7 +17,7 @@ from ee_dist.engines.contract import EngineError
 from ee_dist.engines.drivers import DriverError
 from ee_dist.evaluation.ray_apart import abandon_ray, when_lost
 from ee_dist.evaluation.ray_folder import remove_orphans
-from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError
+from ee_dist.evaluation.ray_session import EvaluatorError, RayGoneError, RayLostError
 from ee_dist.recording.errors import RecordingError
 from ee_dist.robots.model import RobotError
 from ee_dist.tasks.config import ConfigError, known_settings, unknown_key
@@ -28,6 +28,7 @@ from ee_dist.trials.log import LogError
 
 __all__ = (
     "USER_ERRORS",
+    "RayGoneError",
     "RayLostError",
     "abandon_evaluators",
     "defect",

@@ -25,6 +25,7 @@ from ee_dist.discrepancy.ways.force_balance.places import Way, share_of_no_place
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.measurements.sampling import LowPass, decimated
 from ee_dist.robots.instruments import with_motor_torques
@@ -205,3 +206,16 @@ def test_in_trials_of_unequal_length_equal_errors_look_equal() -> None:
     np.testing.assert_allclose(cells**2, np.where(problem.trial_of_segment == 0, 2.0, 1.0))
     np.testing.assert_allclose(trials, [problem.trial_error(residual, k) for k in range(2)])
     assert compare(problem, residual).channels[0].worst_trial == "motion 0"
+
+
+@pytest.mark.parametrize("noise", [2e-3, 1.4e-3, 1e-3, 5e-4])
+def test_the_roughness_of_precise_sensors_has_the_floor_that_their_noise_gives_it(noise: float) -> None:
+    """From as much as counts down to a quarter of that: the noise of a channel moves the log of its roughness by less than its
+    own share, and by more than the square of that."""
+    plain = samples()["arm"]
+    robot = with_noise(two_joint_arm(), noise)
+    sample = Sample(robot, (), sines(robot, 0.3, 12.0), plain.ways)
+    problem = OpenLoop(measure(sample, ()), robot, evaluator_for(robot))
+    texture = ~problem.layout.reading
+    left, floor = problem.residuals([()])[0][texture], problem.floor[texture]
+    assert 0.7 < np.mean(left**2) / np.mean(floor) < 1.1

@@ -14,10 +14,11 @@ from types import SimpleNamespace
 
 import psutil
 import pytest
+from rerun.error_utils import catch_and_log_exceptions
 
 from ee_dist.evaluation import ray_apart, ray_watch
 from ee_dist.evaluation.ray_apart import RayApart, abandon_ray, stop_ray
-from ee_dist.evaluation.ray_session import EvaluatorError, RayLostError
+from ee_dist.evaluation.ray_session import EvaluatorError, RayGoneError, RayLostError
 
 STAND_IN = """
 import json, os, subprocess, sys, threading, time
@@ -79,8 +80,20 @@ def test_its_end_without_a_word_is_told_at_once_and_nothing_is_left(apart):
 
 def test_a_run_that_is_busy_elsewhere_is_told_of_its_end(apart):
     apart.evaluate([job("die_soon")])
-    with pytest.raises(RayLostError, match="has ended"):
+    with pytest.raises(RayGoneError, match="has ended"):
         time.sleep(60)
+
+
+def test_a_picture_that_is_being_made_swallows_no_such_end(apart):
+    """Rerun's library makes a warning of what is raised in it."""
+
+    @catch_and_log_exceptions()
+    def draw() -> None:
+        time.sleep(60)
+
+    apart.evaluate([job("die_soon")])
+    with pytest.raises(RayGoneError, match="has ended"):
+        draw()
 
 
 def test_a_lost_raylet_is_seen_where_rays_library_is_stuck(apart, tmp_path, monkeypatch):
@@ -90,7 +103,7 @@ def test_a_lost_raylet_is_seen_where_rays_library_is_stuck(apart, tmp_path, monk
     shutil.copy(sleep, tmp_path / "raylet")
     abandon_ray()
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(RayLostError, match="its process raylet has ended"):
+    with pytest.raises((RayGoneError, RayLostError), match="its process raylet has ended"):
         RayApart(3).evaluate([job("stall")])
 
 

@@ -46,6 +46,8 @@ TOGETHER = 4_000_000
 """Residual values that are computed together: of long logs those of a few hypotheses."""
 COMMAND_SHARE = 0.005
 """Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
+TINY = 0.25
+"""Share of a channel's scale whose roughness is too small to count."""
 _SOFT_FLOOR = 0.974
 """Mean square of SOFT * asinh(x / SOFT) for standard normal x."""
 _ROUGH_FLOOR = 0.93
@@ -148,7 +150,7 @@ class OpenLoop(Problem):
 
     @property
     def _tiny(self) -> Array:
-        return (0.25 * self.scale.scale) ** 2
+        return (TINY * self.scale.scale) ** 2
 
     def _rough(self, predicted: Digest) -> Array:
         """(windows, S) of a prediction, with the noise that no description declares."""
@@ -200,7 +202,9 @@ class OpenLoop(Problem):
         self.slices: list[slice] = []
         s, per = len(self.robot.sensors), self.window // self.block
         at = 0
-        noisy = (self.scale.noise / self.scale.scale) ** 2
+        # How far noise moves the log of roughness beside what is too small to count, as a share of what it does alone.
+        noise = self.scale.noise**2
+        noisy = (noise / (noise + self._tiny) * (1.0 + TINY**2)) ** 2
         pure = 2 * 1.95 / self.window + 0.01
         for k, trial in enumerate(self.measured):
             blocks, windows = self._rows[k] // self.block, self._rows[k] // self.window
