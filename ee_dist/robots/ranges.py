@@ -13,7 +13,9 @@ from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.model import Drive, Joint, Robot, RobotError
 
 WIDEST = 4 * math.pi
-"""What a hinge that turns on and on counts as at most, rad."""
+"""What a hinge that turns on and on counts as at most, rad,"""
+ROUNDED = 1e-3
+"""and by what share a file may round it up: two turns are often entered as 6.28319 to each side."""
 FULL_M = 2.0
 """What a slide without ends counts as, m."""
 
@@ -29,7 +31,7 @@ def drive_of(robot: Robot, joint: str) -> Drive:
 def span(joint: Joint) -> tuple[float, float]:
     """(lowest, highest) position that a command or a scale reckons with, rad (m)."""
     most = WIDEST if joint.kind == "hinge" else math.inf
-    if joint.upper - joint.lower <= most * (1 + 1e-9) and math.isfinite(joint.upper - joint.lower):
+    if joint.upper - joint.lower <= most * (1 + ROUNDED) and math.isfinite(joint.upper - joint.lower):
         return joint.lower, joint.upper
     half = WIDEST / 4 if joint.kind == "hinge" else FULL_M / 2
     middle = (joint.lower + joint.upper) / 2

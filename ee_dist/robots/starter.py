@@ -14,7 +14,7 @@ from ee_dist.robots.body import Body
 from ee_dist.robots.described import ASSUMED, GRAVITY_M_S2, robot_of_body
 from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.model import Joint, Robot
-from ee_dist.robots.ranges import span, travel
+from ee_dist.robots.ranges import travel
 
 SETTLING_RAD, SETTLING_M = 0.1, 0.01
 """Error at which an assumed position controller asks for all the torque that there is."""
@@ -87,7 +87,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         lines.insert(2, f"# time_step_s: {robot.time_step_s:g}  # assumed: {STEP}")
         assumed.append(f"time_step_s: {robot.time_step_s:g} s, {STEP}")
     text = "\n".join(lines) + "\n"
-    moved = {j.child for j in robot.joints}
+    moved = _moved(robot)
     heavy = sum(p.mass_kg for p in robot.parts if free or p.name in moved)
     read = (
         f"{len(robot.parts)} parts, {heavy:.4g} kg" + ("" if free else " of them move"),
@@ -143,6 +143,17 @@ def _drive(joint: Joint, body: Body, inertia: Mapping[str, float]) -> tuple[dict
     return {k: known[k] for k in [*(o for o in order if o in known), *(k for k in known if k not in order)]}, guessed
 
 
+def _moved(robot: Robot) -> set[str]:
+    """The parts below a joint that can move; what is bolted to a bolted base stays."""
+    carried = {j.child: j for j in robot.joints}
+
+    def moves(part: str) -> bool:
+        joint = carried.get(part)
+        return joint is not None and (joint.kind != "fixed" or moves(joint.parent))
+
+    return {p.name for p in robot.parts if moves(p.name)}
+
+
 def _acted_on(known: Mapping[str, float | str]) -> bool:
     return known.get("command") != "none" or not set(known) <= {"command", "torque_limit"}
 
@@ -154,7 +165,7 @@ def _rounded(value: float) -> float:
 
 def _row(robot: Robot, joint: Joint) -> tuple[str, ...]:
     drive = next(d for d in robot.drives if d.joint == joint.name)
-    stops = span(joint) == (joint.lower, joint.upper)
+    stops = all(map(math.isfinite, joint.ends))
     reach = (
         (f"{joint.lower:.3g}", f"{joint.upper:.3g}")
         if stops

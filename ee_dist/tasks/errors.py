@@ -72,6 +72,8 @@ def abandon_evaluators() -> None:
 
 def unasked_end(error: BaseException) -> str:
     """A run that was ended from within: by code of the user's that calls ``sys.exit``, or for want of memory."""
+    if isinstance(error.__context__, BrokenPipeError):
+        return "whoever read what this prints has ended, and so the run has"
     where = _of_plugin(error)
     if isinstance(error, MemoryError):
         return (

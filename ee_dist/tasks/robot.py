@@ -82,9 +82,11 @@ def text_of(found: Starter) -> str:
 
 def tell(console: Console, found: Starter, file: Path) -> None:
     """Print what was read, assumed and missing."""
-    joints = Table(title=found.robot.name, title_justify="left", box=None)
+    joints = Table(title=found.robot.name, title_justify="left", box=None, padding=(0, 1, 0, 0))
     for k, name in enumerate(JOINT_COLUMNS):
-        joints.add_column(name, no_wrap=k == 0, justify="left" if k in (0, 3) else "right")
+        # Where there is little room titles and names are folded, and numbers whole.
+        widest = max((len(row[k]) for row in found.joints if k), default=8)
+        joints.add_column(name, min_width=widest, overflow="fold", justify="left" if k in (0, 3) else "right")
     for row in found.joints:
         joints.add_row(*row)
     console.print(joints)

@@ -208,7 +208,7 @@ ONE = '<mujoco><worldbody><body name="b"><joint/>{}<geom size="0.1"/></body></wo
         (ONE.format('<inertial mass="1e308" pos="0 0 0" diaginertia="1 1 1"/>', ""), "mass_kg: 1e.308; expected"),
         (ONE.format('<inertial mass="nan" pos="0 0 0" diaginertia="1 1 1"/>', ""), "MuJoCo cannot build it"),
         (ONE.format("<nonsense/>", ""), "MuJoCo cannot build it: .*nonsense"),
-        ("<mujoco/>", "no <body> in it"),
+        ("<mujoco/>", "no <body> within its <worldbody>"),
         (ONE.replace("<joint/>", '<joint type="ball"/>').format("", ""), "is a ball; write it as three hinges"),
         (ONE.format("", "<worldbody><body><freejoint/><geom size='1'/></body></worldbody>"), "the robot alone"),
         ('<mujoco><worldbody><body><joint/><geom type="mesh" mesh="m"/></body></worldbody><asset><mesh name="m" '

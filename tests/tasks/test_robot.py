@@ -8,7 +8,9 @@ import pytest
 import yaml
 
 from ee_dist.robots.describe import load_robot
+from ee_dist.robots.ranges import span
 from ee_dist.robots.serial import robot_to_dict
+from ee_dist.tasks.errors import unasked_end
 from ee_dist.tasks.robot import sweep
 
 ARM = Path(__file__).parents[2] / "docs" / "examples" / "arm.urdf"
@@ -100,3 +102,32 @@ def test_marks_that_cannot_be_are_one_line_wherever_a_robot_comes_from(cli, tmp_
     assert outcome.status == 2
     assert said in outcome.err
     assert len(outcome.err.strip().splitlines()) == 1
+
+
+def test_what_is_bolted_down_does_not_move_and_two_turns_are_a_limit(cli, tmp_path):
+    """A table beside the arm weighs what it likes; files round two turns up."""
+    file = tmp_path / "bench.xml"
+    file.write_text(
+        '<mujoco model="bench"><compiler angle="radian"/><worldbody><body name="table"><geom size="0.2" mass="30"/>'
+        '<body name="first_link_of_the_arm"><joint name="a_joint_with_a_long_name" axis="0 1 0" range="-6.28319 6.28319"/>'
+        '<geom size="0.05" mass="2" pos="0 0 -0.1"/><body name="tool"><geom size="0.05" mass="0.5" pos="0 0 -0.2"/></body>'
+        "</body></body></worldbody>"
+        '<actuator><position joint="a_joint_with_a_long_name" kp="1234.5" kv="123.4" forcerange="-150.5 150.5"/></actuator>'
+        "</mujoco>"
+    )
+    outcome = cli("task=robot", f"mjcf={file}")
+    assert outcome.status == 0, outcome.err
+    assert "2.5 kg of them move" in outcome.out
+    (row,) = [line for line in outcome.out.splitlines() if "position" in line and "-6.28" in line]
+    assert "6.28 position 1234" in row
+    assert "…" not in outcome.out
+    (run,) = outcome.runs()
+    joint = load_robot(run / "robot.yaml")[0].joint("a_joint_with_a_long_name")
+    assert span(joint) == (joint.lower, joint.upper)
+
+
+def test_who_stops_reading_ends_the_run_in_words():
+    stop = SystemExit(1)
+    stop.__context__ = BrokenPipeError()
+    assert "sys.exit" not in unasked_end(stop)
+    assert "sys.exit(3)" in unasked_end(SystemExit(3))

@@ -76,7 +76,9 @@ class _Reader:
         free = [j for j in range(m.njnt) if m.jnt_type[j] == _FREE]
         tops = [b for b in range(1, m.nbody) if m.body_parentid[b] == 0]
         if not tops:
-            raise MjcfError(f"{self.file}: no <body> in it")
+            raise MjcfError(
+                f"{self.file}: no <body> within its <worldbody>; a part that others include is no robot by itself"
+            )
         if (m.jnt_type == _BALL).any():
             j = int(np.argmax(m.jnt_type == _BALL))
             raise MjcfError(f"{self.file}: joint {quoted(self.name(j, 'joint'))} is a ball; write it as three hinges")

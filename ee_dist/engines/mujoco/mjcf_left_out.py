@@ -26,14 +26,18 @@ _SWITCHES = {
 
 def left_out(m: Any) -> Iterator[str]:
     """One line for each kind of thing."""
-    for count, what in (
-        (int(m.neq), "equality constraints"),
-        (int(m.ntendon), "tendons"),
-        (int(m.nflex), "flexible bodies"),
-        (int((m.jnt_actgravcomp != 0).sum() + (m.body_gravcomp != 0).sum()), "gravity compensations"),
+    for count, one, many in (
+        (int(m.neq), "equality constraint", "equality constraints"),
+        (int(m.ntendon), "tendon", "tendons"),
+        (int(m.nflex), "flexible body", "flexible bodies"),
+        (
+            int((m.jnt_actgravcomp != 0).sum() + (m.body_gravcomp != 0).sum()),
+            "gravity compensation",
+            "gravity compensations",
+        ),
     ):
         if count:
-            yield f"{count} {what} left out"
+            yield f"{count} {one if count == 1 else many} left out"
     switched = [name for name, bit in _SWITCHES.items() if int(m.opt.disableflags) & int(bit)]
     if switched:
         yield f"switched off in the file, but not here: {', '.join(switched)}"
