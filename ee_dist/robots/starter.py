@@ -37,6 +37,7 @@ class Starter:
     read: tuple[str, ...]
     assumed: tuple[str, ...]
     missing: tuple[str, ...]
+    moving_kg: float
 
 
 JOINT_COLUMNS = ("joint", "from", "to", "command", "kp", "kd", "limit", "viscous", "dry", "rotor")
@@ -104,6 +105,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         (*read, *said),
         tuple(assumed),
         _missing(robot, any("rotor_inertia" in guessed for _, guessed in drives.values())) + _trusted(robot),
+        heavy,
     )
 
 

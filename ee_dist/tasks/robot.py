@@ -58,6 +58,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     rest = {
         "robot": robot.name,
         "mass_kg": sum(p.mass_kg for p in robot.parts),
+        "moving_mass_kg": found.moving_kg,
         "degrees_of_freedom": sum(j.kind != "fixed" for j in robot.joints) + 6 * robot.free_base,
         "joints": [dict(zip(JOINT_COLUMNS, row, strict=True)) for row in found.joints],
         "read": list(found.read),

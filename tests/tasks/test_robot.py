@@ -118,6 +118,7 @@ def test_what_is_bolted_down_does_not_move_and_two_turns_are_a_limit(cli, tmp_pa
     outcome = cli("task=robot", f"mjcf={file}")
     assert outcome.status == 0, outcome.err
     assert "2.5 kg of them move" in outcome.out
+    assert (outcome.summary()["mass_kg"], outcome.summary()["moving_mass_kg"]) == pytest.approx((32.5, 2.5))
     (row,) = [line for line in outcome.out.splitlines() if "position" in line and "-6.28" in line]
     assert "6.28 position 1234" in row
     assert "…" not in outcome.out
