@@ -214,7 +214,7 @@ def test_the_roughness_of_precise_sensors_has_the_floor_that_their_noise_gives_i
     own share, and by more than the square of that."""
     plain = samples()["arm"]
     robot = with_noise(two_joint_arm(), noise)
-    sample = Sample(robot, (), sines(robot, 0.3, 12.0), plain.ways)
+    sample = Sample(robot, sines(robot, 0.3, 12.0), (), plain.ways)
     problem = OpenLoop(measure(sample, ()), robot, evaluator_for(robot))
     texture = ~problem.layout.reading
     left, floor = problem.residuals([()])[0][texture], problem.floor[texture]
