@@ -205,7 +205,7 @@ def main() -> int:
         hydra.main(version_base="1.3", config_path=str(folder), config_name="config")(run)()
         if _jobs.broken:
             return _complain(_jobs.account(), _jobs.status)
-    except (*USER_ERRORS, Refused) as error:
+    except (*USER_ERRORS, RayGoneError, Refused) as error:
         return _complain(str(error))
     except HydraException as error:
         return _complain(hydra_message(error))

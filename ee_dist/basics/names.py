@@ -43,6 +43,11 @@ def listed_or(names: list[str]) -> str:
     return " or ".join(_plain(n) if len(n) <= LONGEST else f"{_plain(n[:LONGEST])}..." for n in names)
 
 
+def counted(number: int, what: str, many: str = "") -> str:
+    """``1 tendon``, ``2 tendons``; ``many`` where that is no plain plural."""
+    return f"{number} {what if number == 1 else many or what + 's'}"
+
+
 def _plain(name: str) -> str:
     """As it is, but for signs that end a line or cannot be seen, which a file's names may have."""
     return name if name.isprintable() else repr(name)[1:-1]

@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from ee_dist.basics.names import listed
+from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
@@ -52,7 +52,7 @@ def assumed_text(robot: Robot) -> list[str]:
     """A line for people where a description only assumed what its controllers do."""
     count = len({j for j, f in robot.assumed if f != "command"})
     names = listed(dict.fromkeys(f for _, f in robot.assumed if f != "command"))
-    drives = "1 drive" if count == 1 else f"{count} drives"
+    drives = counted(count, "drive")
     return [f"The description only assumed {names} of {drives}: explain and improve look there first."] if count else []
 
 

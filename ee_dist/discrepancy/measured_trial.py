@@ -11,6 +11,7 @@ import scipy  # which loads its parts when they are used: signals take a second
 
 from ee_dist.discrepancy.steps import SPEEDS, between_steps, held
 from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.effects.fixture import STAND
 from ee_dist.engines.drivers import Commands, Driver, Network
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
@@ -57,7 +58,7 @@ def driver_of(excitation: Excitation, robot: Robot) -> Commands | Network:
 
 def setup_of(excitation: Excitation) -> Hypothesis:
     """How the robot is held."""
-    return (term("on_stand"),) if excitation.fixture == "stand" else ()
+    return (term(STAND),) if excitation.fixture == "stand" else ()
 
 
 def released(commands: Array) -> tuple[Array, Array | None]:

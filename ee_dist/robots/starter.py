@@ -37,7 +37,6 @@ class Starter:
     read: tuple[str, ...]
     assumed: tuple[str, ...]
     missing: tuple[str, ...]
-    moving_kg: float
 
 
 JOINT_COLUMNS = ("joint", "from", "to", "command", "kp", "kd", "limit", "viscous", "dry", "rotor")
@@ -88,10 +87,8 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         lines.insert(2, f"# time_step_s: {robot.time_step_s:g}  # assumed: {STEP}")
         assumed.append(f"time_step_s: {robot.time_step_s:g} s, {STEP}")
     text = "\n".join(lines) + "\n"
-    moved = _moved(robot)
-    heavy = sum(p.mass_kg for p in robot.parts if free or p.name in moved)
     read = (
-        f"{len(robot.parts)} parts, {heavy:.4g} kg" + ("" if free else " of them move"),
+        f"{len(robot.parts)} parts, {moving_mass(robot):.4g} kg" + ("" if free else " of them move"),
         f"{len(body.moving) + 6 * free} degrees of freedom: {len(body.moving)} joints"
         + (", base free" if free else ", base bolted down"),
         f"{sum(_acted_on(body.drives[name]) for name in body.driven)} joints with a drive or passive forces in the file",
@@ -105,7 +102,6 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         (*read, *said),
         tuple(assumed),
         _missing(robot, any("rotor_inertia" in guessed for _, guessed in drives.values())) + _trusted(robot),
-        heavy,
     )
 
 
@@ -145,15 +141,12 @@ def _drive(joint: Joint, body: Body, inertia: Mapping[str, float]) -> tuple[dict
     return {k: known[k] for k in [*(o for o in order if o in known), *(k for k in known if k not in order)]}, guessed
 
 
-def _moved(robot: Robot) -> set[str]:
-    """The parts below a joint that can move; what is bolted to a bolted base stays."""
-    carried = {j.child: j for j in robot.joints}
-
-    def moves(part: str) -> bool:
-        joint = carried.get(part)
-        return joint is not None and (joint.kind != "fixed" or moves(joint.parent))
-
-    return {p.name for p in robot.parts if moves(p.name)}
+def moving_mass(robot: Robot) -> float:
+    """Of all that can move, kg: what is bolted to a bolted base stays."""
+    if robot.free_base:
+        return sum(p.mass_kg for p in robot.parts)
+    moved = {name for j in robot.joints if j.kind != "fixed" for name in robot.subtree(j.child)}
+    return sum(p.mass_kg for p in robot.parts if p.name in moved)
 
 
 def _acted_on(known: Mapping[str, float | str]) -> bool:

@@ -16,7 +16,7 @@ from ee_dist.recording.records import HARDWARE, RunRecord, TrialRecord
 from ee_dist.robots.describe import kind_of, read_body
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import span
-from ee_dist.robots.starter import JOINT_COLUMNS, Starter, source_from, starter
+from ee_dist.robots.starter import JOINT_COLUMNS, Starter, moving_mass, source_from, starter
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.folder import check_file_name
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
@@ -58,7 +58,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     rest = {
         "robot": robot.name,
         "mass_kg": sum(p.mass_kg for p in robot.parts),
-        "moving_mass_kg": found.moving_kg,
+        "moving_mass_kg": moving_mass(robot),
         "degrees_of_freedom": sum(j.kind != "fixed" for j in robot.joints) + 6 * robot.free_base,
         "joints": [dict(zip(JOINT_COLUMNS, row, strict=True)) for row in found.joints],
         "read": list(found.read),

@@ -20,6 +20,7 @@ from ee_dist.discrepancy.measured_trial import driver_of
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, apply, find, from_dict, term
 from ee_dist.effects.described import check_written
+from ee_dist.effects.fixture import STAND
 from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.recording.records import HARDWARE, TrialRecord
@@ -99,7 +100,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     floor_seed, stand_seed = noise_seed.spawn(2)
     hardware = {
         "floor": PhysicalRobot(engine, robot, hidden, floor_seed),
-        "stand": PhysicalRobot(engine, robot, (*hidden, term("on_stand")), stand_seed),
+        "stand": PhysicalRobot(engine, robot, (*hidden, term(STAND)), stand_seed),
     }
     tried = {name: remembered(name, body or simulated, robot) for name, simulated in hardware.items()}
     path, sums = out / "trial.mcap", hashlib.sha256()

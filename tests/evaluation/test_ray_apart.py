@@ -16,6 +16,7 @@ import psutil
 import pytest
 from rerun.error_utils import catch_and_log_exceptions
 
+from ee_dist import __main__
 from ee_dist.evaluation import ray_apart, ray_watch
 from ee_dist.evaluation.ray_apart import RayApart, abandon_ray, stop_ray
 from ee_dist.evaluation.ray_session import EvaluatorError, RayGoneError, RayLostError
@@ -94,6 +95,18 @@ def test_a_picture_that_is_being_made_swallows_no_such_end(apart):
     apart.evaluate([job("die_soon")])
     with pytest.raises(RayGoneError, match="has ended"):
         draw()
+
+
+def test_a_ray_that_goes_outside_of_any_run_is_one_line_too(monkeypatch, capsys):
+    """Between two runs of a sweep, or while Hydra ends one."""
+
+    def gone(overrides: list[str]) -> None:
+        raise RayGoneError("Ray is lost: its process raylet has ended")
+
+    monkeypatch.setattr(__main__, "check_flags", gone)
+    monkeypatch.setattr(sys, "argv", ["ee_dist", "+scenario=8"])
+    assert __main__.main() != 0
+    assert capsys.readouterr().err == "ee_dist: Ray is lost: its process raylet has ended\n"
 
 
 def test_a_lost_raylet_is_seen_where_rays_library_is_stuck(apart, tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ee_dist.basics.names import counted
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed, plain
@@ -107,10 +108,6 @@ def slower(places: Sequence[str]) -> str:
 def _listed_places(places: Sequence[str]) -> str:
     more = f" and {len(places) - FEW} more" if len(places) > FEW else ""
     return ", ".join(map(plain, places[:FEW])) + more
-
-
-def counted(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def was_or_were(count: int) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ee_dist.basics.names import counted
 from ee_dist.discrepancy.accounts.account import (
     CONTENT,
     Account,
     advised,
     beside_floor,
-    counted,
     curves_of,
     error_name,
     left_text,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ee_dist.basics.names import counted
 from ee_dist.discrepancy.accounts.account import (
     BEYOND,
     CONTENT,
@@ -18,7 +19,6 @@ from ee_dist.discrepancy.accounts.account import (
     advised,
     before_and_after,
     beside_floor,
-    counted,
     curves_of,
     error_name,
     left_beside_noise,

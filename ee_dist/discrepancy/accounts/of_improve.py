@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ee_dist.basics.names import counted
 from ee_dist.discrepancy.accounts.account import (
     BEYOND,
     CONTENT,
@@ -16,7 +17,6 @@ from ee_dist.discrepancy.accounts.account import (
     advised,
     before_and_after,
     beside_floor,
-    counted,
     error_name,
     left_text,
     listed_few,

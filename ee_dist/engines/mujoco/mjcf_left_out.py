@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-from ee_dist.basics.names import listed
+from ee_dist.basics.names import counted, listed
 
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _OFF = mujoco.mjtDisableBit
@@ -26,18 +26,14 @@ _SWITCHES = {
 
 def left_out(m: Any) -> Iterator[str]:
     """One line for each kind of thing."""
-    for count, one, many in (
-        (int(m.neq), "equality constraint", "equality constraints"),
-        (int(m.ntendon), "tendon", "tendons"),
-        (int(m.nflex), "flexible body", "flexible bodies"),
-        (
-            int((m.jnt_actgravcomp != 0).sum() + (m.body_gravcomp != 0).sum()),
-            "gravity compensation",
-            "gravity compensations",
-        ),
+    for count, what in (
+        (int(m.neq), ("equality constraint",)),
+        (int(m.ntendon), ("tendon",)),
+        (int(m.nflex), ("flexible body", "flexible bodies")),
+        (int((m.jnt_actgravcomp != 0).sum() + (m.body_gravcomp != 0).sum()), ("gravity compensation",)),
     ):
         if count:
-            yield f"{count} {one if count == 1 else many} left out"
+            yield f"{counted(count, *what)} left out"
     switched = [name for name, bit in _SWITCHES.items() if int(m.opt.disableflags) & int(bit)]
     if switched:
         yield f"switched off in the file, but not here: {', '.join(switched)}"

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ee_dist.basics.names import counted
 from ee_dist.tasks.outcome import RESTORED
 from ee_dist.tasks.results import study_sections as parts
 from ee_dist.tasks.results.commands import command, setting
@@ -61,14 +62,14 @@ def study_page(
     restored, runs = sum(t["restored"] for t in totals.values()), len(rows)
     right, scored = sum(t["right"] for t in totals.values()), sum(t["scored"] for t in totals.values())
     named = sum(t["true_among_believed"] for t in totals.values())
-    head = f"Function restored in {restored} of {_count(runs, 'run')}"
+    head = f"Function restored in {restored} of {counted(runs, 'run')}"
     head += (
         f"; the diagnosis right in {right} of {scored}." if scored else "; what had happened to the robot is not known."
     )
     budgets, engines, seeds = (sorted({str(r[k]) for r in rows}) for k in ("budget", "engine", "seed"))
     page = Page(
-        f"Study: {_count(runs, 'run')}",
-        f"{_count(len({r['scenario'] for r in rows}), 'case')}, {'seed' if len(seeds) == 1 else 'seeds'} {', '.join(seeds)}; "
+        f"Study: {counted(runs, 'run')}",
+        f"{counted(len({r['scenario'] for r in rows}), 'case')}, {'seed' if len(seeds) == 1 else 'seeds'} {', '.join(seeds)}; "
         f"budget {', '.join(budgets)}; {', '.join(engines)}; {where}",
         head,
         tone="good" if restored == runs and right == scored and QUICK not in budgets else "open",
@@ -102,10 +103,6 @@ def study_page(
     return page
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
-
-
 def _mean(rows: Rows, key: str) -> float:
     return sum(float(r[key]) for r in rows) / len(rows)
 
@@ -126,7 +123,7 @@ def _sure(lines: Rows) -> str:
     of = "" if what == "case" else " of case and metric"
     clear = sum(x["test"].sure and x["test"].shift > 0 for x in tested)
     told = (
-        f"How sure: in {clear} of {_count(len(tested), what)}{of} the last trial goes farther than the one after the change by "
+        f"How sure: in {clear} of {counted(len(tested), what)}{of} the last trial goes farther than the one after the change by "
         f"more than luck (p < {SURE:g}, Wilcoxon signed rank test, corrected)"
     )
     fewest = min(x["runs"] for x in tested)
@@ -186,7 +183,7 @@ def _advice(rows: Rows, lines: Rows, budgets: Sequence[str]) -> list[str]:
     if any(not x["p_corrected"] < SURE for x in lines):
         cases = max(sum(x["metric"] == m for x in lines) for m in {x["metric"] for x in lines})
         return [
-            f"Next: more seeds (seed=0,1,2,...): with {_count(cases, 'case')} p can fall below {SURE:g} from "
+            f"Next: more seeds (seed=0,1,2,...): with {counted(cases, 'case')} p can fall below {SURE:g} from "
             f"{seeds_for(cases)} seeds on."
         ]
     return ["Next: nothing has to be done."]

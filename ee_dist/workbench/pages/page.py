@@ -8,6 +8,7 @@ from typing import Any
 from nicegui import background_tasks, ui
 from nicegui.events import KeyEventArguments
 
+from ee_dist.basics.names import counted
 from ee_dist.discrepancy.words import plain
 from ee_dist.trials.log import Array
 from ee_dist.workbench import verbs
@@ -147,7 +148,7 @@ class Page:
             self.title.set_text(f"{plain(measured.robot.name)}: {names}")
             way = "" if sight is None else f", compared by {plain(sight.way.name)}"
             self.subtitle.set_text(
-                f"{_many(len(measured.trials), 'trial')}{way}; {_many(len(session.bench.terms), 'effect')} in the model"
+                f"{counted(len(measured.trials), 'trial')}{way}; {counted(len(session.bench.terms), 'effect')} in the model"
             )
         if seen is not None and sight is not None and topics & {"seen", "opened"}:
             self.show_error(seen.found.error)
@@ -238,7 +239,3 @@ class Page:
             await self.begin(verbs.EXPLAIN)
         elif key == "Escape":
             self.session.cancel()
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}" + ("" if count == 1 else "s")
