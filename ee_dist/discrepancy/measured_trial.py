@@ -17,8 +17,8 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array, SensorLog
 
-SMOOTHED = 15
-"""Rows that a parabola is laid through to smooth a noisy speed."""
+SMOOTHED, SMOOTH_ORDER = 15, 2
+"""Rows that a parabola is laid through to smooth a noisy speed; its order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,12 +171,31 @@ def read_speeds(log: SensorLog, read: SpeedSensors) -> Array:
     assert log.joints is not None
     out = _slopes(log.joints, float(np.median(np.diff(log.times_s))))
     for k, c, noise in read:
-        seen = log.sensors[:, c]
-        if not noise or len(seen) <= SMOOTHED:
-            out[:, k] = seen
-            continue
-        smooth = scipy.signal.savgol_filter(seen, SMOOTHED, 2)
+        seen, smooth = log.sensors[:, c], _smooth(log.sensors[:, c], noise)
         # Where a joint starts or stops within a few rows it is the curve that is wrong, and by more than any noise.
         out[:, k] = np.where(np.abs(smooth - seen) > SUDDEN * noise, seen, smooth)
     out.setflags(write=False)
     return out
+
+
+def first_speeds_off(log: SensorLog, read: SpeedSensors, joints: int) -> Array:
+    """(M,) of ``joints``: standard deviations of the first of the speeds that ``read_speeds`` knows, by the noise that sensors
+    declare; 0 where they declare none."""
+    out = np.zeros(joints)
+    for k, c, noise in read:
+        seen, smooth = log.sensors[:, c], _smooth(log.sensors[:, c], noise)
+        parts = abs(float(smooth[0] - seen[0]))
+        if parts == 0.0 or parts > SUDDEN * noise:
+            out[k] = noise
+            continue
+        # The noise of a curve's end, and what the curve parts from the reading by beyond it.
+        end = float(np.linalg.norm(scipy.signal.savgol_coeffs(SMOOTHED, SMOOTH_ORDER, pos=0, use="dot")))
+        out[k] = np.sqrt((end * noise) ** 2 + max(parts**2 - noise**2, 0.0))
+    return out
+
+
+def _smooth(seen: Array, noise: float) -> Array:
+    """(T,) a smooth course through the readings of a sensor that is known to be noisy; the readings of any other."""
+    if not noise or len(seen) <= SMOOTHED:
+        return seen
+    return np.asarray(scipy.signal.savgol_filter(seen, SMOOTHED, SMOOTH_ORDER))

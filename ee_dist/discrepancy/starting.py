@@ -12,7 +12,14 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, SpeedSensors, evenly_read, read_speeds, speed_sensors
+from ee_dist.discrepancy.measured_trial import (
+    MeasuredTrial,
+    SpeedSensors,
+    evenly_read,
+    first_speeds_off,
+    read_speeds,
+    speed_sensors,
+)
 from ee_dist.discrepancy.slow_noise import slow_noise
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, State
@@ -29,6 +36,16 @@ def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
     if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
         return None
     return State(log.joints[0].copy(), starting_speeds(trial, robot)[0].copy())
+
+
+def starts_beside(trial: MeasuredTrial, robot: Robot) -> list[State]:
+    """Where it may have begun as well: one standard deviation of the noise that sensors of speed declare beside ``start_of``, a
+    joint at a time. None where that is not told by them."""
+    start = start_of(trial, robot)
+    if start is None or trial.commands_held:
+        return []
+    off = first_speeds_off(trial.log, speed_sensors(robot), len(start.speeds))
+    return [State(start.joints, start.speeds + step) for step in np.diag(off) if step.any()]
 
 
 def starting_speeds(trial: MeasuredTrial, robot: Robot) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -219,3 +220,25 @@ def test_the_roughness_of_precise_sensors_has_the_floor_that_their_noise_gives_i
     texture = ~problem.layout.reading
     left, floor = problem.residuals([()])[0][texture], problem.floor[texture]
     assert 0.7 < np.mean(left**2) / np.mean(floor) < 1.1
+
+
+def test_what_noisy_speeds_do_to_a_start_is_noise() -> None:
+    """A model starts as fast as a noisy sensor says. What that leaves in the first blocks of a robot that is described exactly is
+    in the floor, and the blocks are weighed by it."""
+    robot = two_joint_arm()
+    loud = tuple(replace(s, noise=0.3 if s.kind == "velocity" else 1e-3) for s in robot.sensors)
+    robot = replace(robot, sensors=loud)
+    evaluator = evaluator_for(robot)
+    first: list[tuple[float, float]] = []
+    for seed in range(12):
+        trials = measure(Sample(robot, sines(robot, 0.3, 3.0), (), ("open_loop",)), (), seed)
+        assert all(t.log.joints is not None and np.abs(t.log.joints[0]).max() > 0 for t in trials)
+        problem = OpenLoop(trials, robot, evaluator)
+        residual = problem.residuals([()])[0]
+        for k in range(len(trials)):
+            left = problem.blocks(k, residual) ** 2
+            floor = problem.floor[problem.slices[k]][: left.size].reshape(left.shape)
+            positions = [c for c, s in enumerate(robot.sensors) if s.kind == "position"]
+            first.append((left[:4, positions].mean(), floor[:4, positions].mean()))
+    left_first, floor_first = np.mean(first, axis=0)
+    assert 0.6 < left_first / floor_first < 1.5

@@ -17,6 +17,11 @@ from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.trials.log import Array
 
+SHOWS = 30.0
+"""Energy (in variances of noise) of a change of the prediction from which its shape tells what more of it would do."""
+FURTHER = 150
+"""Candidates at most whose small probes show and that are looked at further on: of fewer all are."""
+
 
 @dataclass(frozen=True, eq=False)
 class Screened:
@@ -36,29 +41,94 @@ def screen(
     refit: Refit = Refit(),  # noqa: B008
 ) -> list[Screened]:
     """Promise of each candidate on top of what the search has fixed, in the order of the pool. ``refit``: what the values of
-    the model so far can make up for by themselves is no promise."""
+    the model so far can make up for by themselves is no promise.
+
+    The smallest probes come first, to one side. What shows in them and is not among the FURTHER best by them needs no more, and
+    the larger ones go to the side that they promise. What does not show in them may show further on."""
     refit = refit.among(search)
     base = refit(search.base())
-    points = [(i, u) for i, c in enumerate(pool) for u in c.probes(shares)]
-    rows: list[list[tuple[Array, float, float, float]]] = [[] for _ in pool]
     total = float(base @ base)
-    for part in search.batches(len(points)):
-        some = points[part]
-        found = search.residuals([(pool[i].term(u),) for i, u in some])
-        for (i, u), r in zip(some, found, strict=True):
-            if np.isfinite(r).all():
-                rows[i].append((u, *_promise(base, refit(r), total, pool[i], u)))
-        search.progress("screening", part.stop / len(points))
+    rows: list[list[_Probe]] = [[] for _ in pool]
+    small = [(i, u) for i, c in enumerate(pool) for u in _smallest(c, shares)]
+    small_share = len(small) / max(1, sum(len(c.probes(shares)) for c in pool))
+
+    def ask(points: Sequence[tuple[int, Array]], begun: float, ended: float) -> None:
+        for part in search.batches(len(points)):
+            some = points[part]
+            found = search.residuals([(pool[i].term(u),) for i, u in some])
+            for (i, u), r in zip(some, found, strict=True):
+                if np.isfinite(r).all():
+                    rows[i].append(_promise(base, refit(r), total, pool[i], u))
+            search.progress("screening", begun + (ended - begun) * part.stop / len(points))
+
+    ask(small, 0.0, small_share)
+    ask([(i, u) for i in _further(pool, rows) for u in _larger(pool[i], shares, rows[i])], small_share, 1.0)
+    search.progress("screening", 1.0)
     return [_screened(c, found) for c, found in zip(pool, rows, strict=True)]
 
 
-def _promise(base: Array, r: Array, total: float, candidate: Candidate, u: Array) -> tuple[float, float, float]:
-    """(promise, best share of the probe, reach) of one probe."""
+@dataclass(frozen=True, eq=False)
+class _Probe:
+    """One value (u), the energy that it promises, at which share of it, the energy of the change it makes, and what part of the
+    residual (d, r) lies along that change."""
+
+    u: Array
+    promise: float
+    share: float
+    reach: float
+    along: float
+
+    @property
+    def shows(self) -> bool:
+        return self.reach >= SHOWS
+
+    @property
+    def unbounded(self) -> float:
+        """Energy that the change would take off at the best of all sizes."""
+        return self.along**2 / self.reach if self.reach > 0 else 0.0
+
+
+def _smallest(c: Candidate, shares: Sequence[float]) -> list[Array]:
+    """The smallest probe of each parameter, to the upper side where it has two."""
+    if not c.size:
+        return c.probes(shares)
+    least = min(shares)
+    return [
+        u for u in c.probes((least,)) if np.count_nonzero(u) == 1 and (u.max() > 0 or not c.upper[np.abs(u).argmax()])
+    ]
+
+
+def _further(pool: Sequence[Candidate], rows: Sequence[Sequence[_Probe]]) -> list[int]:
+    """Candidates that are looked at further on."""
+    hidden = [i for i, found in enumerate(rows) if pool[i].size and not any(p.shows for p in found)]
+    seen = [i for i, found in enumerate(rows) if pool[i].size and any(p.shows for p in found)]
+    best = sorted(seen, key=lambda i: -max(p.unbounded for p in rows[i]))[:FURTHER]
+    return sorted({*hidden, *best, *(i for i in seen if pool[i].guess)})
+
+
+def _larger(c: Candidate, shares: Sequence[float], found: Sequence[_Probe]) -> list[Array]:
+    """The other probes, without those of a parameter to the one of its two sides that its smallest one speaks against."""
+    against = {}
+    for p in found:
+        k = int(np.abs(p.u).argmax())
+        if p.shows and p.along and c.lower[k] < 0 < c.upper[k]:
+            against[k] = -np.sign(p.along * p.u[k])
+    done = [p.u for p in found]
+    out = []
+    for u in c.probes(shares):
+        k = int(np.abs(u).argmax())
+        alone = np.count_nonzero(u) == 1
+        if not any(np.array_equal(u, v) for v in done) and not (alone and np.sign(u[k]) == against.get(k)):
+            out.append(u)
+    return out
+
+
+def _promise(base: Array, r: Array, total: float, candidate: Candidate, u: Array) -> _Probe:
     d = base - r
-    reach = float(d @ d)
+    reach, along = float(d @ d), float(d @ base)
     if reach < 1e-9:
-        return 0.0, 0.0, 0.0
-    a = float(d @ base) / reach
+        return _Probe(u, 0.0, 0.0, 0.0, 0.0)
+    a = along / reach
     if not len(u):
         a = 1.0
     else:
@@ -66,24 +136,24 @@ def _promise(base: Array, r: Array, total: float, candidate: Candidate, u: Array
         low = -1.0 if (candidate.lower[np.abs(u).argmax()] < 0 and candidate.upper[np.abs(u).argmax()] > 0) else 0.0
         a = min(max(a, low / size), 1.0 / size)
         a = min(max(a, -3.0), 3.0)
-    linear = float(a * (d @ base) * 2 - a * a * reach)
+    linear = a * along * 2 - a * a * reach
     direct = total - float(r @ r)
-    return max(linear, direct, 0.0), (1.0 if direct >= linear else a), reach
+    return _Probe(u, max(linear, direct, 0.0), 1.0 if direct >= linear else a, reach, along)
 
 
-def _screened(candidate: Candidate, found: list[tuple[Array, float, float, float]]) -> Screened:
+def _screened(candidate: Candidate, found: Sequence[_Probe]) -> Screened:
     if not found:
         return Screened(candidate, 0.0, (), 0.0)
-    ordered = sorted(found, key=lambda f: -f[1])
+    ordered = sorted(found, key=lambda p: -p.promise)
     starts: list[Array] = []
     if candidate.size > 1:
         # The best point of each parameter, put together: the parameters of an effect often add up (x and y of a push).
         joint = np.zeros(candidate.size)
-        for u, promise, share, _ in reversed(ordered):
-            k = int(np.abs(u).argmax())
-            if promise > 0:
-                joint[k] = share * u[k]
+        for p in reversed(ordered):
+            k = int(np.abs(p.u).argmax())
+            if p.promise > 0:
+                joint[k] = p.share * p.u[k]
         starts.append(np.clip(joint, candidate.lower, candidate.upper))
-    for u, _, share, _ in ordered[:3]:
-        starts.append(np.clip(share * u, candidate.lower, candidate.upper) if len(u) else u)
-    return Screened(candidate, ordered[0][1], tuple(starts), max(f[3] for f in found))
+    for p in ordered[:3]:
+        starts.append(np.clip(p.share * p.u, candidate.lower, candidate.upper) if len(p.u) else p.u)
+    return Screened(candidate, ordered[0].promise, tuple(starts), max(p.reach for p in found))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
-from ee_dist.discrepancy.starting import start_of
+from ee_dist.discrepancy.starting import start_of, starts_beside
 from ee_dist.discrepancy.steps import centred
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands, Controllers, Network, command_scaling
@@ -201,6 +201,17 @@ class Predictor:
                 for i, seen in zip(some, self._reported(k, faulty), strict=True):
                     out[i] = seen
         return out
+
+    def by_start(self, trial: int, model: Robot) -> Array:
+        """(R // block, S) mean squares of block means by which the noise of the speeds that a trial starts with moves them."""
+        measured = self.trials[trial]
+        own = rollout_of(measured, model)
+        reduction = ToDigest(self.block, self.window, self.rows[trial], measured.early(self.base))
+        starts = starts_beside(measured, model)
+        jobs = [Job(r, reduction) for r in (own, *(replace(own, start=s) for s in starts))]
+        base, *others = self.evaluator.evaluate(jobs)
+        moved = [(d.means.astype(float) - base.means) ** 2 for d in others if d.finite and base.finite]
+        return np.asarray(np.sum([np.zeros(base.means.shape), *moved], axis=0))
 
     def _changed(self, model: Robot) -> list[int]:
         """The channels whose report takes more than adding the noise that the base model declares."""

@@ -130,12 +130,13 @@ class OpenLoop(Problem):
         found = self.predictor.digests(pairs)
         self.repeating = repeating(self.robot, zip(self._data, found[:: len(models)], strict=True), self.window)
         self._undeclared = self._rougher(found[:: len(models)])
+        self._begun = [self.predictor.by_start(k, held) for k, held in pairs[:: len(models)]]
         self.deviation: list[Array] = []
         self.grain_deviation: list[Array] = []
         for k in range(len(self.measured)):
             mine = found[k * len(models) : (k + 1) * len(models)]
             base, others = mine[0], [d for d in mine[1:] if d.finite]
-            noise = self.scale.scale**2 / self.block + self._known(k)[0]
+            noise = self.scale.scale**2 / self.block + self._begun[k] + self._known(k)[0]
             spread = np.zeros_like(base.means, dtype=float)
             grain = np.zeros_like(base.rough, dtype=float)
             if others and base.finite:
@@ -219,7 +220,7 @@ class OpenLoop(Problem):
             time += [np.repeat(middle, s), np.repeat(self._middles(k, self.window), 2 * s)]
             reading += [np.ones(blocks * s, dtype=bool), np.zeros(2 * windows * s, dtype=bool)]
             left = self._known(k)[0] / self.deviation[k] ** 2
-            share = self.scale.noise**2 / self.block / self.deviation[k] ** 2 + left
+            share = (self.scale.noise**2 / self.block + self._begun[k]) / self.deviation[k] ** 2 + left
             rough = _ROUGH_FLOOR * self._known(k)[1] / self.grain_deviation[k] ** 2
             grain = _ROUGH_FLOOR * noisy * pure / self.grain_deviation[k] ** 2 + rough
             texture = np.stack([grain, np.zeros_like(grain)], axis=1)
