@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from ee_dist.basics.names import counted, listed
 from ee_dist.robots.body import Body
 from ee_dist.robots.described import ASSUMED, GRAVITY_M_S2, robot_of_body
 from ee_dist.robots.inertia import felt_inertia
@@ -92,7 +93,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         f"{len(body.moving) + 6 * free} degrees of freedom: {len(body.moving)} joints"
         + (", base free" if free else ", base bolted down"),
         f"{sum(_acted_on(body.drives[name]) for name in body.driven)} joints with a drive or passive forces in the file",
-        f"{sum(len(p.shapes) for p in robot.parts)} shapes that can touch the floor",
+        *_shapes(robot),
     )
     said = tuple(n for n in notes if n not in body.assumed)
     return Starter(
@@ -101,7 +102,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         tuple(_row(robot, j) for j in body.moving),
         (*read, *said),
         tuple(assumed),
-        _missing(robot, any("rotor_inertia" in guessed for _, guessed in drives.values())) + _trusted(robot),
+        _missing(robot) + _trusted(robot),
     )
 
 
@@ -187,7 +188,15 @@ def _trusted(robot: Robot) -> tuple[str, ...]:
     )
 
 
-def _missing(robot: Robot, guessed_rotors: bool) -> tuple[str, ...]:
+def _shapes(robot: Robot) -> tuple[str, ...]:
+    """How many can touch something, of a robot that stands on a floor or could."""
+    count = sum(len(p.shapes) for p in robot.parts)
+    if robot.world.has_floor:
+        return (f"{counted(count, 'shape')} that can touch the floor",)
+    return (f"{counted(count, 'shape')}, and no floor to touch",) if count else ()
+
+
+def _missing(robot: Robot) -> tuple[str, ...]:
     found = []
     if robot.free_base and not any(p.shapes for p in robot.parts):
         found.append(
@@ -195,9 +204,14 @@ def _missing(robot: Robot, guessed_rotors: bool) -> tuple[str, ...]:
         )
     if not any(s.noise for s in robot.sensors):
         found.append("noise of the sensors: it is estimated from a log where none is stated")
-    if guessed_rotors or not any(d.rotor_inertia for d in robot.drives):
+    if not any(d.rotor_inertia for d in robot.drives):
         found.append(
             "rotor inertia of the motors (rotor_inertia): it may be as large as the arm's own behind a high gear"
+        )
+    elif guessed := robot.assumed_joints("rotor_inertia"):
+        found.append(
+            f"a measured rotor inertia of {listed(guessed)}: what is assumed may be several times off, and behind a high gear "
+            "it is as large as the arm's own"
         )
     if not any(d.coulomb or d.viscous for d in robot.drives):
         found.append("friction of the joints: explain and improve look for it")

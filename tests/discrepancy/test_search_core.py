@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +17,7 @@ from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.search import screen as screening
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates, known, parse
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
@@ -147,6 +150,45 @@ def test_screening_finds_the_exact_gain_of_a_linear_effect() -> None:
     top = max(promise, key=lambda k: promise[k])
     assert top == "motor_weak@hip_rear_left"
     assert promise[top] == pytest.approx(base @ base - best @ best, rel=0.05)
+
+
+class Asked(Linear):
+    """Remembers what it was asked; a torque that is weaker by less than ``dead`` does nothing."""
+
+    dead = 0.0
+
+    def shift(self, hypothesis: Hypothesis) -> Array:
+        alive = tuple(t for t in hypothesis if t.effect != "motor_weak" or t.values[0][1] > self.dead)
+        return 2.0 * super().shift(alive)
+
+    def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+        self.asked = [*getattr(self, "asked", []), *(t for h in hypotheses for t in h)]
+        return super().residuals(hypotheses, trials)
+
+
+def test_screening_looks_further_on_where_a_small_step_promises_something(monkeypatch: pytest.MonkeyPatch) -> None:
+    hidden = (term("joint_jam", "hip_rear_left", loss=0.5),)
+    problem = Asked(hidden)
+    every = {s.candidate.name: s.promise for s in screen(Search(problem), POOL)}
+    times = Counter(f"{t.effect}@{t.target}" for t in problem.asked)
+    assert max(times.values()) < 4, "of two sides the one that is promised"
+    monkeypatch.setattr(screening, "FURTHER", 3)
+    few = Asked(hidden)
+    found = {s.candidate.name: s.promise for s in screen(Search(few), POOL)}
+    times = Counter(f"{t.effect}@{t.target}" for t in few.asked)
+    assert sum(count > 1 for count in times.values()) == 3 and len(times) == len(POOL)
+    best = max(every, key=lambda name: every[name])
+    assert best == "joint_jam@hip_rear_left" and found[best] == every[best]
+
+
+def test_what_shows_in_no_small_step_is_looked_at_further_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(screening, "FURTHER", 0)
+    monkeypatch.setattr(Asked, "dead", 0.3)
+    found = {
+        s.candidate.name: s.promise
+        for s in screen(Search(Asked((term("motor_weak", "hip_rear_left", loss=0.5),))), POOL)
+    }
+    assert max(found, key=lambda name: found[name]) == "motor_weak@hip_rear_left"
 
 
 def test_unknown_names_are_told_with_the_nearest() -> None:

@@ -268,3 +268,18 @@ def test_what_holds_a_free_joint_is_said(tmp_path: Path) -> None:
     freely = '<body><joint type="free" damping="2" armature=".5"/>'
     file = written(tmp_path, f'{freely}<geom size=".1"/></body>')
     assert "the free joint's damping and armature left out" in read_mjcf(file).notes
+
+
+def test_joints_that_only_a_tendon_would_move_are_said_to_swing(tmp_path: Path) -> None:
+    links = "".join(
+        f'<body pos="0 0 {-k}"><joint name="{name}" axis="0 1 0"/>{POLE}</body>'
+        for k, name in enumerate(("a", "b", "c"))
+    )
+    rest = (
+        '<tendon><fixed name="both"><joint joint="b" coef="1"/><joint joint="c" coef="1"/></fixed></tendon>'
+        '<actuator><position joint="a" kp="10"/><position tendon="both" kp="10"/></actuator>'
+    )
+    body = read_mjcf(written(tmp_path, links, rest))
+    assert "joints that nothing drives here, and that swing: b, c" in body.notes
+    driven = read_mjcf(written(tmp_path, links, '<actuator><position joint="a" kp="10"/></actuator>'))
+    assert not any("swing" in note for note in driven.notes), "a file that leaves them loose means it"

@@ -12,6 +12,7 @@ from typing import Any
 
 import mujoco
 
+from ee_dist.basics.names import listed
 from ee_dist.robots.model import Sensor
 
 NEAR = 1e-3
@@ -50,6 +51,8 @@ def drives_of(m: Any, joints: Mapping[int, str]) -> tuple[dict[str, Fields], tup
         notes.append(f"actuators left out (only one drive of a joint is read, the first): {', '.join(further)}")
     if skipped:
         notes.append(f"actuators left out (not one of a joint, or of no known law): {', '.join(skipped)}")
+    if skipped and (loose := [n for n, fields in found.items() if "command" not in fields]):
+        notes.append(f"joints that nothing drives here, and that swing: {listed(loose)}")
     # Where the file drives some joints, it leaves the others to swing on purpose.
     driven = tuple(n for n, fields in found.items() if m.nu or any(k != "torque_limit" for k in fields))
     for name in driven:
