@@ -205,13 +205,18 @@ class Predictor:
     def by_start(self, trial: int, model: Robot) -> Array:
         """(R // block, S) mean squares of block means by which the noise of the speeds that a trial starts with moves them."""
         measured = self.trials[trial]
+        moved = np.zeros((len(measured.log.readings) // self.block, len(self.base.sensors)))
+        starts = starts_beside(measured, model)
+        if not starts:
+            return moved
         own = rollout_of(measured, model)
         reduction = ToDigest(self.block, self.window, self.rows[trial], measured.early(self.base))
-        starts = starts_beside(measured, model)
         jobs = [Job(r, reduction) for r in (own, *(replace(own, start=s) for s in starts))]
-        base, *others = self.evaluator.evaluate(jobs)
-        moved = [(d.means.astype(float) - base.means) ** 2 for d in others if d.finite and base.finite]
-        return np.asarray(np.sum([np.zeros(base.means.shape), *moved], axis=0))
+        found: list[Digest] = list(self.evaluator.evaluate(jobs))
+        if found[0].finite:
+            for d in found[1:]:
+                moved += (d.means.astype(float) - found[0].means) ** 2 if d.finite else 0.0
+        return moved
 
     def _changed(self, model: Robot) -> list[int]:
         """The channels whose report takes more than adding the noise that the base model declares."""
