@@ -26,6 +26,8 @@ from ee_dist.trials.log import Array, State
 
 AROUND, CUBIC = (9, 5), 3
 """Readings that the curve is laid through, and fewer, which part from the first where it is too stiff; its order."""
+STOOD = 0.99
+"""Share of robots at rest whose sensors of speed read that little."""
 BEYOND = 3.0
 """Standard deviations of what the curve's own errors explain."""
 
@@ -35,14 +37,29 @@ def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
     log = trial.log
     if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
         return None
-    return State(log.joints[0].copy(), starting_speeds(trial, robot)[0].copy())
+    joints = log.joints[0].copy()
+    if _at_rest(trial, speed_sensors(robot)):
+        return State(joints, np.zeros(len(joints)))
+    return State(joints, starting_speeds(trial, robot)[0].copy())
+
+
+@lru_cache(maxsize=64)
+def _at_rest(trial: MeasuredTrial, sensors: SpeedSensors) -> bool:
+    """Whether the first readings of all joints' speeds, of a robot whose sensors declare their noise, are no more than that noise:
+    it stood, and what noise would make of a start is not simulated."""
+    log = trial.log
+    assert log.joints is not None
+    told = {joint: float(log.sensors[0, c]) / noise for joint, c, noise in sensors if noise}
+    if trial.commands_held or len(told) < log.joints.shape[1]:
+        return False
+    return sum(v**2 for v in told.values()) < float(scipy.stats.chi2.ppf(STOOD, len(told)))
 
 
 def starts_beside(trial: MeasuredTrial, robot: Robot) -> list[State]:
     """Where it may have begun as well: one standard deviation of the noise that sensors of speed declare beside ``start_of``, a
-    joint at a time. None where that is not told by them."""
+    joint at a time. None where that is not told by them, or it stood."""
     start = start_of(trial, robot)
-    if start is None or trial.commands_held:
+    if start is None or trial.commands_held or _at_rest(trial, speed_sensors(robot)):
         return []
     off = first_speeds_off(trial.log, speed_sensors(robot), len(start.speeds))
     return [State(start.joints, start.speeds + step) for step in np.diag(off) if step.any()]

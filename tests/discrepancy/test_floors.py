@@ -21,6 +21,7 @@ from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.starting import start_of, starts_beside
 from ee_dist.discrepancy.ways.force_balance.noise import roughness_of_noise, share_of_noise
 from ee_dist.discrepancy.ways.force_balance.places import Way, share_of_no_place
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
@@ -31,6 +32,7 @@ from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.measurements.sampling import LowPass, decimated
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.inverse_dynamics import parameters, regressor
+from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array, SensorLog
@@ -222,23 +224,45 @@ def test_the_roughness_of_precise_sensors_has_the_floor_that_their_noise_gives_i
     assert 0.7 < np.mean(left**2) / np.mean(floor) < 1.1
 
 
+def loud_arm() -> Robot:
+    """Whose sensors of speed are far worse than those of position."""
+    robot = two_joint_arm()
+    loud = tuple(replace(s, noise=0.3 if s.kind == "velocity" else 1e-3) for s in robot.sensors)
+    return replace(robot, sensors=loud)
+
+
 def test_what_noisy_speeds_do_to_a_start_is_noise() -> None:
     """A model starts as fast as a noisy sensor says. What that leaves in the first blocks of a robot that is described exactly is
     in the floor, and the blocks are weighed by it."""
-    robot = two_joint_arm()
-    loud = tuple(replace(s, noise=0.3 if s.kind == "velocity" else 1e-3) for s in robot.sensors)
-    robot = replace(robot, sensors=loud)
+    robot = loud_arm()
     evaluator = evaluator_for(robot)
+    positions = [c for c, s in enumerate(robot.sensors) if s.kind == "position"]
+    sample = Sample(robot, tuple(3.0 * s for s in sines(robot, 0.3, 3.0)), (), ("open_loop",))
     first: list[tuple[float, float]] = []
     for seed in range(12):
-        trials = measure(Sample(robot, sines(robot, 0.3, 3.0), (), ("open_loop",)), (), seed)
-        assert all(t.log.joints is not None and np.abs(t.log.joints[0]).max() > 0 for t in trials)
+        whole = measure(sample, (), seed)
+        # From where they move as fast as that sensors can tell.
+        begins = [
+            60 + int(np.abs(np.diff(np.asarray(t.log.joints), axis=0)[60:200].sum(axis=1)).argmax()) for t in whole
+        ]
+        trials = [replace(t, log=t.log.part(b, len(t.log)), driver=None) for t, b in zip(whole, begins, strict=True)]
         problem = OpenLoop(trials, robot, evaluator)
         residual = problem.residuals([()])[0]
         for k in range(len(trials)):
             left = problem.blocks(k, residual) ** 2
             floor = problem.floor[problem.slices[k]][: left.size].reshape(left.shape)
-            positions = [c for c, s in enumerate(robot.sensors) if s.kind == "position"]
             first.append((left[:4, positions].mean(), floor[:4, positions].mean()))
     left_first, floor_first = np.mean(first, axis=0)
     assert 0.6 < left_first / floor_first < 1.5
+
+
+def test_a_robot_whose_sensors_see_no_motion_stood() -> None:
+    robot = loud_arm()
+    for seed in range(4):
+        for trial in measure(Sample(robot, sines(robot, 0.3, 3.0), (), ("open_loop",)), (), seed):
+            start = start_of(trial, robot)
+            assert start is not None and not start.speeds.any() and starts_beside(trial, robot) == []
+            quick = trial.log.sensors.copy()
+            quick[0, [s.kind == "velocity" for s in robot.sensors]] = 2.0
+            moving = start_of(replace(trial, log=replace(trial.log, sensors=quick)), robot)
+            assert moving is not None and moving.speeds.all()
