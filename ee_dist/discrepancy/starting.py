@@ -45,7 +45,7 @@ def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
 
 @lru_cache(maxsize=64)
 def _at_rest(trial: MeasuredTrial, sensors: SpeedSensors) -> bool:
-    """Whether the first readings of all joints' speeds, of a robot whose sensors declare their noise, are no more than it: the robot
+    """Whether the first readings of all joints' speeds, of a robot whose sensors declare their noise, are no more than that: it
     stood, and what noise would make of a start is not simulated."""
     log = trial.log
     assert log.joints is not None
