@@ -56,6 +56,13 @@ def start_ray(address: str | None, workers: int, folder: str | None = None) -> N
     from ray._private import auto_init_hook, ray_constants
 
     global _guard, _address, _started, _heads
+    cores = os.cpu_count() or 1
+    if not address and workers > PER_CORE * cores:
+        # Before anything else: a Ray that is there already would begin to start them all, and take all memory.
+        raise EvaluatorError(
+            f"evaluator.workers={workers}: this machine has {cores} cores, and more than {PER_CORE * cores} workers "
+            "only take memory; choose fewer, or evaluator.workers=0 for one a core"
+        )
     if ray.is_initialized():
         return
     # Ray's answer to SIGTERM is a dump of stacks; ours is a line.
@@ -70,12 +77,6 @@ def start_ray(address: str | None, workers: int, folder: str | None = None) -> N
         options |= {"address": address, "runtime_env": {"env_vars": {**alike, **ONE_THREAD}}}
         environment: dict[str, str] = {}
     else:
-        cores = os.cpu_count() or 1
-        if workers > PER_CORE * cores:
-            raise EvaluatorError(
-                f"evaluator.workers={workers}: this machine has {cores} cores, and more than {PER_CORE * cores} workers "
-                "only take memory; choose fewer, or evaluator.workers=0 for one a core"
-            )
         _guard = None if folder else Guard()
         options |= {
             "address": "local",

@@ -140,10 +140,11 @@ def test_what_a_worker_raises_is_raised_here():
     evaluator.close()
 
 
-def test_more_workers_than_a_machine_can_have_are_refused():
+@pytest.mark.parametrize("running", [False, True])
+def test_more_workers_than_a_machine_can_have_are_refused(running: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     import ray
 
-    ray.shutdown()
+    monkeypatch.setattr(ray, "is_initialized", lambda: running)
     with pytest.raises(EvaluatorError, match=r"evaluator\.workers=100000: this machine has \d+ cores"):
         start_ray(None, 100_000)
 
