@@ -171,9 +171,7 @@ def read_speeds(log: SensorLog, read: SpeedSensors) -> Array:
     assert log.joints is not None
     out = _slopes(log.joints, float(np.median(np.diff(log.times_s))))
     for k, c, noise in read:
-        seen, smooth = log.sensors[:, c], _smooth(log.sensors[:, c], noise)
-        # Where a joint starts or stops within a few rows it is the curve that is wrong, and by more than any noise.
-        out[:, k] = np.where(np.abs(smooth - seen) > SUDDEN * noise, seen, smooth)
+        out[:, k] = _course(log.sensors[:, c], noise)
     out.setflags(write=False)
     return out
 
@@ -183,9 +181,9 @@ def first_speeds_off(log: SensorLog, read: SpeedSensors, joints: int) -> Array:
     declare; 0 where they declare none."""
     out = np.zeros(joints)
     for k, c, noise in read:
-        seen, smooth = log.sensors[:, c], _smooth(log.sensors[:, c], noise)
-        parts = abs(float(smooth[0] - seen[0]))
-        if parts == 0.0 or parts > SUDDEN * noise:
+        seen = log.sensors[:, c]
+        parts = float(_course(seen, noise)[0] - seen[0])
+        if parts == 0.0:
             out[k] = noise
             continue
         # The noise of a curve's end, and what the curve parts from the reading by beyond it.
@@ -194,8 +192,10 @@ def first_speeds_off(log: SensorLog, read: SpeedSensors, joints: int) -> Array:
     return out
 
 
-def _smooth(seen: Array, noise: float) -> Array:
-    """(T,) a smooth course through the readings of a sensor that is known to be noisy; the readings of any other."""
+def _course(seen: Array, noise: float) -> Array:
+    """(T,) speeds by the readings of a sensor: a smooth course through them, if it is known to be noisy. Where a joint starts or
+    stops within a few rows it is the curve that is wrong, and by more than any noise."""
     if not noise or len(seen) <= SMOOTHED:
         return seen
-    return np.asarray(scipy.signal.savgol_filter(seen, SMOOTHED, SMOOTH_ORDER))
+    smooth = scipy.signal.savgol_filter(seen, SMOOTHED, SMOOTH_ORDER)
+    return np.where(np.abs(smooth - seen) > SUDDEN * noise, seen, smooth)

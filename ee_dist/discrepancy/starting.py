@@ -27,7 +27,7 @@ from ee_dist.trials.log import Array, State
 AROUND, CUBIC = (9, 5), 3
 """Readings that the curve is laid through, and fewer, which part from the first where it is too stiff; its order."""
 STOOD = 0.99
-"""Share of robots at rest whose sensors of speed read that little."""
+"""Share of robots at rest whose sensors of speed read that little (a chi-square of as many degrees as joints)."""
 BEYOND = 3.0
 """Standard deviations of what the curve's own errors explain."""
 
@@ -37,32 +37,31 @@ def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
     log = trial.log
     if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
         return None
-    joints = log.joints[0].copy()
-    if _at_rest(trial, speed_sensors(robot)):
-        return State(joints, np.zeros(len(joints)))
-    return State(joints, starting_speeds(trial, robot)[0].copy())
-
-
-@lru_cache(maxsize=64)
-def _at_rest(trial: MeasuredTrial, sensors: SpeedSensors) -> bool:
-    """Whether the first readings of all joints' speeds, of a robot whose sensors declare their noise, are no more than that: it
-    stood, and what noise would make of a start is not simulated."""
-    log = trial.log
-    assert log.joints is not None
-    told = {joint: float(log.sensors[0, c]) / noise for joint, c, noise in sensors if noise}
-    if trial.commands_held or len(told) < log.joints.shape[1]:
-        return False
-    return sum(v**2 for v in told.values()) < float(scipy.stats.chi2.ppf(STOOD, len(told)))
+    speeds, _ = _first_speeds(trial, speed_sensors(robot))
+    return State(log.joints[0].copy(), speeds.copy())
 
 
 def starts_beside(trial: MeasuredTrial, robot: Robot) -> list[State]:
     """Where it may have begun as well: one standard deviation of the noise that sensors of speed declare beside ``start_of``, a
     joint at a time. None where that is not told by them, or it stood."""
     start = start_of(trial, robot)
-    if start is None or trial.commands_held or _at_rest(trial, speed_sensors(robot)):
+    if start is None:
         return []
-    off = first_speeds_off(trial.log, speed_sensors(robot), len(start.speeds))
+    _, off = _first_speeds(trial, speed_sensors(robot))
     return [State(start.joints, start.speeds + step) for step in np.diag(off) if step.any()]
+
+
+@lru_cache(maxsize=64)
+def _first_speeds(trial: MeasuredTrial, sensors: SpeedSensors) -> tuple[Array, Array]:
+    """(M,) with which a simulation begins, and (M,) standard deviations of their noise, of simulated logs as far as it is
+    declared. What reads no more than its noise at all joints stood: what noise would make of a start is not simulated."""
+    log, speeds = trial.log, _starting(trial, sensors)[0]
+    if trial.commands_held:
+        return speeds, np.zeros(len(speeds))
+    read = [float(log.sensors[0, c]) / noise for _, c, noise in sensors if noise]
+    if len(read) == len(speeds) and sum(v**2 for v in read) < 2.0 * scipy.special.gammaincinv(len(read) / 2, STOOD):
+        return np.zeros(len(speeds)), np.zeros(len(speeds))
+    return speeds, first_speeds_off(log, sensors, len(speeds))
 
 
 def starting_speeds(trial: MeasuredTrial, robot: Robot) -> Array:

@@ -92,35 +92,42 @@ def _smallest(c: Candidate, shares: Sequence[float]) -> list[Array]:
     """The smallest probe of each parameter, to the upper side where it has two."""
     if not c.size:
         return c.probes(shares)
-    least = min(shares)
-    return [
-        u for u in c.probes((least,)) if np.count_nonzero(u) == 1 and (u.max() > 0 or not c.upper[np.abs(u).argmax()])
-    ]
+    alone = [u for u in c.probes((min(shares),)) if np.count_nonzero(u) == 1]
+    return [u for u in alone if u.max() > 0 or not c.upper[_moved(u)]]
 
 
 def _further(pool: Sequence[Candidate], rows: Sequence[Sequence[_Probe]]) -> list[int]:
     """Candidates that are looked at further on."""
-    hidden = [i for i, found in enumerate(rows) if pool[i].size and not any(p.shows for p in found)]
-    seen = [i for i, found in enumerate(rows) if pool[i].size and any(p.shows for p in found)]
+    free = [i for i, c in enumerate(pool) if c.size]
+    seen = [i for i in free if any(p.shows for p in rows[i])]
     best = sorted(seen, key=lambda i: -max(p.unbounded for p in rows[i]))[:FURTHER]
-    return sorted({*hidden, *best, *(i for i in seen if pool[i].guess)})
+    needless = {i for i in seen if not pool[i].guess}.difference(best)
+    return [i for i in free if i not in needless]
 
 
 def _larger(c: Candidate, shares: Sequence[float], found: Sequence[_Probe]) -> list[Array]:
     """The other probes, without those of a parameter to the one of its two sides that its smallest one speaks against."""
     against = {}
     for p in found:
-        k = int(np.abs(p.u).argmax())
-        if p.shows and p.along and c.lower[k] < 0 < c.upper[k]:
+        k = _moved(p.u)
+        if p.shows and p.along and _two_sided(c, k):
             against[k] = -np.sign(p.along * p.u[k])
-    done = [p.u for p in found]
     out = []
     for u in c.probes(shares):
-        k = int(np.abs(u).argmax())
-        alone = np.count_nonzero(u) == 1
-        if not any(np.array_equal(u, v) for v in done) and not (alone and np.sign(u[k]) == against.get(k)):
+        k = _moved(u)
+        opposed = np.count_nonzero(u) == 1 and np.sign(u[k]) == against.get(k)
+        if not opposed and not any(np.array_equal(u, p.u) for p in found):
             out.append(u)
     return out
+
+
+def _moved(u: Array) -> int:
+    """The parameter that a probe moves, or moves most."""
+    return int(np.abs(u).argmax())
+
+
+def _two_sided(c: Candidate, k: int) -> bool:
+    return bool(c.lower[k] < 0 < c.upper[k])
 
 
 def _promise(base: Array, r: Array, total: float, candidate: Candidate, u: Array) -> _Probe:
@@ -133,7 +140,7 @@ def _promise(base: Array, r: Array, total: float, candidate: Candidate, u: Array
         a = 1.0
     else:
         size = float(np.abs(u).max())
-        low = -1.0 if (candidate.lower[np.abs(u).argmax()] < 0 and candidate.upper[np.abs(u).argmax()] > 0) else 0.0
+        low = -1.0 if _two_sided(candidate, _moved(u)) else 0.0
         a = min(max(a, low / size), 1.0 / size)
         a = min(max(a, -3.0), 3.0)
     linear = a * along * 2 - a * a * reach
@@ -150,7 +157,7 @@ def _screened(candidate: Candidate, found: Sequence[_Probe]) -> Screened:
         # The best point of each parameter, put together: the parameters of an effect often add up (x and y of a push).
         joint = np.zeros(candidate.size)
         for p in reversed(ordered):
-            k = int(np.abs(p.u).argmax())
+            k = _moved(p.u)
             if p.promise > 0:
                 joint[k] = p.share * p.u[k]
         starts.append(np.clip(joint, candidate.lower, candidate.upper))
