@@ -48,11 +48,20 @@ class RayApart:
         self.counts = Counts()
         if _process is not None and _process.why is not None:
             abandon_ray()
+        if _process is not None and _process.address != address:
+            # A sweep over addresses: a process joins one cluster, and takes no notice of another address from then on.
+            stop_ray()
+        begun = _process is None
         if _process is None:
             _process = _Process(address)
-        _process.ask("know", loaded_plugins())
-        folder = _process.guard.folder if _process.guard else None
-        self._name = _process.ask("make", make_engine, workers, chunk, address, folder)
+        try:
+            _process.ask("know", loaded_plugins())
+            folder = _process.guard.folder if _process.guard else None
+            self._name = _process.ask("make", make_engine, workers, chunk, address, folder)
+        except EvaluatorError:
+            if begun:  # it has joined nothing
+                abandon_ray()
+            raise
 
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
         if _process is None:

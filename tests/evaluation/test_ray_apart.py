@@ -24,13 +24,18 @@ from ee_dist.evaluation.ray_session import EvaluatorError, RayGoneError, RayLost
 STAND_IN = """
 import json, os, subprocess, sys, threading, time
 sys.path[:] = json.loads(sys.argv[1])
-from ee_dist.evaluation import ray_process
+from ee_dist.evaluation import ray_process, ray_session
 class Odd(Exception):
     def __init__(self, one, two):
         super().__init__(one)
 class Desk:
+    joined = False
     def know(self, plugins): pass
-    def make(self, make_engine, *_): return make_engine
+    def make(self, make_engine, workers, chunk, address, folder):
+        if address and not self.joined:
+            ray_session.knock(address)
+        self.joined = True  # as Ray does, it goes on with what it has joined
+        return make_engine
     def close(self, name): pass
     def stop(self): pass
     def evaluate(self, name, jobs): return [getattr(self, job.what)() for job in jobs]
@@ -145,6 +150,16 @@ def test_after_its_end_another_one_is_begun(apart):
     stop_ray()
     with pytest.raises(RayLostError, match="it was ended"):
         again.evaluate([job("work")])
+
+
+def test_another_address_is_another_ray(apart):
+    """A sweep over ``ray.address`` went on with the first one's, and an address where nobody answers began a run."""
+    first = ray_apart._process.process
+    with pytest.raises(EvaluatorError, match="no Ray cluster answers there"):
+        RayApart(3, address="127.0.0.1:1")
+    assert first.poll() is not None
+    assert ray_apart._process is None, "what has joined nothing goes on knocking"
+    assert RayApart(3).evaluate([job("work")]) != [first.pid]
 
 
 RUN = f"""
