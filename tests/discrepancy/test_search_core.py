@@ -19,8 +19,10 @@ from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, ex
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.search import screen as screening
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates, known, parse
+from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import follow_slopes
 from ee_dist.effects.catalogue import EffectError, Hypothesis, term
 from ee_dist.trials.log import Array
 
@@ -189,6 +191,48 @@ def test_what_shows_in_no_small_step_is_looked_at_further_on(monkeypatch: pytest
         for s in screen(Search(Asked((term("motor_weak", "hip_rear_left", loss=0.5),))), POOL)
     }
     assert max(found, key=lambda name: found[name]) == "motor_weak@hip_rear_left"
+
+
+class OneBlind(Asked):
+    """Motors that are weaker show in the second trial alone."""
+
+    def shift(self, hypothesis: Hypothesis) -> Array:
+        weaker = tuple(t for t in hypothesis if t.effect == "motor_weak")
+        others = tuple(t for t in hypothesis if t.effect != "motor_weak")
+        return np.asarray(super().shift(others) + np.where(self.trial_of == 0, 0.0, super().shift(weaker)))
+
+
+def test_screening_on_one_trial_looks_into_the_others_for_what_does_not_show_in_it() -> None:
+    problem = OneBlind((term("motor_weak", "hip_rear_left", loss=0.5),), motions=2)
+    found = {s.candidate.name: s for s in screen(Search(problem), POOL, trial=0)}
+    assert max(found, key=lambda name: found[name].promise) == "motor_weak@hip_rear_left"
+
+
+def test_screening_on_one_trial_promises_what_all_hold() -> None:
+    problem = Asked((term("joint_jam", "hip_rear_left", loss=0.5),), motions=2)
+    alone, both = (
+        {s.candidate.name: s.promise for s in screen(Search(problem), POOL, trial=trial)} for trial in (0, None)
+    )
+    best = max(both, key=lambda name: both[name])
+    assert best == "joint_jam@hip_rear_left" == max(alone, key=lambda name: alone[name])
+    assert alone[best] == pytest.approx(both[best], rel=0.2)
+
+
+def test_a_step_that_keeps_its_promise_is_not_tried_shorter_and_is_the_last() -> None:
+    """A straight problem: one slope and one step for each value, and no second look."""
+
+    class Counted(Linear):
+        count = 0
+
+        def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+            self.count += len(hypotheses)
+            return super().residuals(hypotheses, trials)
+
+    problem = Counted((term("motor_weak", "hip_rear_left", loss=0.4),))
+    search, c = Search(problem), candidate(ROBOT, "motor_weak", "hip_rear_left")
+    (fit,) = follow_slopes(search, [(Model((c,)), np.array([0.3]))], search.everything)
+    assert c.values(fit.u)["loss"] == pytest.approx(0.4, abs=0.02)
+    assert problem.count == 3, "the start, a slope and a step"
 
 
 def test_unknown_names_are_told_with_the_nearest() -> None:

@@ -15,8 +15,8 @@ Progress = Callable[[str, float], None]
 """Told (what is being done, share done in [0, 1])."""
 BATCH = 240
 """Hypotheses that are asked for in one call while many are probed, at most,"""
-VALUES = 2_000_000
-"""and residual values that they may have together: of long logs a call takes seconds and tens of MB with few of them."""
+VALUES = 8_000_000
+"""and residual values that they may have together: of long logs a call takes seconds and 64 MB with few of them."""
 FIRST = 6
 """How much smaller the first of them is."""
 

@@ -1,7 +1,7 @@
 """Fitting: bounded Gauss-Newton for many candidates at once, one evaluator call per step for all of them.
 
 A residual over seconds of contact is rugged in its parameters, so that a derivative at a point says little. Slopes are
-taken over a finite step, which begins wide and shrinks, and every step is tried at several lengths at once.
+taken over a finite step, which begins wide and shrinks, and a step that does not keep what it promised is tried shorter.
 """
 
 from __future__ import annotations
@@ -17,7 +17,11 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.trials.log import Array
 
 LENGTHS = (1.0, 0.5, 0.2)
-"""How far along the Gauss-Newton step to look."""
+"""How far along the Gauss-Newton step to look: at the shorter ones where the whole of it takes off less than"""
+KEPT = 0.75
+"""this share of what slopes foretell."""
+SAME = 0.5
+"""Energy that data tell nothing by: half of what it costs to have a value one standard deviation off."""
 WIDTHS = (0.12, 0.06, 0.03, 0.012)
 """Finite differences of the iterations, as shares of a parameter's room."""
 FINER, NARROWER = 6, 3.0
@@ -35,6 +39,8 @@ class _Run:
     slopes: Array | None = None
     origin: tuple[Array, Array] | None = None
     """Where the slopes were taken: values and residual."""
+    settled: bool = False
+    """Whether the last step came to what slopes foretold: another from there leads nowhere that data tell from here."""
 
 
 Evaluate = Callable[[Sequence[tuple[_Run, Array]]], list[tuple[float, Array]]]
@@ -71,8 +77,9 @@ def follow_slopes(
         run.energy, run.residual = value, r
     moving = [run for run in runs if len(run.u)]
     for step, width in enumerate(widths):
-        _slopes(moving, width, mask, evaluate, whole.problem, known)
-        _steps(moving, mask, evaluate, prior)
+        going = [run for run in moving if not run.settled]
+        _slopes(going, width, mask, evaluate, whole.problem, known)
+        _steps(going, mask, evaluate, prior)
         search.progress("fitting", (step + 1) / len(widths))
     if len(widths) > 1:
         _finer(moving, widths[-1], mask, evaluate, whole.problem, known, prior)
@@ -159,26 +166,42 @@ def _slopes(
 
 
 def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, prior: float) -> None:
-    points = []
+    """The step that slopes lead to, and shorter ones where it does not come to what they foretell."""
+
+    def better(points: Sequence[tuple[_Run, Array]]) -> None:
+        asked = [(run, u) for run, u in points if not np.allclose(u, run.u, atol=1e-6)]
+        for (run, u), (value, r) in zip(asked, evaluate(asked), strict=True):
+            if value < run.energy:
+                run.energy, run.u, run.residual = value, u, r
+
+    full, shorter, aims = [], [], []
     for run in runs:
         assert run.origin is not None and run.slopes is not None
         origin, residual = run.origin
         if not np.isfinite(residual).all():
             # No slope where nothing can be simulated: nearer to neutral.
-            points += [(run, run.u * 0.5)]
+            full.append((run, run.u * 0.5))
             continue
         normal = run.slopes.T @ run.slopes + prior * np.eye(len(run.u))
         right = -run.slopes.T @ residual[mask] - prior * origin
         damp = 1e-6 * np.trace(normal) / len(run.u) + 1e-12
         step = np.linalg.solve(normal + damp * np.eye(len(run.u)), right)
+        aim = origin + step
         step = np.clip(step, -0.5, 0.5)
-        for length in LENGTHS:
-            u = np.clip(origin + length * step, run.model.lower, run.model.upper)
-            if not np.allclose(u, run.u, atol=1e-6):
-                points.append((run, u))
-    for (run, u), (value, r) in zip(points, evaluate(points), strict=True):
-        if value < run.energy:
-            run.energy, run.u, run.residual = value, u, r
+        first, *others = (np.clip(origin + length * step, run.model.lower, run.model.upper) for length in LENGTHS)
+        bent = residual[mask] + run.slopes @ (first - origin)
+        here = float(residual[mask] @ residual[mask]) + prior * float(origin @ origin)
+        there = float(bent @ bent) + prior * float(first @ first)
+        full.append((run, first))
+        shorter += [(run, here - KEPT * (here - there), u) for u in others]
+        if here - there < SAME:
+            run.settled = True
+        elif np.array_equal(first, aim):
+            aims.append((run, first, there))
+    better(full)
+    for run, first, there in aims:
+        run.settled = run.u is first and abs(run.energy - there) < SAME
+    better([(run, u) for run, enough, u in shorter if not run.energy <= enough])
 
 
 def slopes_at(search: Search, model: Model, u: Array, width: float = WIDTHS[2]) -> Array:
