@@ -106,7 +106,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     if len(current.u):
         leading = slopes_at(search, Model(current.parts), current.u)
     refit, busy = Refit(leading), busiest(problem, base, calm)
-    screened = screen(now.among(busy), pool, effort.shares, refit, busiest(problem, base, busy, 0.0)[0])
+    screened = screen(now.among(busy), pool, effort.shares, refit, by_excess(problem, base, busy)[0])
     least = least_energy(len(pool))
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)
     promising = _first(promising, effort.first)
@@ -228,17 +228,23 @@ def calm_trials(problem: Problem, base: Array) -> list[int]:
 def busiest(problem: Problem, base: Array, among: Sequence[int], share: float = 0.5) -> list[int]:
     """Of some trials those with most to explain for their length, up to a share of all their values; a trial with a
     controller in the loop is always among them."""
-    count = len(problem.trials)
-    size = np.bincount(problem.trial_of, minlength=count).astype(float)
-    excess = np.bincount(problem.trial_of, weights=base**2 - problem.floor, minlength=count)
+    size = np.bincount(problem.trial_of, minlength=len(problem.trials))
     chosen: list[int] = []
-    for k in sorted(among, key=lambda k: -float(excess[k]) / max(float(size[k]), 1.0)):
+    for k in by_excess(problem, base, among):
         if not chosen or size[chosen].sum() < share * size[list(among)].sum():
             chosen.append(k)
     looped = [k for k in problem.looped if k in among]
     if looped and not set(looped) & set(chosen):
         chosen.append(looped[0])
     return sorted(chosen)
+
+
+def by_excess(problem: Problem, base: Array, among: Sequence[int]) -> list[int]:
+    """Some trials by how much they have to explain for their length, most first."""
+    count = len(problem.trials)
+    size = np.bincount(problem.trial_of, minlength=count)
+    excess = np.bincount(problem.trial_of, weights=base**2 - problem.floor, minlength=count)
+    return sorted(among, key=lambda k: -float(excess[k]) / max(int(size[k]), 1))
 
 
 def _quick(

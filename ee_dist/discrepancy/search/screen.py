@@ -71,7 +71,7 @@ def screen(
     further = _further(pool, rows)
     ask(alone, [(i, u) for i in further for u in _larger(pool[i], shares, rows[i])], first, 0.9)
     if whole is not alone:
-        hidden = [i for i in further if pool[i].size and not any(p.shows for p in rows[i])]
+        hidden = [i for i, found in enumerate(rows) if not any(p.shows for p in found)]
         ask(whole, [(i, u) for i in hidden for u in pool[i].probes((max(shares),))], 0.9, 1.0)
     search.progress("screening", 1.0)
     return [_screened(c, found) for c, found in zip(pool, rows, strict=True)]
