@@ -21,7 +21,8 @@ LENGTHS = (1.0, 0.5, 0.2)
 KEPT = 0.75
 """this share of what slopes foretell."""
 SAME = 0.5
-"""Energy that data tell nothing by: half of what it costs to have a value one standard deviation off."""
+"""Energy that data tell nothing by: half of what it costs to have a value one standard deviation off. Where more than noise
+is left, what is left takes the place of noise."""
 WIDTHS = (0.12, 0.06, 0.03, 0.012)
 """Finite differences of the iterations, as shares of a parameter's room."""
 FINER, NARROWER = 6, 3.0
@@ -39,8 +40,10 @@ class _Run:
     slopes: Array | None = None
     origin: tuple[Array, Array] | None = None
     """Where the slopes were taken: values and residual."""
-    settled: bool = False
-    """Whether the last step came to what slopes foretold: another from there leads nowhere that data tell from here."""
+    straight: bool = False
+    """Whether the last step came to what slopes foretold: the next would lead nowhere that data tell from there,"""
+    flat: bool = False
+    """or slopes foretold nothing."""
 
 
 Evaluate = Callable[[Sequence[tuple[_Run, Array]]], list[tuple[float, Array]]]
@@ -77,12 +80,12 @@ def follow_slopes(
         run.energy, run.residual = value, r
     moving = [run for run in runs if len(run.u)]
     for step, width in enumerate(widths):
-        going = [run for run in moving if not run.settled]
+        going = [run for run in moving if not (run.straight or run.flat)]
         _slopes(going, width, mask, evaluate, whole.problem, known)
-        _steps(going, mask, evaluate, prior)
+        _steps(going, mask, evaluate, whole.problem, prior)
         search.progress("fitting", (step + 1) / len(widths))
     if len(widths) > 1:
-        _finer(moving, widths[-1], mask, evaluate, whole.problem, known, prior)
+        _finer([run for run in moving if not run.straight], widths[-1], mask, evaluate, whole.problem, known, prior)
     out = []
     if search is not whole:
         for run, r in zip(runs, whole.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
@@ -112,7 +115,7 @@ def _finer(
         runs = [run for run in runs if np.isfinite(run.energy) and run.energy > DOWN_TO * floor]
         before = [run.energy for run in runs]
         _slopes(runs, width, mask, evaluate, problem, known)
-        _steps(runs, mask, evaluate, prior)
+        _steps(runs, mask, evaluate, problem, prior)
         runs = [run for run, energy in zip(runs, before, strict=True) if run.energy < STILL * energy]
         if not runs:
             break
@@ -165,7 +168,7 @@ def _slopes(
         run.energy, run.u, run.residual = best
 
 
-def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, prior: float) -> None:
+def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Problem, prior: float) -> None:
     """The step that slopes lead to, and shorter ones where it does not come to what they foretell."""
 
     def better(points: Sequence[tuple[_Run, Array]]) -> None:
@@ -174,7 +177,7 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, prior: float) -
             if value < run.energy:
                 run.energy, run.u, run.residual = value, u, r
 
-    full, shorter, aims = [], [], []
+    full, shorter, aims, floor = [], [], [], max(float(problem.floor[mask].sum()), 1e-12)
     for run in runs:
         assert run.origin is not None and run.slopes is not None
         origin, residual = run.origin
@@ -194,13 +197,12 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, prior: float) -
         there = float(bent @ bent) + prior * float(first @ first)
         full.append((run, first))
         shorter += [(run, here - KEPT * (here - there), u) for u in others]
-        if here - there < SAME:
-            run.settled = True
-        elif np.array_equal(first, aim):
+        run.flat = here - there < SAME
+        if not run.flat and np.array_equal(first, aim):
             aims.append((run, first, there))
     better(full)
     for run, first, there in aims:
-        run.settled = run.u is first and abs(run.energy - there) < SAME
+        run.straight = run.u is first and abs(run.energy - there) < SAME * max(1.0, run.energy / floor)
     better([(run, u) for run, enough, u in shorter if not run.energy <= enough])
 
 

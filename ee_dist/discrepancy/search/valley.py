@@ -16,7 +16,7 @@ import numpy as np
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import weighed
+from ee_dist.discrepancy.search.slopes import KEPT, weighed
 from ee_dist.trials.log import Array
 
 LARGE = 10
@@ -26,8 +26,12 @@ WIDEST, NARROWEST = 0.12, 0.006
 """Finite differences, as shares of a value's room: wide while the fit is far off, narrow in the end."""
 DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)
 """Tried at once, relative to the one that did best before."""
-GAIN = 0.005
-"""Share of the energy that an iteration must take off, or else slopes are taken narrower; at the narrowest it ends."""
+GAIN, NARROWER = 0.005, 0.25
+"""Share of the energy that an iteration must take off, or else slopes are taken narrower by so much; at the narrowest it ends."""
+SECANTS = 4
+"""More steps at most between two times that slopes are taken, as long as each keeps its word: what a step showed of its own
+direction is put into the slopes (Broyden's rule; Madsen, Nielsen and Tingleff 2004, "Methods for non-linear least squares
+problems", section 3.5). Slopes of many values cost ten times a step."""
 
 
 @dataclass(eq=False)
@@ -38,10 +42,18 @@ class _Run:
     residual: Array
     energy: float = np.inf
     damping: float = 1e-3
-    slopes: Array | None = None
-    weighed: Array | None = None
-    """The smooth residual where it is fitted, weighed."""
+    straight: Array | None = None
+    """(m, P) slopes of the smooth residual (m,) where it is fitted,"""
+    smooth: Array | None = None
+    weights: Array | None = None
+    """and the weights (m,) of its values."""
+    kept: bool = False
+    """Whether the last step came to what slopes foretold, and was worth it."""
     done: bool = False
+
+    @property
+    def slopes(self) -> Array | None:
+        return None if self.straight is None or self.weights is None else self.weights[:, None] * self.straight
 
 
 def follow_valley(
@@ -71,7 +83,18 @@ def follow_valley(
         _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
         moving = [run for run in moving if np.isfinite(run.energy)]
         _slopes(moving, search, mask)
-        _steps(moving, search, mask, prior, step, NARROWEST if not settled else np.inf)
+        before = [run.energy for run in moving]
+        _step_on(moving, search, mask, prior)
+        for run, energy in zip(moving, before, strict=True):
+            if energy - run.energy < GAIN * energy:
+                run.done = settled or run.width <= NARROWEST
+                run.width = max(NARROWER * run.width, NARROWEST)
+            elif step % 2:
+                run.width = max(0.7 * run.width, NARROWEST)
+        for _ in range(SECANTS):
+            moving = [run for run in moving if run.kept]
+            if moving:
+                _step_on(moving, search, mask, prior)
         search.progress("fitting all together", (step + 1) / iterations)
     best = [min(runs[k : k + len(widths)], key=lambda r: r.energy) for k in range(0, len(runs), len(widths))]
     rows = np.array([run.residual for run in best])
@@ -100,7 +123,7 @@ def _from_nowhere(runs: Sequence[_Run], search: Search, mask: Mask, prior: float
 
 
 def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
-    """Weighed derivatives (n, P) of the smooth residual where the mask is."""
+    """Derivatives (m, P) of the smooth residual where the mask is."""
     points = []
     for run in runs:
         for k in range(len(run.u)):
@@ -111,46 +134,64 @@ def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
     rows = iter(search.residuals([run.model.hypothesis(v) for run, v in points]))
     smooth_of, at = search.problem.smooth, 0
     for run in runs:
-        smooth, weight = (values[mask] for values in weighed(search.problem, run.residual))
+        run.smooth, run.weights = (values[mask] for values in weighed(search.problem, run.residual))
         columns = []
         for k in range(len(run.u)):
             row, gap = next(rows), points[at][1][k] - run.u[k]
             at += 1
             usable = np.isfinite(row).all()
-            columns.append(weight * (smooth_of(row)[mask] - smooth) / gap if usable else np.zeros(len(smooth)))
-        run.slopes, run.weighed = np.stack(columns, axis=1), weight * smooth
+            columns.append((smooth_of(row)[mask] - run.smooth) / gap if usable else np.zeros(len(run.smooth)))
+        run.straight = np.stack(columns, axis=1)
 
 
-def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step: int, last: float) -> None:
-    """``last``: width from which a step that takes next to nothing ends the descent."""
-    points = [(run, d, _step(run, prior, d)) for run in runs for d in run.damping * np.array(DAMPINGS)]
+def _step_on(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> None:
+    """The best of steps of several dampings, if it is better than none; what it showed is put into the slopes."""
+    points = []
+    for run in runs:
+        normal, down = _normal(run, prior)
+        points += [(run, d, _step(run, normal, down, prior, d)) for d in run.damping * np.array(DAMPINGS)]
     rows = search.residuals([run.model.hypothesis(v) for run, _, v in points])
     count = len(DAMPINGS)
     for k, run in enumerate(runs):
         mine = range(k * count, (k + 1) * count)
         costs = [_cost(rows[i], points[i][2], mask, prior) for i in mine]
         best, before = int(np.argmin(costs)), run.energy
-        if costs[best] < run.energy:
-            _, damping, run.u = points[mine[best]]
-            run.energy, run.residual, run.damping = costs[best], rows[mine[best]], max(float(damping), 1e-7)
-        else:
-            run.damping = min(100.0 * run.damping, 1e6)
-        if before - run.energy < GAIN * before:
-            run.done = run.width <= last
-            run.width = max(0.5 * run.width, NARROWEST)
-        elif step % 2:
-            run.width = max(0.7 * run.width, NARROWEST)
+        if costs[best] >= run.energy:
+            run.damping, run.kept = min(100.0 * run.damping, 1e6), False
+            continue
+        _, damping, u = points[mine[best]]
+        step, foretold = u - run.u, _foretold(run, u, prior)
+        run.u, run.energy, run.residual, run.damping = u, costs[best], rows[mine[best]], max(float(damping), 1e-7)
+        won = before - run.energy
+        run.kept = won >= KEPT * (before - foretold) and won >= GAIN * before
+        if run.kept:
+            assert run.straight is not None and run.smooth is not None
+            smooth, weights = (values[mask] for values in weighed(search.problem, run.residual))
+            run.straight = run.straight + np.outer(smooth - run.smooth - run.straight @ step, step) / (step @ step)
+            run.smooth, run.weights = smooth, weights
+
+
+def _foretold(run: _Run, u: Array, prior: float) -> float:
+    """The energy that slopes lead to expect at u."""
+    assert run.straight is not None and run.smooth is not None and run.weights is not None
+    bent = run.weights * (run.smooth + run.straight @ (u - run.u))
+    return float(bent @ bent) + prior * float(u @ u)
 
 
 def _cost(r: Array, u: Array, mask: Mask, prior: float) -> float:
     return float(r[mask] @ r[mask]) + prior * float(u @ u) if np.isfinite(r).all() else float("inf")
 
 
-def _step(run: _Run, prior: float, damping: float) -> Array:
+def _normal(run: _Run, prior: float) -> tuple[Array, Array]:
+    """The normal matrix (P, P) and the way down (P,)."""
+    slopes = run.slopes
+    assert slopes is not None and run.smooth is not None and run.weights is not None
+    return slopes.T @ slopes, -(slopes.T @ (run.weights * run.smooth)) - prior * run.u
+
+
+def _step(run: _Run, normal: Array, down: Array, prior: float, damping: float) -> Array:
     """Where a damped Gauss-Newton step leads, values that it would push out of their bounds held there."""
-    assert run.slopes is not None and run.weighed is not None
     u, model = run.u, run.model
-    normal, down = run.slopes.T @ run.slopes, -(run.slopes.T @ run.weighed) - prior * u
     scale = np.diag(normal)
     scale = np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-12))
     system = normal + prior * np.eye(len(u)) + damping * np.diag(scale)
