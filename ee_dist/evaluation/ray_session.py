@@ -57,12 +57,9 @@ def start_ray(address: str | None, workers: int, folder: str | None = None) -> N
 
     global _guard, _address, _started, _heads
     cores = os.cpu_count() or 1
-    if not address and workers > PER_CORE * cores:
+    if not address:
         # Before anything else: a Ray that is there already would begin to start them all, and take all memory.
-        raise EvaluatorError(
-            f"evaluator.workers={workers}: this machine has {cores} cores, and more than {PER_CORE * cores} workers "
-            "only take memory; choose fewer, or evaluator.workers=0 for one a core"
-        )
+        _check(workers, cores, "this machine")
     if ray.is_initialized():
         return
     # Ray's answer to SIGTERM is a dump of stacks; ours is a line.
@@ -103,6 +100,20 @@ def start_ray(address: str | None, workers: int, folder: str | None = None) -> N
             raise _unreachable(address, first)
         raise RayLostError(f"Ray did not start ({first}); evaluator=serial does without it")
     _address = address
+    if address:
+        try:
+            _check(workers, int(ray.cluster_resources().get("CPU", cores)), "the cluster")
+        except EvaluatorError:
+            stop_ray()
+            raise
+
+
+def _check(workers: int, cores: int, whose: str) -> None:
+    if workers > PER_CORE * cores:
+        raise EvaluatorError(
+            f"evaluator.workers={workers}: {whose} has {cores} cores, and more than {PER_CORE * cores} workers "
+            "only take memory; choose fewer, or evaluator.workers=0 for one a core of this machine"
+        )
 
 
 class _Starter(threading.Thread):

@@ -19,6 +19,7 @@ from ee_dist.engines.drivers import Network, weight_count
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.evaluation.jobs import Job, Whole
 from ee_dist.evaluation.ray_actors import RayEvaluator
+from ee_dist.evaluation.ray_session import EvaluatorError
 from ee_dist.evaluation.serial import SerialEvaluator
 from ee_dist.robots.quadruped import quadruped
 
@@ -67,6 +68,8 @@ def test_a_lost_node_changes_nothing():
         work = jobs(200)
         serial = SerialEvaluator(engine())
         expected = content(serial.evaluate(work))
+        with pytest.raises(EvaluatorError, match=r"evaluator\.workers=17: the cluster has 2 cores"):
+            RayEvaluator(engine, 17, 5, nodes.address)
         evaluator = RayEvaluator(engine, 2, 5, nodes.address)
         assert content(evaluator.evaluate(work[:20])) == expected[: len(content(serial.evaluate(work[:20])))]
         homes = {n["NodeID"] for n in ray.nodes() if n["Alive"]}
