@@ -46,7 +46,7 @@ class _Worker:
         return node(), os.getpid(), installed()
 
 
-WORTH_A_CALL = 24
+WORTH_A_CALL = 48
 """Jobs below which a step costs nearly as much for the batch as for its robots: no call carries fewer unless there are
 too few for all workers."""
 LOOK_S = 1.0

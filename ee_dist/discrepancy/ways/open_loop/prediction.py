@@ -145,14 +145,23 @@ def wired_commands(trial: MeasuredTrial, model: Robot) -> Commands:
     return Commands(np.ascontiguousarray(trial.obeyed(planned[: len(trial.log)])[:, list(model.wiring.source)]))
 
 
-def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None) -> Rollout:
-    """The physics of a model on the trial's own commands, with clean sensors (``bare``: the model as it is simulated, if that is
-    at hand already)."""
+Obeyed = tuple[Commands, Array | None]
+"""What drives obey, and (T,) 0 where they were released, if they were."""
+
+
+def obeyed(trial: MeasuredTrial, model: Robot) -> Obeyed:
     commands, enabled = released(wired_commands(trial, model).values)
+    return Commands(commands), enabled
+
+
+def rollout_of(trial: MeasuredTrial, model: Robot, bare: Robot | None = None, given: Obeyed | None = None) -> Rollout:
+    """The physics of a model on the trial's own commands, with clean sensors (``bare``: the model as it is simulated, and
+    ``given``: what its drives obey, if these are at hand already)."""
+    commands, enabled = given or obeyed(trial, model)
     start = start_of(trial, model)
     return Rollout(
         bare or trial.simulated(clean(model)),
-        Commands(commands),
+        commands,
         len(trial.log),
         start=start,
         supply_v=trial.log.supply_v,
@@ -170,6 +179,7 @@ class Predictor:
         self.trials, self.base, self.evaluator = trials, base, evaluator
         self.block, self.window = block, window
         self.rows = [rows_read(t.log) for t in trials]
+        self._obeyed: dict[tuple[int, tuple[int, ...]], Obeyed] = {}
         self._only_noisy = [replace(s, noise=0.0) == _faultless(s) for s in base.sensors]
 
     def digests(self, pairs: Sequence[tuple[int, Robot]]) -> list[Digest]:
@@ -184,7 +194,7 @@ class Predictor:
             early = self.trials[k].early(self.base)
             whole = bool(changed[id(model)])
             reduction = ToSensors(early) if whole else ToDigest(self.block, self.window, self.rows[k], early)
-            jobs.append(Job(rollout_of(self.trials[k], model, bare[which]), reduction))
+            jobs.append(Job(rollout_of(self.trials[k], model, bare[which], self._given(k, model)), reduction))
         found = self.evaluator.evaluate(jobs)
         out: list[Digest] = list(found)
         alike: dict[tuple[int, ...], list[int]] = {}
@@ -201,6 +211,13 @@ class Predictor:
                 for i, seen in zip(some, self._reported(k, faulty), strict=True):
                     out[i] = seen
         return out
+
+    def _given(self, trial: int, model: Robot) -> Obeyed:
+        """Models of one wiring share the very array, which so goes to a worker once."""
+        key = trial, tuple(model.wiring.source)
+        if key not in self._obeyed:
+            self._obeyed[key] = obeyed(self.trials[trial], model)
+        return self._obeyed[key]
 
     def by_start(self, trial: int, model: Robot) -> Array:
         """(R // block, S) mean squares of block means by which the noise of the speeds that a trial starts with moves them."""
