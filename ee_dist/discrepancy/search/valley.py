@@ -49,6 +49,7 @@ class _Run:
     """and the weights (m,) of its values."""
     kept: bool = False
     """Whether the last step came to what slopes foretold, and was worth it."""
+    steps: int = 0
     done: bool = False
 
     @property
@@ -76,10 +77,7 @@ def follow_valley(
         for (m, _), u, r in zip(starts, points, rows, strict=True)
         for width in widths
     ]
-    for step in range(iterations):
-        moving = [run for run in runs if not run.done]
-        if not moving:
-            break
+    while moving := [run for run in runs if not run.done and run.steps < iterations]:
         _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
         moving = [run for run in moving if np.isfinite(run.energy)]
         _slopes(moving, search, mask)
@@ -89,13 +87,13 @@ def follow_valley(
             if energy - run.energy < GAIN * energy:
                 run.done = settled or run.width <= NARROWEST
                 run.width = max(NARROWER * run.width, NARROWEST)
-            elif step % 2:
-                run.width = max(0.7 * run.width, NARROWEST)
+            else:
+                run.width = max(0.85 * run.width, NARROWEST)
         for _ in range(SECANTS):
-            moving = [run for run in moving if run.kept]
+            moving = [run for run in moving if run.kept and run.steps < iterations]
             if moving:
                 _step_on(moving, search, mask, prior)
-        search.progress("fitting all together", (step + 1) / iterations)
+        search.progress("fitting all together", max(run.steps for run in runs) / iterations)
     best = [min(runs[k : k + len(widths)], key=lambda r: r.energy) for k in range(0, len(runs), len(widths))]
     rows = np.array([run.residual for run in best])
     if search is not whole:
@@ -117,7 +115,7 @@ def follow_valley(
 def _from_nowhere(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> None:
     """No slope where nothing can be simulated: nearer to neutral."""
     for run in runs:
-        run.u = 0.5 * run.u
+        run.u, run.steps = 0.5 * run.u, run.steps + 1
     for run, r in zip(runs, search.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
         run.residual, run.energy = r, _cost(r, run.u, mask, prior)
 
@@ -156,6 +154,7 @@ def _step_on(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> 
         mine = range(k * count, (k + 1) * count)
         costs = [_cost(rows[i], points[i][2], mask, prior) for i in mine]
         best, before = int(np.argmin(costs)), run.energy
+        run.steps += 1
         if costs[best] >= run.energy:
             run.damping, run.kept = min(100.0 * run.damping, 1e6), False
             continue
