@@ -26,7 +26,7 @@ WIDEST, NARROWEST = 0.12, 0.006
 """Finite differences, as shares of a value's room: wide while the fit is far off, narrow in the end."""
 DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)
 """Tried at once, relative to the one that did best before."""
-GAIN, NARROWER = 0.005, 0.25
+GAIN, NARROWER = 0.005, 0.5
 """Share of the energy that an iteration must take off, or else slopes are taken narrower by so much; at the narrowest it ends."""
 SECANTS = 4
 """More steps at most between two times that slopes are taken, as long as each keeps its word: what a step showed of its own
@@ -49,7 +49,8 @@ class _Run:
     """and the weights (m,) of its values."""
     kept: bool = False
     """Whether the last step came to what slopes foretold, and was worth it."""
-    steps: int = 0
+    spent: float = 0.0
+    """Iterations: slopes and a step are one, a step alone is what it costs beside that."""
     done: bool = False
 
     @property
@@ -77,23 +78,26 @@ def follow_valley(
         for (m, _), u, r in zip(starts, points, rows, strict=True)
         for width in widths
     ]
-    while moving := [run for run in runs if not run.done and run.steps < iterations]:
+    while moving := [run for run in runs if not run.done and run.spent < iterations]:
         _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
         moving = [run for run in moving if np.isfinite(run.energy)]
         _slopes(moving, search, mask)
         before = [run.energy for run in moving]
         _step_on(moving, search, mask, prior)
         for run, energy in zip(moving, before, strict=True):
+            run.spent += 1.0
             if energy - run.energy < GAIN * energy:
                 run.done = settled or run.width <= NARROWEST
                 run.width = max(NARROWER * run.width, NARROWEST)
             else:
                 run.width = max(0.85 * run.width, NARROWEST)
         for _ in range(SECANTS):
-            moving = [run for run in moving if run.kept and run.steps < iterations]
+            moving = [run for run in moving if run.kept and run.spent < iterations]
             if moving:
                 _step_on(moving, search, mask, prior)
-        search.progress("fitting all together", max(run.steps for run in runs) / iterations)
+            for run in moving:
+                run.spent += len(DAMPINGS) / (len(DAMPINGS) + len(run.u))
+        search.progress("fitting all together", min(1.0, max(run.spent for run in runs) / iterations))
     best = [min(runs[k : k + len(widths)], key=lambda r: r.energy) for k in range(0, len(runs), len(widths))]
     rows = np.array([run.residual for run in best])
     if search is not whole:
@@ -115,7 +119,7 @@ def follow_valley(
 def _from_nowhere(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> None:
     """No slope where nothing can be simulated: nearer to neutral."""
     for run in runs:
-        run.u, run.steps = 0.5 * run.u, run.steps + 1
+        run.u, run.spent = 0.5 * run.u, run.spent + 1.0
     for run, r in zip(runs, search.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
         run.residual, run.energy = r, _cost(r, run.u, mask, prior)
 
@@ -154,7 +158,6 @@ def _step_on(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> 
         mine = range(k * count, (k + 1) * count)
         costs = [_cost(rows[i], points[i][2], mask, prior) for i in mine]
         best, before = int(np.argmin(costs)), run.energy
-        run.steps += 1
         if costs[best] >= run.energy:
             run.damping, run.kept = min(100.0 * run.damping, 1e6), False
             continue
