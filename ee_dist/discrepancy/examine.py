@@ -112,8 +112,8 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     promising = _first(promising, effort.first)
     scanned = sorted(scan(now.among(busy), promising, refit), key=lambda s: s.energy)
     scanned = _first(scanned, effort.second)
-    quick = sorted(_quick(search.among(busy), current, scanned, effort.starts, leading), key=lambda f: f.energy)
-    energy = float((base[np.isin(problem.trial_of, busy)] ** 2).sum())
+    quick = sorted(_quick(search.among(calm), current, scanned, effort.starts, leading), key=lambda f: f.energy)
+    energy = float((base[np.isin(problem.trial_of, calm)] ** 2).sum())
     quick = [
         f
         for k, f in enumerate(quick)
@@ -126,7 +126,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     starts += _families(screened, starts, least, has)
     guessed = assumed_drives(now.among(busy), pool, [t.name for t in (*search.fixed, *current.hypothesis)])
     starts += [guessed] if guessed is not None else []
-    nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, busy), 1e-12)
+    nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
     far = nearest > FAR**2
     judged = _judged(search, current, starts, base, len(pool), leading, far)
     if judged and not judged[0].earned and not far and leftovers(problem, base):
@@ -250,7 +250,7 @@ def by_excess(problem: Problem, base: Array, among: Sequence[int]) -> list[int]:
 def _quick(
     search: Search, current: Current, scanned: Sequence[Scanned], starts: int, leading: Array | None
 ) -> list[Fit]:
-    """The better of a few quick fits of each candidate with the model so far: it only chooses who is judged."""
+    """The better of a few quick fits of each candidate with the model so far, on all data: it only chooses who is judged."""
     tasks = [(i, s.candidate, u) for i, s in enumerate(scanned) for u in s.starts[:starts]]
     models = [(Model((*current.parts, c)), np.concatenate([current.u, u])) for _, c, u in tasks]
     fits = follow_slopes(search, models, search.everything, WIDTHS[1:3], leading=leading)
