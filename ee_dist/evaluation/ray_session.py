@@ -61,6 +61,8 @@ def start_ray(address: str | None, workers: int, folder: str | None = None) -> N
         # Before anything else: a Ray that is there already would begin to start them all, and take all memory.
         _check(workers, cores, "this machine")
     if ray.is_initialized():
+        if address:
+            _check(workers, _cores_of_cluster(), "the cluster")
         return
     # Ray's answer to SIGTERM is a dump of stacks; ours is a line.
     ray_constants.RAY_DISABLE_FAILURE_SIGNAL_HANDLER = True
@@ -101,11 +103,13 @@ def start_ray(address: str | None, workers: int, folder: str | None = None) -> N
         raise RayLostError(f"Ray did not start ({first}); evaluator=serial does without it")
     _address = address
     if address:
-        try:
-            _check(workers, int(ray.cluster_resources().get("CPU", cores)), "the cluster")
-        except EvaluatorError:
-            stop_ray()
-            raise
+        _check(workers, _cores_of_cluster(), "the cluster")
+
+
+def _cores_of_cluster() -> int:
+    import ray
+
+    return int(ray.cluster_resources().get("CPU", 1))
 
 
 def _check(workers: int, cores: int, whose: str) -> None:

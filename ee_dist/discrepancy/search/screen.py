@@ -50,10 +50,10 @@ def screen(
     where one is named, is enough for all this, but for what does not show in it at all."""
     whole = _Ground.of(search, refit)
     alone = whole if trial is None or search.trials == (trial,) else _Ground.of(search.among([trial]), refit)
-    rows: list[list[_Probe]] = [[] for _ in pool]
-    small = [(i, u) for i, c in enumerate(pool) for u in _smallest(c, shares)]
     if alone.total <= 0:
         alone = whole
+    rows: list[list[_Probe]] = [[] for _ in pool]
+    small = [(i, u) for i, c in enumerate(pool) for u in _smallest(c, shares)]
 
     def ask(ground: _Ground, points: Sequence[tuple[int, Array]], begun: float, ended: float) -> None:
         for part in search.batches(len(points)):
@@ -91,10 +91,6 @@ class _Ground:
         refit = refit.among(search)
         base = refit(search.base())
         return cls(search, refit, base, float(base @ base))
-
-    @property
-    def trials(self) -> int:
-        return len(self.search.problem.trials) if self.search.trials is None else len(self.search.trials)
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,11 +80,11 @@ def follow_slopes(
 
     for run, (value, r) in zip(runs, evaluate([(run, run.u) for run in runs]), strict=True):
         run.energy, run.residual = value, r
-    moving = [run for run in runs if len(run.u)]
+    moving, floor = [run for run in runs if len(run.u)], float(whole.problem.floor[mask].sum())
     for step, width in enumerate(widths):
         going = [run for run in moving if not (run.straight or run.flat)]
         _slopes(going, width, mask, evaluate, whole.problem, known)
-        _steps(going, mask, evaluate, whole.problem, prior)
+        _steps(going, mask, evaluate, floor, prior)
         search.progress("fitting", (step + 1) / len(widths))
     if len(widths) > 1:
         _finer([run for run in moving if not run.straight], widths[-1], mask, evaluate, whole.problem, known, prior)
@@ -117,7 +117,7 @@ def _finer(
         runs = [run for run in runs if np.isfinite(run.energy) and run.energy > DOWN_TO * floor]
         before = [run.energy for run in runs]
         _slopes(runs, width, mask, evaluate, problem, known)
-        _steps(runs, mask, evaluate, problem, prior)
+        _steps(runs, mask, evaluate, floor, prior)
         runs = [run for run, energy in zip(runs, before, strict=True) if run.energy < STILL * energy]
         if not runs:
             break
@@ -170,8 +170,9 @@ def _slopes(
         run.energy, run.u, run.residual = best
 
 
-def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Problem, prior: float) -> None:
-    """The step that slopes lead to, and shorter ones where it does not come to what they foretell."""
+def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, prior: float) -> None:
+    """The step that slopes lead to, and shorter ones: all of them where more than NEAR times the ``floor`` is left, else where
+    the whole one does not come to what slopes foretell."""
 
     def better(points: Sequence[tuple[_Run, Array]]) -> None:
         asked = [(run, u) for run, u in points if not np.allclose(u, run.u, atol=1e-6)]
@@ -179,7 +180,7 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Proble
             if value < run.energy:
                 run.energy, run.u, run.residual = value, u, r
 
-    full, shorter, aims, floor = [], [], [], float(problem.floor[mask].sum())
+    full, shorter, aims = [], [], []
     for run in runs:
         assert run.origin is not None and run.slopes is not None
         origin, residual = run.origin
