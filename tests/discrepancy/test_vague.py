@@ -29,14 +29,14 @@ def judged(explained: float, vague: bool) -> object:
     cut = SimpleNamespace(by_unit=lambda e: e)
     one = SimpleNamespace(
         name=f"{explained}", explained=explained, vague=vague, why_not="", held=np.full(20, 1000.0 * (1 - explained)),
-        outcome=SimpleNamespace(cut=cut), dispersion=1.0, proposal=SimpleNamespace(size=4 if vague else 1, guess=False),
+        outcome=SimpleNamespace(cut=cut), dispersion=1.0, proposal=SimpleNamespace(size=4 if vague else 1, guess=False, parts=()),
         tied_with=[], rank=0,
     )  # fmt: skip
     return Following(one)
 
 
 class Following:
-    """Has ``earned`` follow ``why_not``."""
+    """Has ``earned`` and ``stands`` follow ``why_not``."""
 
     def __init__(self, one: SimpleNamespace) -> None:
         self.__dict__.update(one.__dict__)
@@ -44,6 +44,10 @@ class Following:
     @property
     def earned(self) -> bool:
         return not self.why_not
+
+    @property
+    def stands(self) -> bool:
+        return self.earned or self.why_not == VAGUE
 
 
 @pytest.mark.parametrize(("plain", "named"), [(0.3, 0.3), (0.2, 0.9)])
@@ -54,6 +58,14 @@ def test_a_vague_explanation_gives_way_to_a_plain_one_that_explains_as_much_for_
     order = ranked([vague, other])  # type: ignore[list-item]
     assert order[0].explained == named
     assert vague.why_not == (VAGUE if plain == named else "")  # type: ignore[attr-defined]
+
+
+def test_what_is_vague_and_explains_as_much_may_be_true_and_is_named_as_tied() -> None:
+    vague, plain, less = judged(0.9, vague=True), judged(0.8999, vague=False), judged(0.5, vague=False)
+    order = ranked([vague, plain, less])  # type: ignore[list-item]
+    assert [j.explained for j in order[:2]] == [0.8999, 0.5]
+    assert order[0].tied_with == ["0.9"]
+    assert not vague.earned  # type: ignore[attr-defined]
 
 
 def test_a_law_of_two_numbers_is_vague_where_the_two_cannot_be_told_apart() -> None:

@@ -77,6 +77,11 @@ class Judged:
         return not self.why_not
 
     @property
+    def stands(self) -> bool:
+        """Whether data do not speak against it: it earned its place, or would have if it said less."""
+        return self.earned or self.why_not == VAGUE
+
+    @property
     def held_out(self) -> str:
         """What was held out."""
         return self.outcome.cut.name
@@ -220,7 +225,8 @@ def _best(found: HeldOut) -> Array:
 
 def ranked(found: Sequence[Judged]) -> list[Judged]:
     """Best held-out energy first, those that earned their place before the others; ties are named, and of those that are
-    tied with the best the one with the fewest numbers goes first: a richer law can always mimic a simpler one."""
+    tied with the best the one with the fewest numbers goes first: a richer law can always mimic a simpler one. What is not told
+    for its vague numbers alone may be true all the same, and is named in ties."""
     for j in found:
         if j.vague and j.earned and any(_plainer(k, j) for k in found):
             j.why_not = VAGUE
@@ -229,20 +235,20 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
         j.tied_with, j.rank = [], k
     for a, one in enumerate(ordered):
         for other in ordered[a + 1 :]:
-            if one.earned and other.earned and tied(one, other):
+            if one.stands and other.stands and (one.earned or other.earned) and tied(one, other):
                 one.tied_with.append(other.name)
                 other.tied_with.append(one.name)
     if ordered:
         # Of explanations that data do not tell apart the one with the fewest numbers says the least that is not known.
         best = ordered[0]
-        same = [best, *(j for j in ordered[1:] if j.name in best.tied_with)]
+        same = [best, *(j for j in ordered[1:] if j.earned and j.name in best.tied_with)]
         # Of as many, a number that was only assumed is blamed before parts that somebody vouched for.
         first = min(same, key=_least_said)
         # What was only guessed at is asked for before as many numbers that are tied with it, be these tied with a better one too.
         asked = [
             j
             for j in ordered
-            if j.name in first.tied_with and j.proposal.guess and j.proposal.size <= first.proposal.size
+            if j.earned and j.name in first.tied_with and j.proposal.guess and j.proposal.size <= first.proposal.size
         ]
         first = min((first, *asked), key=_least_said)
         first = min((j for j in ordered if j.name in first.tied_with and _fuller(j, first)), key=_left, default=first)

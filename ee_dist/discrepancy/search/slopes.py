@@ -2,6 +2,8 @@
 
 A residual over seconds of contact is rugged in its parameters, so that a derivative at a point says little. Slopes are
 taken over a finite step, which begins wide and shrinks, and a step that does not keep what it promised is tried shorter.
+Far from the noise steps of plain least squares are tried too: what little of a large swing is near zero has, softened, the
+greatest weight, and holds a weighed step back.
 """
 
 from __future__ import annotations
@@ -27,10 +29,12 @@ SAME = 0.5
 """Energy that data tell nothing by: half of what it costs to have a value one standard deviation off."""
 WIDTHS = (0.12, 0.06, 0.03, 0.012)
 """Finite differences of the iterations, as shares of a parameter's room."""
-FINER, NARROWER = 6, 3.0
-"""More iterations at most, by how much narrower each,"""
-STILL, DOWN_TO = 0.8, 1.2
-"""as long as one leaves less than this share of the energy, and that is more than this many times what noise leaves."""
+FINER, NARROWER, MUCH_NARROWER = 12, 3.0, 10.0
+"""More iterations at most, by how much narrower each, after one that led to nothing by much;"""
+STILL, MISSES = 0.8, 2
+"""far from the noise as long as one in this many leaves less than this share of the energy."""
+CLOSEST = 1e-9
+"""Share of a parameter's room below which two values are one."""
 
 
 @dataclass(eq=False)
@@ -41,7 +45,12 @@ class _Run:
     residual: Array | None = None
     slopes: Array | None = None
     origin: tuple[Array, Array] | None = None
-    """Where the slopes were taken: values and residual."""
+    """Where the slopes were taken: values, and the residual as it is weighed there."""
+    weights: Array | None = None
+    width: float = WIDTHS[0]
+    misses: int = 0
+    side: Array | None = None
+    """(P,) to which side of each value slopes are taken next."""
     straight: bool = False
     """Whether the last step came to what slopes foretold: the next would lead nowhere that data tell from there,"""
     flat: bool = False
@@ -68,6 +77,8 @@ def follow_slopes(
     whole, search = search, search.within(mask)
     known = None if leading is None else leading[mask]
     runs = [_Run(m, np.clip(np.asarray(u, float), m.lower, m.upper)) for m, u in starts]
+    for run in runs:
+        run.side = np.ones(len(run.u))
 
     def evaluate(points: Sequence[tuple[_Run, Array]]) -> list[tuple[float, Array]]:
         if not points:
@@ -83,11 +94,13 @@ def follow_slopes(
     moving, floor = [run for run in runs if len(run.u)], float(whole.problem.floor[mask].sum())
     for step, width in enumerate(widths):
         going = [run for run in moving if not (run.straight or run.flat)]
-        _slopes(going, width, mask, evaluate, whole.problem, known)
+        for run in going:
+            run.width = width
+        _slopes(going, mask, evaluate, whole.problem, known)
         _steps(going, mask, evaluate, floor, prior)
         search.progress("fitting", (step + 1) / len(widths))
     if len(widths) > 1:
-        _finer([run for run in moving if not run.straight], widths[-1], mask, evaluate, whole.problem, known, prior)
+        _finer(moving, mask, evaluate, whole.problem, known, prior)
     out = []
     if search is not whole:
         for run, r in zip(runs, whole.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
@@ -102,25 +115,32 @@ def follow_slopes(
 
 def _finer(
     runs: Sequence[_Run],
-    width: float,
     mask: Mask,
     evaluate: Evaluate,
     problem: Problem,
     known: Array | None,
     prior: float,
 ) -> None:
-    """Finer steps for those that still come much nearer by them: where sensors are precise and one effect is all that is missing,
+    """Finer steps for those that still come nearer by them: where sensors are precise and one effect is all that is missing,
     the last width is coarser than what data tell. Half fitted, an explanation loses to one that stands in for it."""
     floor = float(problem.floor[mask].sum())
     for _ in range(FINER):
-        width = width / NARROWER
-        runs = [run for run in runs if np.isfinite(run.energy) and run.energy > DOWN_TO * floor]
-        before = [run.energy for run in runs]
-        _slopes(runs, width, mask, evaluate, problem, known)
-        _steps(runs, mask, evaluate, floor, prior)
-        runs = [run for run, energy in zip(runs, before, strict=True) if run.energy < STILL * energy]
+        runs = [
+            run for run in runs if np.isfinite(run.energy) and not (run.straight or run.flat or run.misses >= MISSES)
+        ]
         if not runs:
             break
+        before = [run.energy for run in runs]
+        for run in runs:
+            run.width /= MUCH_NARROWER if run.misses else NARROWER
+        _slopes(runs, mask, evaluate, problem, known)
+        _steps(runs, mask, evaluate, floor, prior)
+        for run, energy in zip(runs, before, strict=True):
+            near = energy <= NEAR * floor
+            if run.energy < (energy - SAME if near else STILL * energy):
+                run.misses = 0
+            else:
+                run.misses += MISSES if near else 1
 
 
 def weighed(problem: Problem, residual: Array) -> tuple[Array, Array]:
@@ -132,21 +152,21 @@ def weighed(problem: Problem, residual: Array) -> tuple[Array, Array]:
 
 def _slopes(
     runs: Sequence[_Run],
-    width: float,
     mask: Mask,
     evaluate: Evaluate,
     problem: Problem,
     leading: Array | None = None,
 ) -> None:
-    """Derivatives over ``width`` (narrower for a small value), towards the inside; a better point found is taken. Those of
+    """Derivatives over the run's width (narrower for a small value), towards the inside; a better point found is taken. Those of
     the first values may be known (``leading``)."""
     points = []
     first = 0 if leading is None else leading.shape[1]
     for run in runs:
         for k in range(first, len(run.u)):
-            h = min(width, 0.3 * abs(run.u[k]) + 0.2 * width)
+            h = min(run.width, 0.3 * abs(run.u[k]) + 0.2 * run.width)
             u = run.u.copy()
-            u[k] += h if u[k] + h <= run.model.upper[k] else -h
+            side = _side(run, k, h)
+            u[k] += side * h
             points.append((run, np.clip(u, run.model.lower, run.model.upper)))
     found = evaluate(points)
     at = 0
@@ -165,8 +185,11 @@ def _slopes(
             )
             if value < best[0]:
                 best = (value, u, r)
+            elif usable and run.side is not None:
+                # Far from where it leads a residual bends: slopes tell more of the side that goes down.
+                run.side[k] = -np.sign(gap)
         run.slopes = np.stack(columns, axis=1)
-        run.origin = (run.u, weights * smooth)
+        run.origin, run.weights = (run.u, weights * smooth), weights[mask]
         run.energy, run.u, run.residual = best
 
 
@@ -175,7 +198,7 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
     the whole one does not come to what slopes foretell."""
 
     def better(points: Sequence[tuple[_Run, Array]]) -> None:
-        asked = [(run, u) for run, u in points if not np.allclose(u, run.u, atol=1e-6)]
+        asked = [(run, u) for run, u in points if not np.allclose(u, run.u, rtol=0.0, atol=CLOSEST)]
         for (run, u), (value, r) in zip(asked, evaluate(asked), strict=True):
             if value < run.energy:
                 run.energy, run.u, run.residual = value, u, r
@@ -201,6 +224,7 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
         full.append((run, first))
         if here > NEAR * floor:
             full += [(run, u) for u in others]
+            full += _unweighed(run, mask, prior)
             continue
         shorter += [(run, here - KEPT * (here - there), u) for u in others]
         run.flat = here - there < SAME
@@ -210,6 +234,26 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
     for run, first, there in aims:
         run.straight = run.u is first and abs(run.energy - there) < SAME
     better([(run, u) for run, enough, u in shorter if not run.energy <= enough])
+
+
+def _side(run: _Run, k: int, h: float) -> float:
+    """To which side of a value its slope is taken: up, or where it went down before, within its bounds."""
+    side = 1.0 if run.side is None else float(run.side[k])
+    at = run.u[k] + side * h
+    return side if run.model.lower[k] <= at <= run.model.upper[k] else -side
+
+
+def _unweighed(run: _Run, mask: Mask, prior: float) -> list[tuple[_Run, Array]]:
+    """The steps of plain least squares."""
+    assert run.origin is not None and run.slopes is not None and run.weights is not None
+    origin, residual = run.origin
+    shares = np.maximum(run.weights, 1e-12)
+    slopes, plain = run.slopes / shares[:, None], residual[mask] / shares
+    normal = slopes.T @ slopes + prior * np.eye(len(run.u))
+    damp = 1e-6 * np.trace(normal) / len(run.u) + 1e-12
+    step = np.linalg.solve(normal + damp * np.eye(len(run.u)), -slopes.T @ plain - prior * origin)
+    step = np.clip(step, -0.5, 0.5)
+    return [(run, np.clip(origin + length * step, run.model.lower, run.model.upper)) for length in LENGTHS[:2]]
 
 
 def slopes_at(search: Search, model: Model, u: Array, width: float = WIDTHS[2]) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import weighed
+from ee_dist.discrepancy.search.slopes import NEAR, weighed
 from ee_dist.trials.log import Array
 
 LARGE = 10
@@ -25,7 +25,9 @@ ITERATIONS = 30
 WIDEST, NARROWEST = 0.12, 0.006
 """Finite differences, as shares of a value's room: wide while the fit is far off, narrow in the end."""
 DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)
-"""Tried at once, relative to the one that did best before."""
+"""Tried at once, relative to the one that did best before;"""
+PLAIN = (0.1, 1.0, 10.0)
+"""those of plain least squares, where more is left than slopes as they are weighed can be trusted with (``slopes.NEAR``)."""
 GAIN = 0.005
 """Share of the energy that an iteration must take off, or else slopes are taken narrower; at the narrowest it ends."""
 
@@ -38,9 +40,12 @@ class _Run:
     residual: Array
     energy: float = np.inf
     damping: float = 1e-3
+    plain_damping: float = 1e-3
     slopes: Array | None = None
     weighed: Array | None = None
-    """The smooth residual where it is fitted, weighed."""
+    """The smooth residual where it is fitted, weighed,"""
+    weights: Array | None = None
+    """and by what."""
     done: bool = False
 
 
@@ -118,23 +123,31 @@ def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
             at += 1
             usable = np.isfinite(row).all()
             columns.append(weight * (smooth_of(row)[mask] - smooth) / gap if usable else np.zeros(len(smooth)))
-        run.slopes, run.weighed = np.stack(columns, axis=1), weight * smooth
+        run.slopes, run.weighed, run.weights = np.stack(columns, axis=1), weight * smooth, np.maximum(weight, 1e-12)
 
 
 def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step: int, last: float) -> None:
     """``last``: width from which a step that takes next to nothing ends the descent."""
-    points = [(run, d, _step(run, prior, d)) for run in runs for d in run.damping * np.array(DAMPINGS)]
-    rows = search.residuals([run.model.hypothesis(v) for run, _, v in points])
-    count = len(DAMPINGS)
-    for k, run in enumerate(runs):
-        mine = range(k * count, (k + 1) * count)
-        costs = [_cost(rows[i], points[i][2], mask, prior) for i in mine]
+    far = NEAR * float(search.problem.floor[mask].sum())
+    tries = [[(plain, d) for plain, d in _tries(run) if not plain or run.energy > far] for run in runs]
+    points = [[_step(run, prior, d, plain) for plain, d in mine] for run, mine in zip(runs, tries, strict=True)]
+    rows = iter(
+        search.residuals([run.model.hypothesis(v) for run, some in zip(runs, points, strict=True) for v in some])
+    )
+    for run, mine, some in zip(runs, tries, points, strict=True):
+        found = [next(rows) for _ in mine]
+        costs = [_cost(r, v, mask, prior) for r, v in zip(found, some, strict=True)]
         best, before = int(np.argmin(costs)), run.energy
         if costs[best] < run.energy:
-            _, damping, run.u = points[mine[best]]
-            run.energy, run.residual, run.damping = costs[best], rows[mine[best]], max(float(damping), 1e-7)
+            plain, damping = mine[best]
+            run.energy, run.u, run.residual = costs[best], some[best], found[best]
+            if plain:
+                run.plain_damping = max(damping, 1e-7)
+            else:
+                run.damping = max(damping, 1e-7)
         else:
             run.damping = min(100.0 * run.damping, 1e6)
+            run.plain_damping = min(100.0 * run.plain_damping, 1e6)
         if before - run.energy < GAIN * before:
             run.done = run.width <= last
             run.width = max(0.5 * run.width, NARROWEST)
@@ -142,15 +155,24 @@ def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step:
             run.width = max(0.7 * run.width, NARROWEST)
 
 
+def _tries(run: _Run) -> list[tuple[bool, float]]:
+    """Dampings, and whether of plain least squares."""
+    return [(False, run.damping * d) for d in DAMPINGS] + [(True, run.plain_damping * d) for d in PLAIN]
+
+
 def _cost(r: Array, u: Array, mask: Mask, prior: float) -> float:
     return float(r[mask] @ r[mask]) + prior * float(u @ u) if np.isfinite(r).all() else float("inf")
 
 
-def _step(run: _Run, prior: float, damping: float) -> Array:
-    """Where a damped Gauss-Newton step leads, values that it would push out of their bounds held there."""
-    assert run.slopes is not None and run.weighed is not None
+def _step(run: _Run, prior: float, damping: float, plain: bool) -> Array:
+    """Where a damped Gauss-Newton step leads, values that it would push out of their bounds held there. ``plain``: by least
+    squares of the smooth residual as it is."""
+    assert run.slopes is not None and run.weighed is not None and run.weights is not None
     u, model = run.u, run.model
-    normal, down = run.slopes.T @ run.slopes, -(run.slopes.T @ run.weighed) - prior * u
+    slopes, values = run.slopes, run.weighed
+    if plain:
+        slopes, values = slopes / run.weights[:, None], values / run.weights
+    normal, down = slopes.T @ slopes, -(slopes.T @ values) - prior * u
     scale = np.diag(normal)
     scale = np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-12))
     system = normal + prior * np.eye(len(u)) + damping * np.diag(scale)

@@ -220,9 +220,9 @@ def ranking_section(
 
 
 def _kind(c: Judged, best: Judged) -> str:
-    if not c.earned:
-        return "not"
-    return "best" if c is best else "tied" if c.name in best.tied_with else "earned"
+    if c.name in best.tied_with:
+        return "tied"
+    return "best" if c is best else "earned" if c.earned else "not"
 
 
 def trials_section(problem: Problem, found: Comparison) -> Section:
