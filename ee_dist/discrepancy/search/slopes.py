@@ -29,10 +29,11 @@ SAME = 0.5
 """Energy that data tell nothing by: half of what it costs to have a value one standard deviation off."""
 WIDTHS = (0.12, 0.06, 0.03, 0.012)
 """Finite differences of the iterations, as shares of a parameter's room."""
-FINER, NARROWER, MUCH_NARROWER = 12, 3.0, 10.0
-"""More iterations at most, by how much narrower each, after one that led to nothing by much;"""
-STILL, MISSES = 0.8, 2
-"""far from the noise as long as one in this many leaves less than this share of the energy."""
+FINER, NARROWER = 12, 3.0
+"""More iterations at most, and by how much narrower each that follows one which paid. After one that did not: by how much more
+its slopes changed the residual than is left of it, if by this or more, for then they tell nothing of what is left."""
+STILL = 0.8
+"""Share of the energy that one leaves at most which pays, far from the noise; near it SAME is what it takes off at least."""
 CLOSEST = 1e-9
 """Share of a parameter's room below which two values are one."""
 
@@ -48,7 +49,10 @@ class _Run:
     """Where the slopes were taken: values, and the residual as it is weighed there."""
     weights: Array | None = None
     width: float = WIDTHS[0]
-    misses: int = 0
+    paid: bool = True
+    """Whether the last iteration did,"""
+    moved: float = 0.0
+    """and how much its slopes changed the residual, as a share of what was left of it."""
     side: Array | None = None
     """(P,) to which side of each value slopes are taken next."""
     straight: bool = False
@@ -91,13 +95,12 @@ def follow_slopes(
 
     for run, (value, r) in zip(runs, evaluate([(run, run.u) for run in runs]), strict=True):
         run.energy, run.residual = value, r
-    moving, floor = [run for run in runs if len(run.u)], float(whole.problem.floor[mask].sum())
+    moving = [run for run in runs if len(run.u)]
     for step, width in enumerate(widths):
         going = [run for run in moving if not (run.straight or run.flat)]
         for run in going:
             run.width = width
-        _slopes(going, mask, evaluate, whole.problem, known)
-        _steps(going, mask, evaluate, floor, prior)
+        _iterate(going, mask, evaluate, whole.problem, known, prior)
         search.progress("fitting", (step + 1) / len(widths))
     if len(widths) > 1:
         _finer(moving, mask, evaluate, whole.problem, known, prior)
@@ -123,24 +126,25 @@ def _finer(
 ) -> None:
     """Finer steps for those that still come nearer by them: where sensors are precise and one effect is all that is missing,
     the last width is coarser than what data tell. Half fitted, an explanation loses to one that stands in for it."""
-    floor = float(problem.floor[mask].sum())
     for _ in range(FINER):
-        runs = [
-            run for run in runs if np.isfinite(run.energy) and not (run.straight or run.flat or run.misses >= MISSES)
-        ]
+        runs = [run for run in runs if np.isfinite(run.energy) and not (run.straight or run.flat)]
+        runs = [run for run in runs if run.paid or run.moved >= NARROWER]
         if not runs:
             break
-        before = [run.energy for run in runs]
         for run in runs:
-            run.width /= MUCH_NARROWER if run.misses else NARROWER
-        _slopes(runs, mask, evaluate, problem, known)
-        _steps(runs, mask, evaluate, floor, prior)
-        for run, energy in zip(runs, before, strict=True):
-            near = energy <= NEAR * floor
-            if run.energy < (energy - SAME if near else STILL * energy):
-                run.misses = 0
-            else:
-                run.misses += MISSES if near else 1
+            run.width /= NARROWER if run.paid else run.moved
+        _iterate(runs, mask, evaluate, problem, known, prior)
+
+
+def _iterate(
+    runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Problem, known: Array | None, prior: float
+) -> None:
+    """Slopes over each run's width, and steps along them."""
+    before, floor = [run.energy for run in runs], float(problem.floor[mask].sum())
+    _slopes(runs, mask, evaluate, problem, known)
+    _steps(runs, mask, evaluate, floor, prior)
+    for run, energy in zip(runs, before, strict=True):
+        run.paid = run.energy < (energy - SAME if energy <= NEAR * floor else STILL * energy)
 
 
 def weighed(problem: Problem, residual: Array) -> tuple[Array, Array]:
@@ -175,14 +179,15 @@ def _slopes(
         columns = [] if leading is None else list(leading.T)
         best = (run.energy, run.u, run.residual)
         smooth, weights = weighed(problem, run.residual)
+        moved = 0.0
         for k in range(first, len(run.u)):
             (value, r), (_, u) = found[at], points[at]
             at += 1
             gap = u[k] - run.u[k]
             usable = np.isfinite(value) and np.isfinite(run.energy) and abs(gap) > 1e-12
-            columns.append(
-                (weights * (problem.smooth(r) - smooth))[mask] / gap if usable else np.zeros(int(mask.sum()))
-            )
+            change = problem.smooth(r)[mask] - smooth[mask] if usable else np.zeros(int(mask.sum()))
+            columns.append(weights[mask] * change / gap if usable else change)
+            moved = max(moved, float(np.linalg.norm(change)))
             if value < best[0]:
                 best = (value, u, r)
             elif usable and run.side is not None:
@@ -190,6 +195,7 @@ def _slopes(
                 run.side[k] = -np.sign(gap)
         run.slopes = np.stack(columns, axis=1)
         run.origin, run.weights = (run.u, weights * smooth), weights[mask]
+        run.moved = moved / max(float(np.linalg.norm(smooth[mask])), 1e-12)
         run.energy, run.u, run.residual = best
 
 
@@ -223,8 +229,7 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
         there = float(bent @ bent) + prior * float(first @ first)
         full.append((run, first))
         if here > NEAR * floor:
-            full += [(run, u) for u in others]
-            full += _unweighed(run, mask, prior)
+            full += [(run, u) for u in (*others, _unweighed(run, mask, prior))]
             continue
         shorter += [(run, here - KEPT * (here - there), u) for u in others]
         run.flat = here - there < SAME
@@ -243,8 +248,8 @@ def _side(run: _Run, k: int, h: float) -> float:
     return side if run.model.lower[k] <= at <= run.model.upper[k] else -side
 
 
-def _unweighed(run: _Run, mask: Mask, prior: float) -> list[tuple[_Run, Array]]:
-    """The steps of plain least squares."""
+def _unweighed(run: _Run, mask: Mask, prior: float) -> Array:
+    """Where the step of plain least squares leads."""
     assert run.origin is not None and run.slopes is not None and run.weights is not None
     origin, residual = run.origin
     shares = np.maximum(run.weights, 1e-12)
@@ -252,8 +257,7 @@ def _unweighed(run: _Run, mask: Mask, prior: float) -> list[tuple[_Run, Array]]:
     normal = slopes.T @ slopes + prior * np.eye(len(run.u))
     damp = 1e-6 * np.trace(normal) / len(run.u) + 1e-12
     step = np.linalg.solve(normal + damp * np.eye(len(run.u)), -slopes.T @ plain - prior * origin)
-    step = np.clip(step, -0.5, 0.5)
-    return [(run, np.clip(origin + length * step, run.model.lower, run.model.upper)) for length in LENGTHS[:2]]
+    return np.asarray(np.clip(origin + np.clip(step, -0.5, 0.5), run.model.lower, run.model.upper))
 
 
 def slopes_at(search: Search, model: Model, u: Array, width: float = WIDTHS[2]) -> Array:
