@@ -30,10 +30,11 @@ SAME = 0.5
 WIDTHS = (0.12, 0.06, 0.03, 0.012)
 """Finite differences of the iterations, as shares of a parameter's room."""
 FINER, NARROWER = 12, 3.0
-"""More iterations at most, and by how much narrower each that follows one which paid. After one that did not: by how much more
-its slopes changed the residual than is left of it, if by this or more, for then they tell nothing of what is left."""
-STILL = 0.8
-"""Share of the energy that one leaves at most which pays, far from the noise; near it SAME is what it takes off at least."""
+"""More iterations at most, and by how much narrower each: by this, or, after one that did not pay, by how much more its slopes
+changed the residual than is left of it, for then they told nothing of what is left."""
+STILL, MISSES = 0.95, 2
+"""Share of the energy that an iteration leaves at most which pays, far from the noise (near it SAME is what it takes off at
+least); and after how many in turn that do not the fit ends. Of laws that are left half fitted luck chooses."""
 CLOSEST = 1e-9
 """Share of a parameter's room below which two values are one."""
 
@@ -49,10 +50,10 @@ class _Run:
     """Where the slopes were taken: values, and the residual as it is weighed there."""
     weights: Array | None = None
     width: float = WIDTHS[0]
-    paid: bool = True
-    """Whether the last iteration did,"""
+    misses: int = 0
+    """Iterations in turn that did not pay,"""
     moved: float = 0.0
-    """and how much its slopes changed the residual, as a share of what was left of it."""
+    """and how much the last slopes changed the residual, as a share of what was left of it."""
     side: Array | None = None
     """(P,) to which side of each value slopes are taken next."""
     straight: bool = False
@@ -128,11 +129,11 @@ def _finer(
     the last width is coarser than what data tell. Half fitted, an explanation loses to one that stands in for it."""
     for _ in range(FINER):
         runs = [run for run in runs if np.isfinite(run.energy) and not (run.straight or run.flat)]
-        runs = [run for run in runs if run.paid or run.moved >= NARROWER]
+        runs = [run for run in runs if run.misses < MISSES or run.moved >= NARROWER]
         if not runs:
             break
         for run in runs:
-            run.width /= NARROWER if run.paid else run.moved
+            run.width /= max(NARROWER, run.moved) if run.misses else NARROWER
         _iterate(runs, mask, evaluate, problem, known, prior)
 
 
@@ -144,7 +145,8 @@ def _iterate(
     _slopes(runs, mask, evaluate, problem, known)
     _steps(runs, mask, evaluate, floor, prior)
     for run, energy in zip(runs, before, strict=True):
-        run.paid = run.energy < (energy - SAME if energy <= NEAR * floor else STILL * energy)
+        paid = run.energy < (energy - SAME if energy <= NEAR * floor else STILL * energy)
+        run.misses = 0 if paid else run.misses + 1
 
 
 def weighed(problem: Problem, residual: Array) -> tuple[Array, Array]:
