@@ -54,12 +54,14 @@ class _Run:
     """Iterations in turn that did not pay,"""
     moved: float = 0.0
     """and how much the last slopes changed the residual, as a share of what was left of it."""
-    side: Array | None = None
-    """(P,) to which side of each value slopes are taken next."""
     straight: bool = False
     """Whether the last step came to what slopes foretold: the next would lead nowhere that data tell from there,"""
     flat: bool = False
     """or slopes foretold nothing."""
+
+    def __post_init__(self) -> None:
+        self.side = np.ones(len(self.u))
+        """(P,) to which side of each value slopes are taken next."""
 
 
 Evaluate = Callable[[Sequence[tuple[_Run, Array]]], list[tuple[float, Array]]]
@@ -82,8 +84,6 @@ def follow_slopes(
     whole, search = search, search.within(mask)
     known = None if leading is None else leading[mask]
     runs = [_Run(m, np.clip(np.asarray(u, float), m.lower, m.upper)) for m, u in starts]
-    for run in runs:
-        run.side = np.ones(len(run.u))
 
     def evaluate(points: Sequence[tuple[_Run, Array]]) -> list[tuple[float, Array]]:
         if not points:
@@ -192,7 +192,7 @@ def _slopes(
             moved = max(moved, float(np.linalg.norm(change)))
             if value < best[0]:
                 best = (value, u, r)
-            elif usable and run.side is not None:
+            elif usable:
                 # Far from where it leads a residual bends: slopes tell more of the side that goes down.
                 run.side[k] = -np.sign(gap)
         run.slopes = np.stack(columns, axis=1)
@@ -219,10 +219,7 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
             # No slope where nothing can be simulated: nearer to neutral.
             full.append((run, run.u * 0.5))
             continue
-        normal = run.slopes.T @ run.slopes + prior * np.eye(len(run.u))
-        right = -run.slopes.T @ residual[mask] - prior * origin
-        damp = 1e-6 * np.trace(normal) / len(run.u) + 1e-12
-        step = np.linalg.solve(normal + damp * np.eye(len(run.u)), right)
+        step = _step(run.slopes, residual[mask], origin, prior)
         aim = origin + step
         step = np.clip(step, -0.5, 0.5)
         first, *others = (np.clip(origin + length * step, run.model.lower, run.model.upper) for length in LENGTHS)
@@ -243,9 +240,16 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
     better([(run, u) for run, enough, u in shorter if not run.energy <= enough])
 
 
+def _step(slopes: Array, residual: Array, u: Array, prior: float) -> Array:
+    """(P,) the Gauss-Newton step from values u."""
+    normal = slopes.T @ slopes + prior * np.eye(len(u))
+    damp = 1e-6 * np.trace(normal) / len(u) + 1e-12
+    return np.asarray(np.linalg.solve(normal + damp * np.eye(len(u)), -slopes.T @ residual - prior * u))
+
+
 def _side(run: _Run, k: int, h: float) -> float:
     """To which side of a value its slope is taken: up, or where it went down before, within its bounds."""
-    side = 1.0 if run.side is None else float(run.side[k])
+    side = float(run.side[k])
     at = run.u[k] + side * h
     return side if run.model.lower[k] <= at <= run.model.upper[k] else -side
 
@@ -255,10 +259,7 @@ def _unweighed(run: _Run, mask: Mask, prior: float) -> Array:
     assert run.origin is not None and run.slopes is not None and run.weights is not None
     origin, residual = run.origin
     shares = np.maximum(run.weights, 1e-12)
-    slopes, plain = run.slopes / shares[:, None], residual[mask] / shares
-    normal = slopes.T @ slopes + prior * np.eye(len(run.u))
-    damp = 1e-6 * np.trace(normal) / len(run.u) + 1e-12
-    step = np.linalg.solve(normal + damp * np.eye(len(run.u)), -slopes.T @ plain - prior * origin)
+    step = _step(run.slopes / shares[:, None], residual[mask] / shares, origin, prior)
     return np.asarray(np.clip(origin + np.clip(step, -0.5, 0.5), run.model.lower, run.model.upper))
 
 
