@@ -22,7 +22,8 @@ settings.register_profile("without a clock", deadline=None)
 settings.load_profile("without a clock")
 
 LONGEST = (
-    "tasks/test_every_run.py", "workbench/test_page.py", "tasks/test_verbs.py", "tasks/test_gene_network.py",
+    "tasks/test_every_run.py", "workbench/test_page.py", "tasks/test_verbs.py", "discrepancy/test_assumed.py",
+    "tasks/test_gene_network.py",
     "recovery/test_loop.py", "real/test_bring_your_robot.py", "tasks/test_study.py", "tasks/test_folders.py",
     "effects/test_effect_catalogue.py", "tasks/test_recover.py", "tasks/test_resume.py", "discrepancy/test_ways.py",
     "tasks/test_repair_gaits.py", "tasks/test_socket_robot.py", "recovery/test_doubt.py", "discrepancy/test_too_much.py",

@@ -269,8 +269,10 @@ def test_a_log_is_looked_at(cli, imported):
 def test_one_digest_of_a_search_wherever_its_models_are_simulated(cli, imported, verb, by):
     asked = [f"task={verb}", f"measured={imported}", f"task.by={by}", "task.only=[coulomb_friction]", "engine=mujoco"]
     asked += ["effect=auto", "task.most=1"] if verb == "improve" else []
-    serial = ["evaluator=serial"], ["evaluator=serial", "evaluator.cache=false", "evaluator.chunk=3"]
-    elsewhere = ["evaluator=ray", "evaluator.workers=2", "evaluator.chunk=1"]
-    digests = [json.loads((run(cli, *asked, *extra)[0] / "summary.json").read_text()) for extra in (*serial, elsewhere)]
+    here, elsewhere = (
+        ["evaluator=serial"],
+        ["evaluator=ray", "evaluator.workers=2", "evaluator.chunk=3", "evaluator.cache=false"],
+    )
+    digests = [json.loads((run(cli, *asked, *extra)[0] / "summary.json").read_text()) for extra in (here, elsewhere)]
     assert "friction" in digests[0]["headline"], "something was found, and fitted"
     assert len({d["result_digest"] for d in digests}) == 1
