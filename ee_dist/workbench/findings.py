@@ -13,9 +13,9 @@ from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import CATALOGUE
-from ee_dist.tasks.results.tables import TIED_STANDING, candidate_label, standing
+from ee_dist.tasks.results.tables import candidate_label, kind_of
 from ee_dist.workbench.bench import Step
-from ee_dist.workbench.results import BEST, EARNED, REFUSED, TIED, Explained, Improved, Ranked
+from ee_dist.workbench.results import Explained, Improved, Ranked
 
 NO_TRACE = "it changes nothing that was measured here"
 
@@ -27,8 +27,6 @@ def of_explanation(problem: Problem, found: Explanation, account: Account, folde
 
 
 def _ranked(problem: Problem, found: Explanation, c: Judged, best: Judged) -> Ranked:
-    how = standing(c, best)
-    kind = REFUSED if not c.earned else {"best": BEST, TIED_STANDING: TIED}.get(how, EARNED)
     entry = CATALOGUE[c.terms[0].effect]
     return Ranked(
         c.name,
@@ -38,7 +36,7 @@ def _ranked(problem: Problem, found: Explanation, c: Judged, best: Judged) -> Ra
         c.error_heldout,
         c.explained,
         above(c),
-        kind,
+        kind_of(c, best),
         c.why_not,
         taken_off(c),
         entry.physics,

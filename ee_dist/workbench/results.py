@@ -9,7 +9,7 @@ from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.workbench.bench import Step
 
-BEST, TIED, EARNED, REFUSED = "best", "tied", "earned", "not"
+REFUSED = "not"
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.model import Robot
+from ee_dist.tasks.results.tables import TIED_STANDING, kind_of, standing
 
 
 def judged(explained: float, vague: bool) -> object:
@@ -66,6 +67,8 @@ def test_what_is_vague_and_explains_as_much_may_be_true_and_is_named_as_tied() -
     assert [j.explained for j in order[:2]] == [0.8999, 0.5]
     assert order[0].tied_with == ["0.9"]
     assert not vague.earned  # type: ignore[attr-defined]
+    assert [kind_of(j, order[0]) for j in order] == ["best", "earned", "tied"]
+    assert standing(order[2], order[0]) == f"{TIED_STANDING}, but {VAGUE}"
 
 
 def test_a_law_of_two_numbers_is_vague_where_the_two_cannot_be_told_apart() -> None:

@@ -89,4 +89,6 @@ def test_the_papers_repair_leaves_the_digest_of_the_settings_as_it_was():
 
     plain = config_digest(Config(), Options())
     assert plain == "d75922d88a9a77e56ef2c2e2f491c7afbdd4b6cc27b6d31455e3d397dda2b9c3"
-    assert plain != config_digest(Config(repair=RepairConfig(name="gaits")), Options())
+    gaits = config_digest(Config(repair=RepairConfig(name="gaits")), Options())
+    assert plain != gaits
+    assert gaits != config_digest(Config(repair=RepairConfig(name="gaits", bins=2)), Options())

@@ -20,14 +20,14 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, trial_name, unit_of, worst_trials
 from ee_dist.tasks.results.labels import drawn as in_unit
-from ee_dist.tasks.results.tables import TIED_STANDING, candidate_label, standing
+from ee_dist.tasks.results.tables import candidate_label, kind_of
 from ee_dist.trials.log import SensorLog
 from ee_dist.viewing import finding as drawn
 from ee_dist.viewing.finding_scene import write_compare_rrd, write_explain_rrd, write_improve_rrd
 
 CANDIDATES = 4
 """Candidates whose predictions can be looked at."""
-STANDINGS = {"best": drawn.BEST, TIED_STANDING: drawn.TIED, "earned": drawn.EARNED}
+KINDS = {"best": drawn.BEST, "tied": drawn.TIED, "earned": drawn.EARNED, "not": drawn.REFUSED}
 
 
 def compare_scene(
@@ -149,6 +149,6 @@ def _finding(
 
 def _candidate(problem: Problem, found: Explanation, c: Judged, shown: bool) -> drawn.Candidate:
     label = candidate_label(c, problem.robot)
-    kind = STANDINGS.get(standing(c, found.candidates[0]), drawn.REFUSED)
+    kind = KINDS[kind_of(c, found.candidates[0])]
     account = said(problem, placed(c.name), (*found.fixed, *c.hypothesis)) if shown else None
     return drawn.Candidate(label, *shown_gain(c), kind, account)

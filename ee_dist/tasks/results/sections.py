@@ -15,7 +15,7 @@ from ee_dist.discrepancy.words import percent, percents, placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share, trial_name, worst_trials
-from ee_dist.tasks.results.tables import candidate_label, standing
+from ee_dist.tasks.results.tables import candidate_label, kind_of, standing
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
@@ -197,7 +197,7 @@ def ranking_section(
     if not judged:
         return None
     best = judged[0]
-    kinds = [_kind(c, best) for c in judged]
+    kinds = [kind_of(c, best) for c in judged]
     rows = [
         [str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
          percents(*shown_gain(c)[1:]), standing(c, best)]
@@ -217,12 +217,6 @@ def ranking_section(
     )
     columns = ["rank", "effect", f"{problem.natural_name}, held out", "gain", "95 % interval", "judgement"]
     return Section(heading, caption, figure, Table(columns, rows, (0, 2, 3, 4), lead, pale))
-
-
-def _kind(c: Judged, best: Judged) -> str:
-    if c.name in best.tied_with:
-        return "tied"
-    return "best" if c is best else "earned" if c.earned else "not"
 
 
 def trials_section(problem: Problem, found: Comparison) -> Section:

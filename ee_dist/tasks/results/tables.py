@@ -72,12 +72,18 @@ def candidate_label(c: Judged, robot: Robot) -> str:
 
 
 def standing(c: Judged, best: Judged) -> str:
-    """How a candidate came out."""
-    if not c.earned:
-        return c.why_not
-    if c is best:
-        return "best"
-    return TIED_STANDING if c.name in best.tied_with else "earned"
+    """How a candidate came out, in words."""
+    kind = kind_of(c, best)
+    if kind == "tied":
+        return f"{TIED_STANDING}, but {c.why_not}" if c.why_not else TIED_STANDING
+    return c.why_not or kind
+
+
+def kind_of(c: Judged, best: Judged) -> str:
+    """The same for a picture: best, tied (what is not told for its vague numbers alone, too), earned or not."""
+    if c.name in best.tied_with:
+        return "tied"
+    return "best" if c is best and c.earned else "earned" if c.earned else "not"
 
 
 def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
