@@ -20,7 +20,7 @@ def test_no_more_than_all_of_it_and_a_loss_is_told_as_one(
 ) -> None:
     c = SimpleNamespace(
         rank=1, terms=(), name="a@b", error_heldout=1.0, explained=explained, gain=explained, interval=(-1.5, 1.2),
-        earned=True, tied_with=[], held_out="windows",
+        earned=True, why_not="", tied_with=[], held_out="windows",
     )  # fmt: skip
     problem = SimpleNamespace(robot=None, told=str, natural_name="error")
     show_candidates(terminal(120), problem, [c], "Candidates")  # type: ignore[arg-type, list-item]
