@@ -6,28 +6,23 @@ import csv
 import io
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
-from yaml import YAMLError
 
 from ee_dist.basics.files import write_whole
-from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.folder import SETTINGS
 from ee_dist.tasks.outcome import RESTORED
-from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.findings import findings
 from ee_dist.tasks.results.study_logs import controllers, doubted, parting, shown
 from ee_dist.tasks.results.study_page import Extra, study_page
+from ee_dist.tasks.results.study_runs import FILE, kept, runs_of, summaries
 from ee_dist.tasks.results.study_sections import TEST, brief, cells, head
-from ee_dist.tasks.results.study_table import COLUMNS, Rows, against, by_case, method, once, plain, row, total
+from ee_dist.tasks.results.study_table import COLUMNS, Rows, against, by_case, once, plain, row, total
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.wiring import evaluator_of, for_few
@@ -38,22 +33,21 @@ from ee_dist.viewing.report import write_page
 @dataclass
 class Options:
     name: str = "study"
+    earlier: list[str] = field(default_factory=list)
 
 
-LARGEST = 2**28
-"""Bytes of a summary."""
 SHORT = ("case", "runs", "intact", "after", "last", "restored", "right", "named", "doubt", "p")
 """Heads of the table for a terminal of 80 columns."""
 
 
 def run(config: Config, options: Options, out: Path) -> None:
-    """Write study.csv, study.md, report.html and summary.json from the runs below ``config.log``. Raises ConfigError."""
+    """Write study.csv, study.md, runs.json, report.html and summary.json from the runs below ``config.log`` and those that
+    ``options.earlier`` studies keep. Raises ConfigError."""
     console, watch = terminal(), Stopwatch()
-    if not config.log:
+    if not config.log and not options.earlier:
         raise ConfigError("log=: which runs? name the folder of a sweep, such as log=logs/recover/..._sweep")
-    folder = Path(config.log)
-    told_by = summaries(folder)
-    every = load(folder, told_by)
+    told_by = summaries(Path(config.log)) if config.log else {}
+    every = runs_of(told_by, [Path(e) for e in options.earlier])
     runs = once(every)
     if len(runs) < len(every):
         console.print(f"{len(every) - len(runs)} of {len(every)} runs are there twice and count once.", highlight=False)
@@ -69,6 +63,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     write_whole(out / "study.csv", table.getvalue())
     lines, between, totals = by_case(rows), against(rows), total(rows)
     write_whole(out / "study.md", markdown(rows, lines, totals))
+    write_whole(out / FILE, kept(runs))
     _print(console, lines, totals)
     parted = _partings(few, runs)
     found = findings(rows, lines, between, runs, [(p.near, p.far) for p in parted])
@@ -81,9 +76,10 @@ def run(config: Config, options: Options, out: Path) -> None:
         "findings": [f.as_dict() for f in found],
     })  # fmt: skip
     extra = Extra(shown(runs), parted, between, found, _links(told_by, out))
-    page = study_page(runs, rows, lines, totals, str(config.log), extra)
+    where = " and ".join([*([config.log] if config.log else []), *options.earlier])
+    page = study_page(runs, rows, lines, totals, where, extra)
     write_page(page, out / "report.html")
-    for name in ("study.csv", "study.md", "report.html"):
+    for name in ("study.csv", "study.md", FILE, "report.html"):
         console.print(f"  {os.path.relpath(out / name)}", highlight=False, soft_wrap=True)
     for line in (page.headline, *page.first):
         console.print(line, highlight=False)
@@ -94,53 +90,6 @@ def run(config: Config, options: Options, out: Path) -> None:
 def _decisive(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows without what says where and how long they were computed: the digest of a study is of its runs' results."""
     return [{k: v for k, v in r.items() if k not in ("wall_s", "folder", "command")} for r in rows]
-
-
-def summaries(folder: Path) -> dict[Path, dict[str, Any]]:
-    """All below a folder, by path in order. Raises ConfigError for a file that is none."""
-    return {path: _summary(path) for path in sorted(folder.rglob("summary.json"))}
-
-
-def load(folder: Path, told_by: Mapping[Path, dict[str, Any]]) -> list[dict[str, Any]]:
-    """Of the summaries below a folder those of finished recover runs, in order, each with its own ``folder`` and the
-    ``command`` that repeats it. Raises ConfigError where there is none."""
-    found = []
-    for path, content in told_by.items():
-        if content.get("task") != "recover":
-            continue
-        try:
-            row(content)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise ConfigError(f"{path}: a summary without {error}; take it out of the folder") from None
-        # Before their way of repair counts as one: the command is of what the run was told.
-        again = _command(path.parent)
-        found.append({**content, "metric": method(content), "folder": str(path.parent), "command": again})
-    if not found:
-        raise ConfigError(f"log={folder}: no finished run below it; a run is finished when it has a summary.json")
-    return sorted(found, key=lambda s: (s["metric"], s["engine"], str(s["scenario"]).zfill(9), s["seed"]))
-
-
-def _summary(path: Path) -> dict[str, Any]:
-    try:
-        content = json_of(text_of(path, LARGEST))
-    except (OSError, UntrustedError) as error:
-        raise ConfigError(f"{path}: not a summary ({error}); take it out of the folder") from None
-    if not isinstance(content, dict):
-        raise ConfigError(f"{path}: not a summary; take it out of the folder")
-    return content
-
-
-def _command(folder: Path) -> str:
-    """What repeats a run, in the words that it was asked for; nothing where they are not beside it."""
-    try:
-        words = OmegaConf.to_container(OmegaConf.create(text_of(folder / SETTINGS / "overrides.yaml", LARGEST)))
-    except (OSError, UntrustedError, YAMLError, OmegaConfBaseException, ValueError):
-        return ""
-    if not isinstance(words, list):
-        return ""
-    asked = [str(w) for w in words if not str(w).startswith(("resume=", "overwrite=", "hydra."))]
-    # A sweep notes the scenario in quotes, which a shell would need quotes for.
-    return command([w.replace("'", "") if w.startswith("+scenario=") else w for w in asked])
 
 
 def _partings(few: Config, runs: Sequence[Mapping[str, Any]]) -> list[Parting]:

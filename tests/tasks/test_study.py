@@ -8,6 +8,7 @@ import json
 import math
 import re
 import shlex
+import shutil
 
 import numpy as np
 import pytest
@@ -56,6 +57,35 @@ def test_a_sweep_becomes_a_table_and_figures(cli, tiny):
     assert outcome.out.splitlines()[-1].startswith("Next: ") and head in outcome.out, (
         "the finding last, and what to do next"
     )
+
+
+def test_a_study_grows_from_one_to_the_next(cli, tiny, tmp_path):
+    sweep = cli("-m", "+scenario=3", "seed=0,1", "evaluator=serial", *tiny, "budget.compensating_trials=1")
+    first, second = (run.parent / run.name for run in sweep.runs())
+    whole = cli("task=study", f"log={first.parent}")
+    part = cli("task=study", f"log={first}")
+    assert (whole.status, part.status) == (0, 0), part.err
+    shutil.rmtree(first)
+    grown = cli("task=study", f"log={second}", f"task.earlier=[{part.runs()[0]}]")
+    assert grown.status == 0, grown.err
+    assert grown.summary()["result_digest"] == whole.summary()["result_digest"], "the same runs make the same study"
+    shutil.rmtree(second)
+    alone = cli("task=study", f"task.earlier=[{grown.runs()[0] / 'runs.json'}]")
+    assert alone.summary()["result_digest"] == whole.summary()["result_digest"], "and keep it without their folders"
+    assert "task=view" not in alone.out.splitlines()[-1], "nothing to view is left of them"
+
+    for content, said in (
+        ('{"runs": [{"scenario": 3}]}', "a run without"),
+        ("[]", "not the runs.json of a study"),
+        ("{", "not the runs.json of a study"),
+    ):
+        (tmp_path / "runs.json").write_text(content)
+        wrong = cli("task=study", f"task.earlier=[{tmp_path}]")
+        assert wrong.status == 2 and said in wrong.err and len(wrong.err.splitlines()) == 1, wrong.err
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    nothing = cli("task=study", f"log={empty}", f"task.earlier=[{grown.runs()[0]}]")
+    assert nothing.status == 2 and "no finished run below it" in nothing.err, "a folder that is named counts"
 
 
 def test_runs_that_repair_in_another_way_are_counted_apart():
@@ -163,12 +193,15 @@ def page_of(summaries):
     return study_page(summaries, rows, by_case(rows), total(rows), "logs/sweep")
 
 
-def test_the_first_lines_of_a_study_tell_what_how_sure_and_what_next():
+def test_the_first_lines_of_a_study_tell_what_how_sure_and_what_next(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     summaries = study_of([1, 2], range(8))
     page = page_of(summaries)
     assert page.tone == "good" and page.first[-1] == "Next: nothing has to be done."
     assert "2 of 2 cases" in page.first[1]
     summaries[9] |= {"restored": False, "recovered_fraction": 0.42, "folder": "logs/a sweep/5"}
+    assert page_of(summaries).following.startswith("python -m ee_dist +scenario=2"), "nothing to view is there"
+    (tmp_path / "logs/a sweep/5").mkdir(parents=True)
     page = page_of(summaries)
     assert (
         page.headline == "Function restored in 15 of 16 runs; the diagnosis right in 16 of 16." and page.tone == "open"

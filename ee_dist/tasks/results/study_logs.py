@@ -63,7 +63,8 @@ def _first(key: tuple[Any, ...]) -> tuple[Any, ...]:
 
 def shown(summaries: Summaries) -> list[tuple[Mapping[str, Any], Told]]:
     """The runs to show, read from their recordings; none where one of them has no recording."""
-    chosen = [(s, recorded(s)) for s in pair_to_show(summaries)]
+    there = [s for s in summaries if (Path(s.get("folder", "")) / LOG).is_file()]
+    chosen = [(s, recorded(s)) for s in pair_to_show(there)] if there else []
     return [(s, told_of(run)) for s, run in chosen if run is not None and len(hardware_trials(run)) > 2]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ee_dist.basics.names import counted
@@ -88,7 +89,11 @@ def study_page(
     page.proof, *figures = (parts.distance_section(m, summaries, rows, lines) for m in metrics)
     worst = _worst(rows)
     if worst is not None and summaries[worst].get("folder"):
-        page.following = command(["task=view", setting("log", summaries[worst]["folder"])])
+        there = Path(summaries[worst]["folder"]).is_dir()
+        # Of an earlier study its numbers may be all that is left.
+        page.following = (
+            command(["task=view", setting("log", summaries[worst]["folder"])]) if there else rows[worst]["command"]
+        )
     page.sections = [
         *figures,
         *parts.finding_sections(extra.findings),
