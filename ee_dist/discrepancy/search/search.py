@@ -17,8 +17,8 @@ BATCH = 240
 """Hypotheses that are asked for in one call while many are probed, at most,"""
 VALUES = 8_000_000
 """and residual values that they may have together: of long logs a call takes seconds and 64 MB with few of them."""
-FIRST = 6
-"""How much smaller the first of them is."""
+FIRST = 20
+"""How much smaller the first of them is where they are of long logs."""
 
 
 def quiet(what: str, share: float) -> None:
@@ -47,9 +47,9 @@ class Search:
         return max(1, min(BATCH, VALUES // max(1, len(self.problem.segment_of))))
 
     def batches(self, count: int) -> Iterator[slice]:
-        """``count`` hypotheses in the batches that they are asked for in. Where a batch takes long the first are smaller: who
-        waits is told soon how long."""
-        size = max(1, self.batch // FIRST) if self.batch < BATCH / FIRST else self.batch
+        """``count`` hypotheses in the batches that they are asked for in. Where logs are long, so that memory bounds them, the
+        first are smaller: who waits is told soon how long."""
+        size = max(1, self.batch // FIRST) if self.batch < BATCH else self.batch
         at = 0
         while at < count:
             yield slice(at, min(at + size, count))
