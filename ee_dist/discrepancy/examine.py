@@ -39,6 +39,9 @@ WORTH_JUDGING = 0.4
 """Share of what the best quick fit takes off that another must take off to be judged beside it, unless it is among the first
 AT_LEAST."""
 AT_LEAST = 4
+TELLING = 1000.0
+"""Energy above the noise (in variances) in one trial from which candidates are screened by it alone: some thirty times what luck
+promises the best of a few hundred, so that a right one, whose small probe may say a third of it, is not lost among them."""
 Looked = TypeVar("Looked", Screened, Scanned)
 FAMILIES_TRIED = 4
 """Effects whose members at all joints, each with a value of its own, are tried together."""
@@ -106,7 +109,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     if len(current.u):
         leading = slopes_at(search, Model(current.parts), current.u)
     refit, busy = Refit(leading), busiest(problem, base, calm)
-    screened = screen(now.among(busy), pool, effort.shares, refit, by_excess(problem, base, busy)[0])
+    screened = screen(now.among(busy), pool, effort.shares, refit, telling(problem, base, busy))
     least = least_energy(len(pool))
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)
     promising = _first(promising, effort.first)
@@ -245,6 +248,13 @@ def by_excess(problem: Problem, base: Array, among: Sequence[int]) -> list[int]:
     size = np.bincount(problem.trial_of, minlength=count)
     excess = np.bincount(problem.trial_of, weights=base**2 - problem.floor, minlength=count)
     return sorted(among, key=lambda k: -float(excess[k]) / max(int(size[k]), 1))
+
+
+def telling(problem: Problem, base: Array, among: Sequence[int]) -> int | None:
+    """The trial among some that has most to explain for its length, if that is enough to tell explanations apart by it alone."""
+    k = by_excess(problem, base, among)[0]
+    own = problem.trial_of == k
+    return k if float((base[own] ** 2 - problem.floor[own]).sum()) >= TELLING else None
 
 
 def _quick(

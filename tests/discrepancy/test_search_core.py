@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, SETTINGS, bootstrap, travelling, windows
 from ee_dist.discrepancy.evidence.left import leftovers
-from ee_dist.discrepancy.examine import Effort
+from ee_dist.discrepancy.examine import Effort, telling
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.search import screen as screening
@@ -255,3 +256,16 @@ def test_bootstrap_holds_the_sum() -> None:
     d = np.random.default_rng(1).normal(1.0, 0.1, 50)
     low, high = bootstrap(d)
     assert low < d.sum() < high and low > 40
+
+
+def test_one_trial_screens_alone_only_where_it_has_enough_to_tell():
+    """Else the right explanation of a faint residual is lost among hundreds: of one trial the small probe of a rotor promised a
+    quarter of what others did, of all trials most of all."""
+    problem = SimpleNamespace(
+        trials=(None, None), trial_of=np.array([0] * 100 + [1] * 50), floor=np.ones(150), trust=(1.0, 1.0), looped=()
+    )
+    faint = np.ones(150) * 2.0
+    loud = faint.copy()
+    loud[100:] = 6.0
+    assert telling(problem, faint, [0, 1]) is None  # type: ignore[arg-type]
+    assert telling(problem, loud, [0, 1]) == 1  # type: ignore[arg-type]
