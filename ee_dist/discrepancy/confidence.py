@@ -56,7 +56,11 @@ def signs_of(found: Explanation) -> Signs | None:
         return None
     taken = best.gain * float(found.base @ found.base)
     luck = best.dispersion * least_energy(found.tried, max(1, best.proposal.size))
-    others = [float(j.held.sum()) for j in found.candidates if j is not best and j.name not in best.tied_with]
+    others = [
+        float(j.held.sum())
+        for j in found.candidates
+        if j is not best and j.name not in best.tied_with and not j.contains(best)
+    ]
     behind = min(others) - float(best.held.sum()) if others else math.inf
     rest = 1.0 if found.left else 0.0
     return Signs(_power(taken / luck, 0.0), _power(behind / (TIE_ENERGY * best.dispersion), -1.0), rest)

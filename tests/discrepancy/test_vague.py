@@ -12,7 +12,7 @@ from linear_problem import ROBOT, Linear
 from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.evidence.holdout import HeldOut, windows
-from ee_dist.discrepancy.evidence.judge import VAGUE, judge, ranked
+from ee_dist.discrepancy.evidence.judge import VAGUE, Judged, judge, ranked
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.pruning import told_only
@@ -49,6 +49,19 @@ class Following:
     @property
     def stands(self) -> bool:
         return self.earned or self.why_not == VAGUE
+
+    contains = Judged.contains
+
+
+def test_the_same_and_more_is_no_other_explanation() -> None:
+    """Friction by load is not to be told apart from friction by load and by its square."""
+    alone, both, other = judged(0.8999, vague=False), judged(0.9, vague=False), judged(0.8998, vague=False)
+    one, two = SimpleNamespace(name="load"), SimpleNamespace(name="square")
+    for j, parts in ((alone, (one,)), (both, (one, two)), (other, (two,))):
+        j.proposal = SimpleNamespace(size=len(parts), guess=False, parts=parts)  # type: ignore[attr-defined]
+        j.sure = 1000.0  # type: ignore[attr-defined]
+    order = ranked([both, alone, other])  # type: ignore[list-item]
+    assert order[0] is alone and order[0].tied_with == ["0.8998"]
 
 
 @pytest.mark.parametrize(("plain", "named"), [(0.3, 0.3), (0.2, 0.9)])

@@ -80,7 +80,8 @@ def explain_account(
     elif found.verdict == EFFECT and best is not None:
         entry, last = CATALOGUE[best.terms[0].effect], best.error_heldout
         # Those that were judged are the most promising: where all of them are tied there may be more.
-        more = "at least " if len(best.tied_with) + 1 == len(found.candidates) < found.tried else ""
+        looked_at = [c for c in found.candidates if not c.contains(best)]
+        more = "at least " if len(best.tied_with) + 1 == len(looked_at) < found.tried else ""
         less = is_less(best.terms)
         rest = left_beside_noise(found.left, best.terms, robot)
         head = f"{'Too much' if less else 'Missing'}{', as one of several things' if rest else ''}: "

@@ -81,6 +81,11 @@ class Judged:
         """Whether data do not speak against it: it earned its place, or would have if it said less."""
         return self.earned or self.why_not == VAGUE
 
+    def contains(self, other: Judged) -> bool:
+        """Whether it is the other and more: no other explanation, unless more pays."""
+        names, fewer = ({c.name for c in j.proposal.parts} for j in (self, other))
+        return fewer < names
+
     @property
     def held_out(self) -> str:
         """What was held out."""
@@ -225,8 +230,9 @@ def _best(found: HeldOut) -> Array:
 
 def ranked(found: Sequence[Judged]) -> list[Judged]:
     """Best held-out energy first, those that earned their place before the others; ties are named, and of those that are
-    tied with the best the one with the fewest numbers goes first: a richer law can always mimic a simpler one. What is not told
-    for its vague numbers alone may be true all the same, and is named in ties."""
+    tied with the best the one with the fewest numbers goes first: a richer law can always mimic a simpler one, and what is it
+    and more is no other explanation. What is not told for its vague numbers alone may be true all the same, and is named in
+    ties."""
     for j in found:
         if j.vague and j.earned and any(_plainer(k, j) for k in found):
             j.why_not = VAGUE
@@ -256,6 +262,8 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
             first.tied_with = [name for name in others if name != first.name]
+        more = {j.name for j in ordered if j.contains(first)}
+        first.tied_with = [name for name in first.tied_with if name not in more]
         ordered.remove(first)
         ordered.insert(0, first)
     for k, j in enumerate(ordered):
@@ -271,8 +279,7 @@ def _left(j: Judged) -> float:
 def _fuller(j: Judged, first: Judged) -> bool:
     """Whether it is the same and more, and takes off a part of what that leaves. With a handful of motions nothing is sure: the
     further term may be none, and yet foretells better on the whole."""
-    names, fewer = ({c.name for c in x.proposal.parts} for x in (j, first))
-    if not j.earned or not fewer < names:
+    if not j.earned or not j.contains(first):
         return False
     return float(first.held.sum()) > NEAR**2 * first.sure and _left(j) <= FULLER * _left(first)
 
