@@ -24,7 +24,7 @@ from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, E
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
-from ee_dist.discrepancy.pruning import told_only, without_useless
+from ee_dist.discrepancy.pruning import told_only, without_neutral, without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_all, fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -145,8 +145,9 @@ def improve(
         if spread or len(current.parts) - own > 1:
             # Of two that leave the same mark the values may be anything, and one of them says it all.
             current, gone = told_only(search, current, own, _cut(problem), len(pool), not spread)
-            if gone:
-                climb(_refitted(search, current, "without what these data do not tell from neutral", gone))
+            current, none = without_neutral(current, own)
+            if gone or none:
+                climb(_refitted(search, current, "without what these data do not tell from neutral", (*gone, *none)))
     return _finish(search, current, ladder, as_it_is, stopped, last)
 
 

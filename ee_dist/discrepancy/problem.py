@@ -78,6 +78,10 @@ def _one(parts: Sequence[Series]) -> Series:
     return replace(parts[0], times_s=across("times_s"), measured=across("measured"), predicted=across("predicted"))
 
 
+TIMES_NOISE = "times the noise"
+"""The unit of an error of channels that have no unit in common."""
+
+
 class Problem(ABC):
     """Measured trials against one base model, under one way of comparing.
 

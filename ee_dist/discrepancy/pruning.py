@@ -18,6 +18,8 @@ from ee_dist.trials.log import Array
 
 AGAIN = 0.03
 """Finite differences where the values are nearly right already."""
+NONE = 1e-9
+"""Share of its range at which a value is neutral."""
 ROUNDS = 3
 """How often terms are left out and the rest is fitted anew."""
 
@@ -168,3 +170,15 @@ def told_only(
     while gone and not _as_good(search, models[0], models[len(gone)], cut, tried):
         gone = gone[: len(gone) // 2]
     return models[len(gone)], tuple(name for names in gone for name in names)
+
+
+def without_neutral(current: Current, own: int) -> tuple[Current, tuple[str, ...]]:
+    """The model without the terms that ended at neutral, and their names: it is the same model, and nobody is told that no
+    friction was added. The first ``own`` parts stay."""
+    places = Model(current.parts).places
+    none = [
+        k for k, p in enumerate(places) if k >= own and current.parts[k].size and not np.abs(current.u[p]).max() > NONE
+    ]
+    keep = [k for k in range(len(places)) if k not in none]
+    values = np.concatenate([current.u[places[k]] for k in keep] or [np.zeros(0)])
+    return Current(tuple(current.parts[k] for k in keep), values), tuple(current.parts[k].name for k in none)

@@ -18,6 +18,8 @@ SHARED = " than joints share"
 MANY = 3
 """Places of one effect from which their values are told as a range: each has its line in a table."""
 
+NOTHING = 1e-12
+"""A value of this size is none, in any unit: what is left of it is arithmetic."""
 EXACT = 1e-9
 """What a share of all of it may lack by the arithmetic alone."""
 
@@ -56,7 +58,7 @@ def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
         return f"{-value:.3g}{_unit(term, key, robot)} less{_than(term, key, value, robot)}"
     if is_share(term.effect, key):
         return f"{100 * value + 0.0:{SIGNED if key in CHANGES else ''}.3g} %"
-    return f"{value:.3g}{_unit(term, key, robot)}"
+    return f"{0.0 if abs(value) < NOTHING else value:.3g}{_unit(term, key, robot)}"
 
 
 def is_share(effect: str, key: str) -> bool:
@@ -86,8 +88,10 @@ def span(term: Term, key: str, low: float, high: float, robot: Robot | None, *, 
     unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
     below = bool(CATALOGUE[term.effect].parameter(key).on_top) and low < 0
     if below and not (interval and _than(term, key, low, robot) == SHARED):
-        more = f"{b}{unit} more" if high > 0 else f"{b.removeprefix('-')}{unit} less"
-        return f"{a.removeprefix('-')}{unit} less to {more}{_than(term, key, low, robot)}"
+        than = _than(term, key, low, robot)
+        if high <= 0:
+            return f"{b.removeprefix('-')} to {a.removeprefix('-')}{unit} less{than}"
+        return f"{a.removeprefix('-')}{unit} less to {b}{unit} more{than}"
     return f"{a} to {b}{unit}"
 
 

@@ -61,6 +61,9 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+TIME_STEP = "time step"
+
+
 def agreed(model: Robot, recorded: Robot, where: str) -> tuple[Robot, tuple[str, ...]]:
     """The robot to compare with a log: the ``model``'s, with the noise that the recorded robot's sensors have.
 
@@ -74,12 +77,13 @@ def agreed(model: Robot, recorded: Robot, where: str) -> tuple[Robot, tuple[str,
         ("sensors", model.sensor_names, recorded.sensor_names),
         ("units of sensors", [s.unit for s in model.sensors], [s.unit for s in recorded.sensors]),
         ("commands", [d.command for d in model.drives], [d.command for d in recorded.drives]),
-        ("time step", [f"{model.time_step_s:g} s"], [f"{recorded.time_step_s:g} s"]),
+        (TIME_STEP, [f"{model.time_step_s:g} s"], [f"{recorded.time_step_s:g} s"]),
     ):
         if list(mine) != list(theirs):
+            not_those = "is not that" if what == TIME_STEP else "are not those"
             raise RobotError(
-                f"{where}: the {what} of {model.name} are not those of the log: {listed(mine)}; the log has "
-                f"{listed(theirs)}"
+                f"{where}: the {what} of {model.name} {not_those} of the log: {listed(mine)}; the log has {listed(theirs)}"
+                + (" (import it again with the other description)" if what == TIME_STEP else "")
             )
     noise = {s.name: {n: getattr(s, n) for n in OF_THE_MEASUREMENT} for s in recorded.sensors}
     sensors = tuple(replace(s, **noise[s.name]) for s in model.sensors)

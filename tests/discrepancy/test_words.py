@@ -282,7 +282,7 @@ def test_units_are_told_behind_values_and_not_in_names():
         (0.1, 0.2, "0.1 to 0.2"),
         (0.1118, 0.1124, "0.1118 to 0.1124"),
         (0.3, 0.3, "0.3 to 0.3"),
-        (-0.000569, -0.000259, "0.000569 less to 0.000259 less than described"),
+        (-0.000569, -0.000259, "0.000259 to 0.000569 less than described"),
         (-0.01, 0.02, "0.01 less to 0.02 more than described"),
     ],
 )

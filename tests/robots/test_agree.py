@@ -39,7 +39,7 @@ def test_a_meter_of_motor_torque_in_the_log_is_no_other_robot() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda r: replace(r, time_step_s=0.01), "the time step of servo_pendulum are not those of the log: 0.01 s"),
+        (lambda r: replace(r, time_step_s=0.01), "the time step of servo_pendulum is not that of the log: 0.01 s"),
         (
             lambda r: replace(r, sensors=r.sensors[:1]),
             "the sensors of servo_pendulum are not those of the log: position;",

@@ -57,3 +57,10 @@ def test_units_are_those_of_a_slide():
         linear_stage(),
     )  # fmt: skip
     assert found[0].name == "coulomb friction, force (N)"
+
+
+def test_an_interval_that_a_bound_cuts_is_told_by_its_ends():
+    """218 with an interval of -90 to 300 is no 218 plus and minus 195, which is surely above zero."""
+    assert within(ParameterReport(0, "x", 218.0, -90.0, 300.0, "")) == "218 (-90 to 300)"
+    assert within(ParameterReport(0, "x", 218.0, -90.0, 300.0, "at its bound")) == "218 (-90 to 300; at its bound)"
+    assert within(ParameterReport(0, "x", 218.0, 23.0, 413.0, "")) == "218 ± 195"

@@ -18,7 +18,7 @@ from ee_dist.discrepancy.accounts.account import (
 from ee_dist.discrepancy.assumed import assumed_text
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.left import Leftover
-from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.problem import TIMES_NOISE, Problem
 from ee_dist.discrepancy.words import plain
 
 CLOSE = 1.1
@@ -46,7 +46,8 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
         how = "The model is nearly right, and more than noise is left" if ratio < CLOSE else "The model is off"
         least = problem.natural(found.noise_floor)
         times = _times(problem.natural(found.error) / least) if least else "far more than"
-        head = f"{how}{where}: {problem.natural_name} {off}, {times} what noise alone would leave."
+        in_noise = problem.natural_unit == TIMES_NOISE
+        head = f"{how}{where}: {problem.natural_name} {off}{'' if in_noise else f', {times} what noise alone would leave'}."
     floor = problem.told(found.noise_floor)
     error = f"{error_name(problem)}: model {off}, noise floor {floor}."
     # A channel that agrees to the last digit is a command that no sensor comes into: there is nothing to compare.
@@ -57,6 +58,8 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
         f"How sure: {curves_of(left)} of {of} differ{'s' if curves_of(left) == 1 else ''} by more than noise"
         if left
         else f"How sure: none of {of} differs by more than noise"
+        if ratio < CLOSE
+        else f"How sure: none of {of} stands out by itself, and all together they are more than noise"
     )
     sure += f"; the noise floor is {found.floor_source}."
     settled = ratio < CLOSE and not left

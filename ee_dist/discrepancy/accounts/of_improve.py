@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
@@ -39,8 +40,17 @@ from ee_dist.effects.catalogue import Hypothesis, Term
 from ee_dist.robots.model import Robot
 
 NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
+EACH = "each of "
 NAMED = 3
 """Effects that a headline names."""
+
+
+def has(names: AbstractSet[str], told: str) -> bool:
+    """Whether effects of these ``names`` are all that an explanation is made of: a rival that came into the model later."""
+    effect, _, place = told.partition("@")
+    if place.startswith(EACH):
+        return any(name.startswith(f"{effect}@") for name in names)
+    return set(told.split(" + ")) <= names
 
 
 def improve_account(problem: Problem, found: Improvement, planner: str = "", also: Sequence[str] = ()) -> Account:
@@ -52,7 +62,7 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     if len(steps) > 1:
         lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
     names = {t.name for t in found.terms}
-    ties = {r.name: [n for n in r.tied_with if n not in names] for r in steps if names & {t.name for t in r.added}}
+    ties = {r.name: [n for n in r.tied_with if not has(names, n)] for r in steps if names & {t.name for t in r.added}}
     lines += [tie_text(placed(name), others) for name, others in ties.items() if others]
     gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in names)
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]

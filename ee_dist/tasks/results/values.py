@@ -51,13 +51,21 @@ def kinds_of(terms: Hypothesis, reports: Sequence[ParameterReport], robot: Robot
     return [Kind(*key, tuple(at)) for key, at in found.items()]
 
 
+UNEVEN = 0.1
+"""Share of half an interval that its middle may be off the value for it to be told as a plus and minus."""
+
+
 def within(p: ParameterReport) -> str:
-    """``0.2032 ± 0.0031``, with as many digits as the interval leaves, and what is wrong with it."""
+    """``0.2032 ± 0.0031``, with as many digits as the interval leaves, and what is wrong with it; an interval that a bound
+    cuts is told by its ends: ``218 (-90 to 300)``."""
     half = (p.high - p.low) / 2
     if not np.isfinite(half):
         return f"{p.value:.3g} ({p.flag})" if p.flag else f"{p.value:.3g}"
     if half <= 0:
         return f"{p.value:.4g}"
+    if abs(p.value - (p.low + p.high) / 2) > UNEVEN * half:
+        cut = f"{p.value:.3g} ({p.low:.3g} to {p.high:.3g})"
+        return f"{cut[:-1]}; {p.flag})" if p.flag else cut
     digits = max(1 - math.floor(math.log10(half)), 0)  # two of the interval
     fine = half < FINE * abs(p.value)
     shown = f"{p.value:.4g} ± {half:.1g}" if fine else f"{round(p.value, digits) + 0.0:.{digits}f} ± {half:.{digits}f}"

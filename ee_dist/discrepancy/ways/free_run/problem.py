@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
-from ee_dist.discrepancy.problem import Index, Layout, Problem, Series, error, joints_of
+from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.slow_noise import slow_noise, without_motion
 from ee_dist.discrepancy.starting import starting_speeds
 from ee_dist.effects.catalogue import Hypothesis, apply
@@ -98,13 +98,13 @@ class FreeRun(Problem):
         """(C,) mean absolute error that noise alone would leave, in the unit of each channel."""
         self._lay_out(BLOCKS if windows_s is None else 1)
         self.units = tuple(by_unit)
-        self.natural_unit = self.units[0] if len(by_unit) == 1 else "times the noise"
+        self.natural_unit = self.units[0] if len(by_unit) == 1 else TIMES_NOISE
         how = "free runs of the whole record" if windows_s is None else f"windows of {windows_s:g} s"
         if windows_s is not None:
             self.natural_name = f"mean absolute position error over {windows_s:g} s"
         self.error_definition = (
-            f"square root of the mean absolute position error over {how}, every trial counting the same, in units of the "
-            f"noise of the readings ({', '.join(f'{noise:.2g} {unit}' for unit, noise in by_unit.items())})"
+            f"mean absolute position error over {how}, every trial counting the same (for programs: its square root, in units "
+            f"of the noise of the readings, {', '.join(f'{noise:.2g} {unit}' for unit, noise in by_unit.items())})"
         )
 
     def _lay_out(self, blocks: int) -> None:

@@ -1,0 +1,35 @@
+"""What ended at neutral is no finding: it is left out of the model, of ties and of intervals as they are shown."""
+
+from __future__ import annotations
+
+import numpy as np
+from linear_problem import ROBOT
+
+from ee_dist.discrepancy.accounts.of_improve import has
+from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.pruning import without_neutral
+from ee_dist.discrepancy.search.candidates import candidate
+
+
+def test_terms_at_neutral_leave_the_model_and_the_others_stay() -> None:
+    parts = tuple(
+        candidate(ROBOT, "motor_weak", joint) for joint in ("knee_front_left", "hip_rear_left", "hip_rear_right")
+    )
+    before = Current(parts, np.array([0.0, 0.3, 0.0]))
+    after, gone = without_neutral(before, 0)
+    assert [p.name for p in after.parts] == ["motor_weak@hip_rear_left"] and after.u.tolist() == [0.3]
+    assert gone == ("motor_weak@knee_front_left", "motor_weak@hip_rear_right")
+    kept, gone = without_neutral(before, 1)
+    assert kept.parts[0] is parts[0] and gone == ("motor_weak@hip_rear_right",), "what the model began with stays"
+    same, gone = without_neutral(after, 0)
+    assert (same.parts, gone) == (after.parts, ())
+
+
+def test_a_rival_that_came_into_the_model_later_is_no_rival() -> None:
+    names = {"coulomb_friction@base", "coulomb_friction@elbow", "load_friction@elbow"}
+    assert has(names, "coulomb_friction@base")
+    assert has(names, "coulomb_friction@each of 3 joints")
+    assert has(names, "coulomb_friction@elbow + load_friction@elbow")
+    assert not has(names, "viscous_friction@base")
+    assert not has(names, "viscous_friction@each of 3 joints")
+    assert not has(names, "load_friction@elbow + quadratic_friction@elbow")
