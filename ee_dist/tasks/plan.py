@@ -26,7 +26,7 @@ from ee_dist.tasks.explained import Explained, explained, fitting
 from ee_dist.tasks.measurements import FEWEST_ROWS, load, with_known_noise
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import command, setting
-from ee_dist.tasks.results.plan_page import account_of, of_plan, plan_page, show_plan
+from ee_dist.tasks.results.plan_page import CSV, account_of, of_plan, plan_page, show_plan
 from ee_dist.tasks.results.tables import show_account
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.terminal import terminal
@@ -41,7 +41,7 @@ MOST_TIED = 6
 """Tied explanations, the best first, that the trial is to tell apart."""
 SUSPECTED = 0.2
 """Share of the range worth trying at which an effect that was not found is put."""
-CSV, ROBOT = "plan.csv", "robot.yaml"
+ROBOT = "robot.yaml"
 
 
 @dataclass
@@ -127,20 +127,23 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     trial = ["task=trial", *robot_settings(robot, out), f"task.noise={noise_share(robot):.3g}",
              setting("engine", found.config.engine.name), f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
     explanations = list(zip(names, models, strict=True))
+    # The robot of a log that was imported is no simulated one.
+    real = all(t.commands_held is not False for t in measured.trials)
+    following = trial if result.enough and not real else []
     account = account_of(
         robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED,
-        every_s,
+        every_s, real,
     ).warned(measured.remarks)  # fmt: skip
     digest = digest_of([(t.excitation, [round(s, 9) for s in t.separations]) for t in result.trials])
     rest = of_plan(result, explanations, found.folder, measured.files, options.limits, account)
     rest |= {"reading_s": every_s or robot.time_step_s, "csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}
     write_summary(out, "plan", found.config, options, watch, digest, rest)
     write_page(
-        plan_page(robot, result, explanations, shown, account, measured.files, command(trial) if result.enough else ""),
+        plan_page(robot, result, explanations, shown, account, measured.files, command(following) if following else ""),
         out / "report.html",
     )
     show_plan(console, robot, result)
-    show_account(console, account, out, trial if result.enough else ())
+    show_account(console, account, out, following)
     return result
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from ee_dist.recording.reader import read_run
+from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.explained import explained
+from ee_dist.tasks.results.plan_page import account_of
 from ee_dist.trials.excitation import parse
 
 QUICK = ("engine=mujoco", "evaluator=serial")
@@ -94,6 +97,20 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     taken, _ = run("task=import", "robot=servo_pendulum", f"measured={plan / 'recorded.csv'}")
     back = read_run(taken / "measured.mcap").trials[0].log
     assert np.allclose(back.commands, log.commands, atol=1e-6)
+
+
+def test_who_has_a_real_robot_is_not_sent_to_a_simulated_one():
+    robot, best = servo_pendulum(), parse("sway:seconds=2,amplitude=0.5,seed=1")
+    found = SimpleNamespace(
+        best=SimpleNamespace(excitation=best, separation=60.0), closest=(0, 1), enough=True, trials=[best], alike=[]
+    )
+    tied_ones = [("part_mass@arm", ()), ("command_gain@servo", ())]
+    real, simulated = (
+        account_of(robot, found, tied_ones, "python -m ee_dist task=trial", True, real=r) for r in (True, False)
+    )
+    assert real.first[-1] == "Next: send plan.csv to the robot, and import its log beside the others (task=import)."
+    assert not any("Next:" in line for line in simulated.first), "the command follows"
+    assert real.headline == simulated.headline
 
 
 def test_a_log_of_30_hz_is_planned_for_at_30_hz(run, cli):

@@ -25,6 +25,7 @@ from ee_dist.viewing import plan_figures as figures
 from ee_dist.viewing.report import Page, Section, Table
 
 Explanations = Sequence[tuple[str, Hypothesis]]
+CSV = "plan.csv"
 SHOWN = 10
 """Trials in the tables."""
 
@@ -37,10 +38,11 @@ def account_of(
     fitted: bool,
     left_out: int = 0,
     every_s: float = 0.0,
+    real: bool = False,
 ) -> Account:
     """What to record, what it is expected to tell, what stays alike, and how to do it. ``fitted``: whether the values were
     let come nearer to one another, as far as measurements leave them open. ``every_s``: time between readings of the sensors,
-    where they are read more seldom than rows are."""
+    where they are read more seldom than rows are; ``real``: whether these are logs of a robot that nobody here drives."""
     best, names = found.best, [placed(n) for n, _ in explanations]
     e, closest = best.excitation, f"{names[found.closest[0]]} from {names[found.closest[1]]}"
     what = f"{e.told(robot).replace('_', ' ')} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}"
@@ -48,7 +50,7 @@ def account_of(
     if found.enough:
         head = f"Record next: {what}. It should tell {closest} ({distance})."
         sure = f"How sure: {len(found.trials)} trials were simulated for {len(names)} explanations; the two most similar decide."
-        advice = ""
+        advice = f"Next: send {CSV} to the robot, and import its log beside the others (task=import)." if real else ""
     else:
         head = f"No trial within these limits is expected to tell {closest}; the best is {what} ({distance})."
         sure = f"How sure: {len(found.trials)} trials were simulated for {len(names)} explanations."
@@ -57,7 +59,7 @@ def account_of(
         "What their values may still make up for, within what was measured already, counts as no difference."
         if fitted
         else "Their values count as certain, as they were fitted: a trial may promise more than it keeps.",
-        f"The commands, for a robot of your own: plan.csv. On a simulated one: {trial}",
+        f"The commands, for a robot of your own: {CSV}. On a simulated one: {trial}",
     ]
     if every_s:
         lines.append(
@@ -183,5 +185,5 @@ def _commands(robot: Robot, best: PlannedTrial) -> list[Section]:
         mine = [k for k, u in enumerate(units) if u == unit]
         names = [plain(robot.motor_names[k]) for k in mine]
         figure = figures.commanded(times, values[:, mine], names, unit)
-        out.append(Section(f"Commands ({unit})", "As plan.csv has them.", figure))
+        out.append(Section(f"Commands ({unit})", f"As {CSV} has them.", figure))
     return out
