@@ -17,7 +17,7 @@ MOTION = 0.5
 all find the same."""
 RESTS, LEVELS, MULTIPLES = 0.1, 5, 0.9
 """A reading comes in steps where it rests in this share of the rows, on so many levels, this share of whose gaps are whole
-multiples of the least."""
+multiples of one step."""
 
 
 def reading_step(values: Array) -> float:
@@ -29,8 +29,20 @@ def reading_step(values: Array) -> float:
         return 0.0
     gaps = np.diff(levels)
     gaps = gaps[gaps > 1e-6 * (levels[-1] - levels[0])]
-    multiples = gaps / gaps.min()
-    return float(gaps.min()) if np.mean(np.abs(multiples - np.round(multiples)) < 0.1) > MULTIPLES else 0.0
+    step = _step_of(gaps)
+    multiples = gaps / step
+    return step if np.mean(np.abs(multiples - np.round(multiples)) < 0.1) > MULTIPLES else 0.0
+
+
+def _step_of(gaps: Array) -> float:
+    """The step that gaps (G,) are multiples of, from the least one to ever larger ones: a log that was written with three digits
+    is a hundredth of a step off, and ten steps of that are a tenth."""
+    step = float(gaps.min())
+    for most in (1.5, 4.5, 16.5, np.inf):
+        near = gaps[gaps < most * step]
+        count = np.round(near / step)
+        step = float(near @ count / (count @ count))
+    return step
 
 
 def slow_noise(times_s: Array, values: Array) -> Array:

@@ -43,3 +43,12 @@ def test_noise_dropouts_and_rest_are_no_steps() -> None:
     assert reading_step(np.zeros(len(T))) == 0.0
     (noise,) = slow_noise(T, (motion() + 1e-3 * rng.standard_normal(len(T)))[:, None])
     assert 0.7e-3 < noise < 1.3e-3
+
+
+def test_steps_that_were_written_with_few_digits_are_whole_ones_all_the_same() -> None:
+    """Ticks of 4096 a turn in degrees with three digits: the least gap is a hundredth too small, and ten steps of it a tenth."""
+    turn = 360.0 / 4096
+    swing = np.degrees(motion(0.3))
+    written = np.round(np.round(swing / turn) * turn, 3)
+    assert reading_step(written) == pytest.approx(turn, rel=1e-3)
+    assert slow_noise(T, written[:, None])[0] >= 0.9 * turn / np.sqrt(12)

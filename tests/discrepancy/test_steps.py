@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.measurements import Measurements
-from ee_dist.tasks.ways import WAYS
+from ee_dist.tasks.ways import WAYS, times_the_noise
 from ee_dist.trials.log import SensorLog
 
 STEP_S, FINER = 0.008, 16
@@ -119,3 +120,19 @@ def test_every_way_that_simulates_takes_it_so(way: str) -> None:
     problem = WAYS[way].make(Measurements(robot, trials, (), (), None, Path()), CONFIG)
     assert problem.measured[0].commands_held
     assert problem.simulated(())[0] is not None
+
+
+def test_each_curve_has_one_voice_in_how_commands_were_read() -> None:
+    """Play at an elbow, the largest error by far, fits commands a little better that come too early; base and shoulder do not."""
+
+    def left(base: float, shoulder: float, elbow: float) -> float:
+        r = np.repeat([base, shoulder, elbow], 50)
+        problem = SimpleNamespace(
+            residuals=lambda _: r[None], trial_of=np.zeros(150, int), channel_of=np.repeat([0, 1, 2], 50),
+            channels=("base", "shoulder", "elbow"), floor=np.ones(150),
+        )  # fmt: skip
+        return times_the_noise(problem)  # type: ignore[arg-type]
+
+    assert left(1.5, 2.0, 40.0) < left(8.0, 9.0, 36.0)
+    assert left(0.5, 0.5, 3.0) == left(1.0, 1.0, 3.0), "at the noise nothing is told"
+    assert left(np.inf, 1.0, 1.0) == np.inf
