@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
 
-from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, least_energy
+from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, contains, least_energy
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, Explanation
 
 COUNTED_WAY = "open_loop"
@@ -59,7 +59,7 @@ def signs_of(found: Explanation) -> Signs | None:
     others = [
         float(j.held.sum())
         for j in found.candidates
-        if j is not best and j.name not in best.tied_with and not j.contains(best)
+        if j is not best and j.name not in best.tied_with and not contains(j, best)
     ]
     behind = min(others) - float(best.held.sum()) if others else math.inf
     rest = 1.0 if found.left else 0.0

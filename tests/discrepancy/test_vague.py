@@ -12,7 +12,7 @@ from linear_problem import ROBOT, Linear
 from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.evidence.holdout import HeldOut, windows
-from ee_dist.discrepancy.evidence.judge import VAGUE, Judged, judge, ranked
+from ee_dist.discrepancy.evidence.judge import VAGUE, judge, ranked
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.pruning import told_only
@@ -49,8 +49,6 @@ class Following:
     @property
     def stands(self) -> bool:
         return self.earned or self.why_not == VAGUE
-
-    contains = Judged.contains
 
 
 def test_the_same_and_more_is_no_other_explanation() -> None:

@@ -31,7 +31,7 @@ from ee_dist.discrepancy.accounts.account import (
     was_or_were,
 )
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
-from ee_dist.discrepancy.evidence.judge import LUCK, Judged
+from ee_dist.discrepancy.evidence.judge import LUCK, Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
@@ -80,7 +80,7 @@ def explain_account(
     elif found.verdict == EFFECT and best is not None:
         entry, last = CATALOGUE[best.terms[0].effect], best.error_heldout
         # Those that were judged are the most promising: where all of them are tied there may be more.
-        looked_at = [c for c in found.candidates if not c.contains(best)]
+        looked_at = [c for c in found.candidates if not contains(c, best)]
         more = "at least " if len(best.tied_with) + 1 == len(looked_at) < found.tried else ""
         less = is_less(best.terms)
         rest = left_beside_noise(found.left, best.terms, robot)

@@ -81,11 +81,6 @@ class Judged:
         """Whether data do not speak against it: it earned its place, or would have if it said less."""
         return self.earned or self.why_not == VAGUE
 
-    def contains(self, other: Judged) -> bool:
-        """Whether it is the other and more: no other explanation, unless more pays."""
-        names, fewer = ({c.name for c in j.proposal.parts} for j in (self, other))
-        return fewer < names
-
     @property
     def held_out(self) -> str:
         """What was held out."""
@@ -262,13 +257,19 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
             first.tied_with = [name for name in others if name != first.name]
-        more = {j.name for j in ordered if j.contains(first)}
+        more = {j.name for j in ordered if contains(j, first)}
         first.tied_with = [name for name in first.tied_with if name not in more]
         ordered.remove(first)
         ordered.insert(0, first)
     for k, j in enumerate(ordered):
         j.rank = k + 1
     return ordered
+
+
+def contains(one: Judged, other: Judged) -> bool:
+    """Whether one is the other and more: no other explanation, unless more pays."""
+    names, fewer = ({c.name for c in j.proposal.parts} for j in (one, other))
+    return fewer < names
 
 
 def _left(j: Judged) -> float:
@@ -279,7 +280,7 @@ def _left(j: Judged) -> float:
 def _fuller(j: Judged, first: Judged) -> bool:
     """Whether it is the same and more, and takes off a part of what that leaves. With a handful of motions nothing is sure: the
     further term may be none, and yet foretells better on the whole."""
-    if not j.earned or not j.contains(first):
+    if not j.earned or not contains(j, first):
         return False
     return float(first.held.sum()) > NEAR**2 * first.sure and _left(j) <= FULLER * _left(first)
 
