@@ -40,8 +40,9 @@ from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.serial import robot_to_dict
-from ee_dist.tasks import compose, explained, measurements, reveal, study
+from ee_dist.tasks import compose, explained, measurements, reveal
 from ee_dist.tasks.config import Config
+from ee_dist.tasks.results import study_runs
 from ee_dist.tasks.results.story import _asked
 from ee_dist.tasks.seal import opened, sealed
 from ee_dist.tasks.unfinished import FOLDER, Unfinished, finished
@@ -93,7 +94,11 @@ def summary(path: Path) -> None:
 
 
 def studied(path: Path) -> None:
-    study.load(path.parent, study.summaries(path.parent))
+    study_runs.runs_of(study_runs.summaries(path.parent), ())
+
+
+def studied_before(path: Path) -> None:
+    study_runs.runs_of({}, (path,))
 
 
 def repaired(path: Path) -> None:
@@ -330,6 +335,7 @@ SAMPLES: dict[str, Callable[[], Sample]] = {
     "sealed truth": _sealed,
     "summary": lambda: _one("summary.json", json.dumps(SUMMARY), summary),
     "summaries of a study": lambda: _one("summary.json", json.dumps(STUDIED), studied),
+    "runs of an earlier study": lambda: _one("runs.json", study_runs.kept([STUDIED, STUDIED]), studied_before),
     "calibration": _calibration,
     "begun run": lambda: Sample(made(_begun), f"{FOLDER}/run.json", (begun,)),
     "journal": lambda: Sample(made(_journal), "simulated.bin", (journal,)),
