@@ -12,6 +12,7 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.folder import SETTINGS
@@ -25,9 +26,18 @@ KEPT = (
     "recovered_fraction", "diagnosis", "doubt", "truth", "hypotheses", "dominants", "evaluations", "result_digest",
     "folder", "command",
 )  # fmt: skip
-RUN = "recover"
 LARGEST = 2**28
 """Bytes of a file that is read."""
+RUN = "recover"
+SORTED_BY: dict[str, type | tuple[type, ...]] = {
+    "scenario": (int, str),
+    "metric": str,
+    "seed": int,
+    "engine": str,
+    "budget": str,
+    "result_digest": str,
+}
+"""What runs are told apart by, and what that may be."""
 
 Run = dict[str, Any]
 
@@ -84,8 +94,14 @@ def _check(content: Run, path: Path) -> None:
     try:
         row(content)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        where = f"{path}: a run" if path.name == FILE else f"{path}: a summary"
-        raise ConfigError(f"{where} without {error}; take it out of the folder") from None
+        raise ConfigError(f"{_what(path)} without {error}; take it out of the folder") from None
+    for key, kinds in SORTED_BY.items():
+        if not isinstance(content[key], kinds) or isinstance(content[key], bool):
+            raise ConfigError(f"{_what(path)} whose {key} is {quoted(content[key])}; take it out of the folder")
+
+
+def _what(path: Path) -> str:
+    return f"{path}: a run" if path.name == FILE else f"{path}: a summary"
 
 
 def _summary(path: Path) -> Run:
