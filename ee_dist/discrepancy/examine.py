@@ -18,7 +18,7 @@ from ee_dist.discrepancy.assumed import assumed_drives
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, no_more_than_noise, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
-from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.problem import Mask, Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.refit import Refit
@@ -222,8 +222,7 @@ def calm_trials(problem: Problem, base: Array) -> list[int]:
     if problem.looped and not set(problem.looped) & set(chosen):
         chosen.append(problem.looped[0])
     own = np.isin(problem.trial_of, chosen)
-    excess = float((base[own] ** 2 - problem.floor[own]).sum())
-    if excess < 6.0 * float(np.sqrt(2.0 * problem.floor[own].sum())):
+    if _excess(problem, base, own) < 6.0 * float(np.sqrt(2.0 * problem.floor[own].sum())):
         return list(range(count))
     return sorted(chosen)
 
@@ -253,8 +252,12 @@ def by_excess(problem: Problem, base: Array, among: Sequence[int]) -> list[int]:
 def telling(problem: Problem, base: Array, among: Sequence[int]) -> int | None:
     """The trial among some that has most to explain for its length, if that is enough to tell explanations apart by it alone."""
     k = by_excess(problem, base, among)[0]
-    own = problem.trial_of == k
-    return k if float((base[own] ** 2 - problem.floor[own]).sum()) >= TELLING else None
+    return k if _excess(problem, base, problem.trial_of == k) >= TELLING else None
+
+
+def _excess(problem: Problem, base: Array, own: Mask) -> float:
+    """Energy above the noise of some residual values (n,)."""
+    return float((base[own] ** 2 - problem.floor[own]).sum())
 
 
 def _quick(

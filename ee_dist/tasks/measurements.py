@@ -52,6 +52,11 @@ class Measurements:
     remarks: tuple[str, ...] = ()
     """What a user should know of before reading any result: where model and log name different robots."""
 
+    @property
+    def real(self) -> bool:
+        """Whether no trial is of a simulation of ours: the robot is somebody's hardware, or was simulated elsewhere."""
+        return all(t.commands_held is not False for t in self.trials)
+
 
 def load(config: Config) -> Measurements:
     """The files of ``config.measured`` and the model of ``config.model``. Raises ConfigError, LogError, RecordingError."""

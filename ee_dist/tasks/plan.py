@@ -127,12 +127,10 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     trial = ["task=trial", *robot_settings(robot, out), f"task.noise={noise_share(robot):.3g}",
              setting("engine", found.config.engine.name), f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
     explanations = list(zip(names, models, strict=True))
-    # The robot of a log that was imported is no simulated one.
-    real = all(t.commands_held is not False for t in measured.trials)
-    following = trial if result.enough and not real else []
+    following = trial if result.enough and not measured.real else []
     account = account_of(
         robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED,
-        every_s, real,
+        every_s, measured.real,
     ).warned(measured.remarks)  # fmt: skip
     digest = digest_of([(t.excitation, [round(s, 9) for s in t.separations]) for t in result.trials])
     rest = of_plan(result, explanations, found.folder, measured.files, options.limits, account)

@@ -159,7 +159,7 @@ def _only_motion(measured: Measurements) -> bool:
     """Whether the log is of a real robot, or may be, that is bolted down, and has nothing but the motion of its joints. Open loop
     does as well, but where a joint sticks or the first moments are off: what went wrong once is in all that follows."""
     robot = measured.robot
-    real = all(t.commands_held is not False for t in measured.trials) and len(robot.drives) <= FEW_JOINTS
+    real = measured.real and len(robot.drives) <= FEW_JOINTS
     return real and not robot.free_base and _seen(measured) and all(s.kind in MOTION for s in robot.sensors)
 
 
