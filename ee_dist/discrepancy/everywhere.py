@@ -21,6 +21,7 @@ from ee_dist.discrepancy.pruning import pruned
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.refit import Refit
+from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
@@ -129,6 +130,7 @@ class _Look:
         everything = self.calm.everything
         widths = WIDTHS if len(u) >= MANY else MORE_WIDTHS
         (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=widths)
+        fit = over_ridges(self.calm, fit, PRIOR)
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
         return self._worth(fit, {}) or (self._beside(model, u, fit) if more else None)
 

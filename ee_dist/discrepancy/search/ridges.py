@@ -1,0 +1,71 @@
+"""Over the ridges between valleys, which slopes do not see.
+
+A delay of more than a row of the log and one of less are two valleys: as the reaction moves past a reading, what a row shows
+changes its slope. Where a joint sticks, it is alike. So from where a descent ended each value is moved by itself, farther than slopes
+look, and what the others would make up for is reckoned from their slopes there (profile likelihood, linearised): one simulation a move.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ee_dist.discrepancy.search.fitted import Fit
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import slopes_at
+from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.trials.log import Array
+
+MOVES = (0.0125, 0.03, 0.1, 0.3)
+"""How far, as shares of a value's room: the least is a quarter of a time step of a delay's."""
+PROMISE = 0.05
+"""Share of what is above the noise that a move must promise to take off, and the descent from there must."""
+TRIED, ROUNDS = 3, 3
+"""Descents at once, each from another value's best move, and how often from where one of them ended."""
+WIDTH, PROBED = 0.03, 0.02
+"""Finite differences of a descent, and of the slopes at its start."""
+
+
+def over_ridges(search: Search, fit: Fit, prior: float = 0.0) -> Fit:
+    """The fit, or a better one of the same model on the far side of a ridge."""
+    floor = float(search.problem.floor[fit.mask].sum())
+    for _ in range(ROUNDS):
+        wanted = fit.energy - PROMISE * max(fit.energy - floor, 0.0)
+        starts = _beyond(search, fit, wanted, prior) if fit.energy > floor else []
+        if not starts:
+            break
+        best = min(
+            follow_valley(search, [(fit.model, u) for u in starts], fit.mask, prior, widths=(WIDTH,)),
+            key=lambda f: f.energy,
+        )
+        if not best.energy < wanted:
+            break
+        fit = best
+    return fit
+
+
+def _beyond(search: Search, fit: Fit, wanted: float, prior: float) -> list[Array]:
+    """Values (P,) to start from, the most promising first."""
+    model, mask = fit.model, fit.mask
+    lower, upper = model.lower, model.upper
+    points = []
+    for k in range(len(fit.u)):
+        for move in (*MOVES, *(-m for m in MOVES)):
+            u = fit.u.copy()
+            u[k] = np.clip(u[k] + move, lower[k], upper[k])
+            if abs(u[k] - fit.u[k]) > 0.5 * min(MOVES):
+                points.append((k, u))
+    slopes = slopes_at(search, model, fit.u, PROBED)[mask]
+    best: dict[int, tuple[float, Array]] = {}
+    for some in search.batches(len(points)):
+        rows = search.residuals([model.hypothesis(u) for _, u in points[some]])
+        for (k, u), row in zip(points[some], rows, strict=True):
+            if not np.isfinite(row).all():
+                continue
+            rest = np.delete(slopes, k, axis=1)
+            normal = rest.T @ rest + max(prior, 1e-9) * np.eye(rest.shape[1])
+            step = -np.linalg.solve(normal, rest.T @ row[mask])
+            left = row[mask] + rest @ step
+            energy = float(left @ left)
+            if energy < wanted and (k not in best or energy < best[k][0]):
+                best[k] = (energy, np.clip(u + np.insert(step, k, 0.0), lower, upper))
+    return [u for _, u in sorted(best.values(), key=lambda found: found[0])[:TRIED]]
