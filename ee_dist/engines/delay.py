@@ -32,6 +32,13 @@ class Delay:
         _read(self.past, self.newest, self.whole, self.part, delayed)
         return delayed
 
+    def over(self, values: Array) -> Array:
+        """(T, B, K) values as they were, from those of all steps from the first on."""
+        at = np.arange(len(values))[:, None, None] - self.whole
+        near = np.take_along_axis(values, np.maximum(at, 0), axis=0)
+        far = np.take_along_axis(values, np.maximum(at - 1, 0), axis=0)
+        return np.where(self.part > 0.0, near * (1 - self.part) + far * self.part, near)
+
 
 @compiled
 def _read(past: Array, newest: int, whole: NDArray[np.intp], part: Array, delayed: Array) -> None:

@@ -57,31 +57,73 @@ class SensingPath:
             return true
         p, value = self.p, true
         if self.uses["missed_touch"]:
-            # A worn switch closes only after it was pressed for a while.
-            down = self.touch & (value > 0)
-            self.pressed_s = np.where(down, self.pressed_s + self.dt, 0.0)
-            value = np.where(down & (self.pressed_s <= p["missed_touch"] + 1e-9), LIFTED, value)
-        if self.uses["gain"]:
-            value = value * p["gain"]
-        if self.uses["bias"]:
-            value = np.where(p["bias"] != 0, value + p["bias"], value)
+            value = self._late_touch(value)
+        value = self._scaled(value)
         if self.uses["delay_s"]:
             value = self.delay(value)
         if self.uses["noise"]:
-            value = np.where(p["noise"] != 0, value + p["noise"] * self.normal[step], value)
+            value = self._noisy(value, self.normal[step])
         if self.uses["dropout"]:
             if self.held is not None:
                 value = np.where(self.uniform[step] < p["dropout"], self.held, value)
             self.held = value
         if self.uses["quantum"]:
-            q = np.where(p["quantum"] > 0, p["quantum"], 1.0)
-            value = np.where(p["quantum"] > 0, np.round(value / q) * q, value)
+            value = self._in_steps(value)
         if self.uses["stuck"]:
             # The value at which the channel sticks is the last that it reported while it still moved freely.
             waiting = step * self.dt < p["stuck_from_s"] - 1e-9
             if step == 0:
                 self.stuck_at = value
             self.stuck_at = np.where(waiting, value, self.stuck_at)
-            slow = self.stuck_at + (1.0 - p["stuck"]) * (value - self.stuck_at)
-            value = np.where((p["stuck"] > 0) & ~waiting, slow, value)
+            value = self._stuck(value, self.stuck_at, waiting)
         return value
+
+    def over(self, true: Array) -> Array:
+        """Reported values (T, B, S) of all steps at once, from true ones: what ``step`` gives, to the last bit."""
+        if self.plain:
+            return true
+        p, value, steps = self.p, true, np.arange(len(true))[:, None, None]
+        if self.uses["missed_touch"]:
+            value = np.stack([self._late_touch(v) for v in value])
+        value = self._scaled(value)
+        if self.uses["delay_s"]:
+            value = self.delay.over(value)
+        if self.uses["noise"]:
+            value = self._noisy(value, self.normal[: len(true)])
+        if self.uses["dropout"]:
+            fresh = ~(self.uniform[: len(true)] < p["dropout"])
+            fresh[0] = True
+            held = np.maximum.accumulate(np.where(fresh, steps, 0), axis=0)
+            value = np.take_along_axis(value, held, axis=0)
+        if self.uses["quantum"]:
+            value = self._in_steps(value)
+        if self.uses["stuck"]:
+            waiting = steps * self.dt < p["stuck_from_s"] - 1e-9
+            last = np.maximum(waiting.sum(axis=0) - 1, 0)
+            value = self._stuck(value, np.take_along_axis(value, last[None], axis=0), waiting)
+        return value
+
+    def _late_touch(self, value: Array) -> Array:
+        """A worn switch closes only after it was pressed for a while."""
+        down = self.touch & (value > 0)
+        self.pressed_s = np.where(down, self.pressed_s + self.dt, 0.0)
+        return np.where(down & (self.pressed_s <= self.p["missed_touch"] + 1e-9), LIFTED, value)
+
+    def _scaled(self, value: Array) -> Array:
+        p = self.p
+        if self.uses["gain"]:
+            value = value * p["gain"]
+        if self.uses["bias"]:
+            value = np.where(p["bias"] != 0, value + p["bias"], value)
+        return value
+
+    def _noisy(self, value: Array, normal: Array) -> Array:
+        return np.where(self.p["noise"] != 0, value + self.p["noise"] * normal, value)
+
+    def _in_steps(self, value: Array) -> Array:
+        q = np.where(self.p["quantum"] > 0, self.p["quantum"], 1.0)
+        return np.where(self.p["quantum"] > 0, np.round(value / q) * q, value)
+
+    def _stuck(self, value: Array, stuck_at: Array, waiting: Array) -> Array:
+        slow = stuck_at + (1.0 - self.p["stuck"]) * (value - stuck_at)
+        return np.where((self.p["stuck"] > 0) & ~waiting, slow, value)

@@ -288,7 +288,7 @@ def reports(members: Sequence[Faulty], seeds: Sequence[int] = ()) -> Array:
     seen = np.stack([true[:, list(channels)] for _, true, channels in members], axis=1)
     each: list[int | None] = [*seeds] if seeds else [None]
     path = SensingPath(robots, robots[0].time_step_s, len(seen), each * len(members))
-    found = np.stack([path.step(i, v) for i, v in enumerate(np.repeat(seen, draws, axis=1))])
+    found = path.over(np.repeat(seen, draws, axis=1))
     return np.moveaxis(found.reshape(len(seen), len(members), draws, -1), 0, 1)
 
 
