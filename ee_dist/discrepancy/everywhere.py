@@ -36,6 +36,8 @@ FEWEST = 3
 WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
 """Finite differences to begin with: each leads down another side of a ridge, and which is right shows at the end. More of them
 where it costs little, for fewer than MANY values."""
+TWINS = 2
+"""Twins of effects that are tried in their place."""
 FEWEST_TRIED, MOST_TRIED, VALUES_TRIED = 3, 12, 120
 """Effects that are tried one by one beside all that may be a little wrong, as far as ``VALUES_TRIED`` values in sum allow."""
 
@@ -49,11 +51,18 @@ class Everywhere:
 
 
 def everywhere(
-    search: Search, current: Current, own: int, pool: Sequence[Candidate], cuts: Sequence[Cut], again: bool = False
+    search: Search,
+    current: Current,
+    own: int,
+    pool: Sequence[Candidate],
+    cuts: Sequence[Cut],
+    again: bool = False,
+    twins: Sequence[tuple[int, Candidate, Array]] = (),
 ) -> Everywhere | None:
     """On top of the current model, whose first ``own`` parts stay. None where it does not earn its place on the data held out
     in each of ``cuts``. ``again``: after such effects were added, only from neutral: beside what was added since, and beside
-    whatever else promises most, for its twin may have been added."""
+    whatever else promises most, for its twin may have been added; and beside each of ``twins``, which were tied with the part whose
+    number they have, with the values that suited."""
     as_it_is = search.on(current.hypothesis).base()
     without = [as_it_is for _ in cuts]
     if current.parts:
@@ -62,14 +71,29 @@ def everywhere(
     calm = search.among(calm_trials(search.problem, as_it_is))
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
     found, places = None if again else look.kept(current), Model(current.parts).places
-    for keep in instead(search.problem.robot, current, own):
-        base = Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
-        other = look.kept(base, more=not keep[own:])
-        if other is not None and (
-            found is None or other.held < found.held + (0.0 if keep[own:] else look.luck(other.held))
-        ):
-            found = other
+    robot = search.problem.robot
+    # Of what was added last the most is not yet decided.
+    alike = [t for t in reversed(twins) if again and stands_out(robot, current.parts[t[0]])][:TWINS]
+    for keep in instead(robot, current, own):
+        for base in _with_twins(current, places, keep, alike):
+            other = look.kept(base, more=not keep[own:])
+            if other is not None and (
+                found is None or other.held < found.held + (0.0 if keep[own:] else look.luck(other.held))
+            ):
+                found = other
     return look.steps(found) if found is not None else None
+
+
+def _with_twins(
+    current: Current, places: Sequence[slice], keep: Sequence[int], twins: Sequence[tuple[int, Candidate, Array]]
+) -> Iterator[Current]:
+    """Some parts of the model, and the same with one of them exchanged for its twin: which of two that look alike is there
+    decides how all the rest is off, and beside the wrong one the rest looks right."""
+    yield Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
+    for at, twin, u in twins:
+        if at in keep:
+            values = [u if k == at else current.u[places[k]] for k in keep]
+            yield Current(tuple(twin if k == at else current.parts[k] for k in keep), np.concatenate(values))
 
 
 def instead(robot: Robot, current: Current, own: int) -> Iterator[list[int]]:

@@ -103,7 +103,8 @@ def improve(
             special = any(stands_out(problem.robot, c) for c in current.parts[own:])
             ready = len(current.parts) != looked and anew < OFTEN and (not spread or special)
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
-                found = everywhere(search, current, own, pool, travelling(problem), again=spread > 0)
+                twins = [(k, p.parts[0], u) for k, p, u in _twins(current, ladder, own)]
+                found = everywhere(search, current, own, pool, travelling(problem), spread > 0, twins)
                 looked, anew = len(current.parts), anew + (spread > 0)
                 if found is not None:
                     current, looked, spread = found.current, len(found.current.parts), spread + 1
@@ -258,6 +259,19 @@ def _rung(search: Search, judged: Judged, ties: Sequence[str] = ()) -> Rung:
     )
 
 
+def _twins(current: Current, ladder: Sequence[Rung], own: int) -> list[tuple[int, Proposal, Array]]:
+    """What was tied with a single effect of the model when it was added: the number of that part, and the values that suited."""
+    where = {c.name: k for k, c in enumerate(current.parts) if k >= own}
+    return [
+        (where[t.name], p, u)
+        for rung in ladder
+        for t in rung.added
+        if t.name in where and len(rung.added) == 1
+        for p, u in rung.alternatives
+        if p.parts[0].name not in where
+    ]
+
+
 def _exchanged(
     search: Search, current: Current, ladder: Sequence[Rung], own: int, pool: Sequence[Candidate], effort: Effort
 ) -> tuple[Current, Rung] | None:
@@ -265,24 +279,19 @@ def _exchanged(
     than luck: by itself, or with what earns its place only beside the other. Two effects that mimic one another decide
     which third one can still be seen."""
     problem, places = search.problem, Model(current.parts).places
-    where = {c.name: k for k, c in enumerate(current.parts) if k >= own}
-    options: list[tuple[int, Proposal]] = []
+    options = _twins(current, ladder, own)
     models = [(Model(current.parts), current.u)]
-    for rung in ladder:
-        for k in [where[t.name] for t in rung.added if t.name in where and len(rung.added) == 1]:
-            for p, u in rung.alternatives:
-                if p.parts[0].name not in where:
-                    options.append((k, p))
-                    parts = (*current.parts[:k], p.parts[0], *current.parts[k + 1 :])
-                    values = np.concatenate([current.u[: places[k].start], u, current.u[places[k].stop :]])
-                    models.append((Model(parts), values))
+    for k, p, u in options:
+        parts = (*current.parts[:k], p.parts[0], *current.parts[k + 1 :])
+        values = np.concatenate([current.u[: places[k].start], u, current.u[places[k].stop :]])
+        models.append((Model(parts), values))
     if not options:
         return None
     cut = _cut(problem)
     now, *others = cross_fit(search, models, cut, WIDTHS[1:])
     order = sorted(range(len(options)), key=lambda i: float((others[i].residual ** 2).sum()))
     for i in order[:LOOKED_AT]:
-        (k, proposal), (model, start), held = options[i], models[1 + i], others[i]
+        (k, proposal, _), (model, start), held = options[i], models[1 + i], others[i]
         changed = Current(model.parts, fit_one(search, model, [start], None, WIDTHS[1:]).u)
         if not surely_better(problem, now, held, len(pool)):
             names = {c.name for c in changed.parts}

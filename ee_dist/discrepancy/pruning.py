@@ -132,12 +132,13 @@ def _as_good(search: Search, whole: Current, less: Current, cut: Cut, tried: int
     a, b = (
         float((h.residual**2).sum()) for h in cross_fit(search, [(Model(m.parts), m.u) for m in (whole, less)], cut)
     )
-    return b - a <= _allowed(search.problem, a, cut, tried)
+    # Many small effects may each be below the resolution at which channels are compared, and not all together.
+    return b - a <= _allowed(search.problem, a, cut, tried, float(search.problem.floor.mean()))
 
 
-def _allowed(problem: Problem, energy: float, cut: Cut, tried: int) -> float:
-    """Held-out energy that leaving a term out may cost."""
-    luck = least_energy(tried) * max(1.0, energy / len(problem.floor))
+def _allowed(problem: Problem, energy: float, cut: Cut, tried: int, least: float = 1.0) -> float:
+    """Held-out energy that leaving a term out may cost; ``least``: the variance that counts in a value."""
+    luck = least_energy(tried) * max(least, energy / len(problem.floor))
     if cut.name == WINDOWS:
         return luck
     return max(luck, 0.5 * WORTH * max(energy - float(problem.floor.sum()), 0.0))
