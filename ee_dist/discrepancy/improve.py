@@ -38,8 +38,9 @@ from ee_dist.trials.log import Array
 
 FEW = 1
 """Effects that the search adds before it looks whether much is a little wrong everywhere, if the next one does not do."""
-OFTEN = 1
-"""How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it."""
+OFTEN = 2
+"""How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it: beside several that come at
+once, and again beside those of them that stay."""
 REFUSED = 1
 """How often that may not earn its place before it is not looked for any more: it takes as long as all the rest."""
 EXCHANGES, LOOKED_AT = 2, 2
@@ -90,6 +91,7 @@ def improve(
             climb(_rung(search, judged))
     else:
         exchanges, looked, spread, anew, refused = 0, -1, 0, 0, 0
+        beside: set[str] = set()
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             has = (*search.fixed, *current.hypothesis)
@@ -100,12 +102,12 @@ def improve(
                 if kept is not None:
                     last, current = kept, Current(current.parts, values_of(current.parts, before))
             best = last.best
-            special = any(stands_out(problem.robot, c) for c in current.parts[own:])
-            ready = len(current.parts) != looked and anew < OFTEN and (not spread or special)
+            special = {c.name for c in current.parts[own:] if stands_out(problem.robot, c)}
+            ready = anew < OFTEN and special != beside and bool(special) if spread else len(current.parts) != looked
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 twins = [(k, p.parts[0], u) for k, p, u in _twins(current, ladder, own)]
                 found = everywhere(search, current, own, pool, travelling(problem), spread > 0, twins)
-                looked, anew = len(current.parts), anew + (spread > 0)
+                looked, anew, beside = len(current.parts), anew + (spread > 0), special if spread else set()
                 if found is not None:
                     current, looked, spread = found.current, len(found.current.parts), spread + 1
                     for rung in found.rungs:

@@ -114,7 +114,7 @@ def command_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robo
 
 
 def _delays(robot: Robot, target: str) -> dict[str, Range]:
-    return {"delay_s": (0.0 - scales.drive_of(robot, target).delay_s, 20.0 * robot.time_step_s)}
+    return {"delay_s": (0.0 - scales.drive_of(robot, target).delay_s, scales.longest_delay(robot))}
 
 
 @effect(

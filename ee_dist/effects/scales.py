@@ -17,6 +17,7 @@ __all__ = [
     "drive_of",
     "firmest",
     "inertia",
+    "longest_delay",
     "speed",
     "steady",
     "stiffest",
@@ -27,6 +28,8 @@ __all__ = [
 
 STEPS = 2.8
 """Time steps in a radian of a joint's own oscillation from which its controller is simulated as it is."""
+DELAYED_STEPS, DELAYED_S = 20.0, 0.1
+"""Longest delay worth trying: of a controller that works in the robot's steps, and of one that does not."""
 Range = tuple[float, float]
 Ranges = Callable[[Robot, str], Mapping[str, Range]]
 
@@ -44,6 +47,11 @@ class Always:
 def always(**ranges: Range) -> Ranges:
     """``always(share=(0.0, 0.8))``: for parameters whose hard bounds are wider than what is worth trying."""
     return Always(tuple(ranges.items()))
+
+
+def longest_delay(robot: Robot) -> float:
+    """s; of buses and firmware, which do not know how finely somebody simulates."""
+    return max(DELAYED_STEPS * robot.time_step_s, DELAYED_S)
 
 
 def travel(robot: Robot, joint: str) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
-from ee_dist.effects.scales import Range, always
+from ee_dist.effects.scales import Range, always, longest_delay
 from ee_dist.effects.targets import continuous_sensors, sensor_groups, sensors, touch_sensors
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.noise import channel_range
@@ -92,7 +92,7 @@ def sensor_noise(robot: Robot, target: str, values: Mapping[str, float]) -> Robo
 
 
 def _delays(robot: Robot, target: str) -> dict[str, Range]:
-    return {"delay_s": (0.0, 20.0 * robot.time_step_s)}
+    return {"delay_s": (0.0, longest_delay(robot))}
 
 
 @effect(
