@@ -30,7 +30,8 @@ class Layout:
 
     ``time_s`` (n,) is when a value was taken, from the start of its trial; ``reading`` (n,) whether it compares what a
     channel reads (rather than its texture or a computed command); ``floor`` (n,) its mean square under a perfect model, and
-    ``known`` (n,) the part of that which calibration left. ``joint_of_channel``: the motor that a channel belongs to.
+    ``known`` (n,) the part of that which is no noise: what calibration left, or what a start that is off does to all that
+    follows. ``joint_of_channel``: the motor that a channel belongs to.
     """
 
     segments: tuple[str, ...]

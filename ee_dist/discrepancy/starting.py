@@ -79,11 +79,31 @@ def _starting(trial: MeasuredTrial, read: SpeedSensors) -> Array:
     return np.concatenate([known[:1] - (known[1:2] - known[:1]) / 2, (known[:-1] + known[1:]) / 2])
 
 
+def speeds_off(trial: MeasuredTrial, robot: Robot) -> Array:
+    """(M,) standard deviations of ``starting_speeds``: of the noise that a sensor shows, or of the curve through positions."""
+    sensors = speed_sensors(robot)
+    read = read_speeds(trial.log, sensors)
+    even = evenly_read(trial.log)
+    sensed = np.stack([np.interp(even.times_s, trial.log.times_s, v) for v in read.T], axis=1)
+    noise = slow_noise(even.times_s, sensed)
+    if not trial.commands_held or even.joints is None or len(even) < AROUND[0]:
+        return noise
+    _, own, better = _curve(trial, sensors, read)
+    return np.where(better, own, noise)
+
+
 def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> Array:
     """(T, M): speeds as ``sensors`` ``read`` them (T, M), and of joints whose positions know better, or alone, from these."""
-    even = evenly_read(trial.log)
-    if even.joints is None or len(even) < AROUND[0]:
+    if evenly_read(trial.log).joints is None or len(evenly_read(trial.log)) < AROUND[0]:
         return read
+    slopes, _, better = _curve(trial, sensors, read)
+    return np.where(better, slopes, read)
+
+
+def _curve(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> tuple[Array, Array, Array]:
+    """Speeds by positions (T, M), their standard deviations (M,), and whether they know better than what was read (M,)."""
+    even = evenly_read(trial.log)
+    assert even.joints is not None
     step_s = float(np.median(np.diff(even.times_s)))
     stiff, supple = (scipy.signal.savgol_filter(even.joints, n, CUBIC, deriv=1, delta=step_s, axis=0) for n in AROUND)
     weights = scipy.signal.savgol_coeffs(AROUND[0], CUBIC, deriv=1, delta=step_s)
@@ -92,7 +112,7 @@ def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array)
     alone = np.isin(np.arange(read.shape[1]), [joint for joint, _, _ in sensors], invert=True)
     better = (_size(sensed - stiff) > BEYOND * own) | alone
     slopes = np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in stiff.T], axis=1)
-    return np.where(better, slopes, read)
+    return slopes, own, better
 
 
 def _size(values: Array) -> Array:

@@ -24,7 +24,7 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
 from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.slow_noise import slow_noise, without_motion
-from ee_dist.discrepancy.starting import starting_speeds
+from ee_dist.discrepancy.starting import speeds_off, starting_speeds
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -57,6 +57,8 @@ RUN_UP = 20
 them when it begins (commands on their way, play) comes from there."""
 MEAN_ABSOLUTE, MEDIAN_ABSOLUTE = math.sqrt(2 / math.pi), 0.6745
 """Of normal noise with a standard deviation of 1."""
+GROWN = 1.2
+"""Floor over that of noise alone from which it is said that the starts of windows are in it."""
 FINEST = 2.0**-20
 """Share of a joint's range that the finest encoders tell apart: one at rest reads the same all the time, and has noise."""
 BLOCKS = 6
@@ -97,6 +99,10 @@ class FreeRun(Problem):
         self.noise = np.array([by_unit[robot.sensors[k].unit] for k in columns])
         """(C,) mean absolute error that noise alone would leave, in the unit of each channel."""
         self._lay_out(BLOCKS if windows_s is None else 1)
+        if windows_s is not None:
+            noise, grown = self.layout.floor, self._by_start()
+            # What a start does stays of one sign for the rest of its window.
+            self.layout = replace(self.layout, floor=noise * grown, known=noise * (grown - 1.0))
         self.units = tuple(by_unit)
         self.natural_unit = self.units[0] if len(by_unit) == 1 else TIMES_NOISE
         how = "free runs of the whole record" if windows_s is None else f"windows of {windows_s:g} s"
@@ -167,12 +173,38 @@ class FreeRun(Problem):
             out[:, self.slices[i]] = np.where(np.isfinite(value), value, np.inf).reshape(len(hypotheses), -1)
         return out
 
+    def _by_start(self) -> Array:
+        """(n,) by how much more than noise a perfect model would leave, for it starts from what was measured: where a motion is
+        not stable, a pole that stands upright, what is wrong with that grows until the window ends. By the robot as it is
+        described, a standard deviation beside each measured position and speed."""
+        jobs, count = [], []
+        off = [speeds_off(t, self.robot) for t in self.measured]
+        for p in self.pieces:
+            model = self._simulated(p.trial, ())
+            beside = [p, *p.beside(self._off(p.trial), off[p.trial])]
+            jobs += [Job(b.rollout(model, len(p.log), False), ToPositions(self.columns, p.rows)) for b in beside]
+            count.append(len(beside))
+        found, grown = iter(self.evaluator.evaluate(jobs)), []
+        for many in count:
+            own, *others = (np.asarray(next(found), dtype=float) for _ in range(many))
+            with np.errstate(invalid="ignore", over="ignore"):
+                spread = np.sqrt(sum(((o - own) ** 2 for o in others), np.zeros_like(own))) * MEAN_ABSOLUTE / self.noise
+            grown.append(np.hypot(1.0, np.where(np.isfinite(spread), spread, 0.0)).ravel())
+        return np.concatenate(grown)
+
+    def _off(self, trial: int) -> Array:
+        """(M,) standard deviations of the joint positions that a simulation starts from."""
+        joints = {s.target: n for s, n in zip((self.robot.sensors[k] for k in self.columns), self.noise, strict=True)}
+        return np.array([joints.get(m, 0.0) / MEAN_ABSOLUTE for m in self.robot.motor_names])
+
     def _simulated(self, trial: int, hypothesis: Hypothesis) -> Robot:
         return self.measured[trial].simulated(apply(self.setups[trial], hypothesis))
 
     def noise_floor(self) -> tuple[float, str]:
         seldom = any(p.log.filled is not None for p in self.pieces)
-        return 1.0, f"estimated: {'divided' if seldom else 'second'} differences of the measured positions"
+        how = f"estimated: {'divided' if seldom else 'second'} differences of the measured positions"
+        grown = float(np.sqrt(self.floor.mean()))
+        return grown, f"{how}, and what they do to the start of each window" if grown > GROWN else how
 
     def smooth(self, residual: Array) -> Array:
         """The error itself, in units of the noise, instead of its root."""
@@ -301,6 +333,20 @@ class Piece:
     def measured(self, columns: Sequence[int]) -> Array:
         """(R, C) of some channels."""
         return np.asarray(self.log.sensors[np.ix_(self.rows, columns)])
+
+    def beside(self, positions: Array, speeds: Array) -> list[Piece]:
+        """The same from states that are off by these (M,), one joint's position or speed at a time."""
+        steps = [(d, 0.0 * d) for d in np.diag(positions) if d.any()] + [
+            (0.0 * d, d) for d in np.diag(speeds) if d.any()
+        ]
+
+        def moved(state: State, by: tuple[Array, Array]) -> State:
+            return State(state.joints + by[0], state.speeds + by[1])
+
+        return [
+            replace(self, start=moved(self.start, by), again=tuple((k, moved(s, by)) for k, s in self.again))
+            for by in steps
+        ]
 
     def rollout(self, model: Robot, steps: int, switched: bool) -> Rollout:
         """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
