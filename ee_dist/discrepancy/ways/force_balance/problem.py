@@ -158,14 +158,15 @@ class ForceBalance(Problem):
                 out.append(Series(k, c, unit, self.times_s[k], force[:, c], (force - rest)[:, c]))
         return out
 
-    def remains(self, hypothesis: Hypothesis, motor: int = 0, trial: int = 0) -> Remains:
-        """When, in which direction and over which position the hypothesis leaves something at one drive in one trial."""
-        every = self.processing.keep_every
-        rows = self.residuals([hypothesis], [trial])[0][self.slices[trial]]
-        left = rows.reshape(-1, len(self.channels))[:, motor] * self.scale[motor]
-        motion = self.motions[trial]
-        x, v, a = (decimated(s[:, motor], every) for s in (motion.position, motion.speed, motion.acceleration))
-        return remains(self.channels[motor], left, x, v, a)
+    def remains(self, hypothesis: Hypothesis, motor: int = 0) -> Remains:
+        """When, in which direction and over which position the hypothesis leaves something at one drive, over all trials."""
+        left = self.raw(self.residuals([hypothesis])[0])[self.channel_of == motor]
+        x, v, a = (
+            np.concatenate([decimated(series[:, motor], self.processing.keep_every) for series in of_all])
+            for of_all in zip(*((m.position, m.speed, m.acceleration) for m in self.motions), strict=True)
+        )
+        trial = np.repeat(np.arange(len(self.times_s)), [len(t) for t in self.times_s])
+        return remains(self.channels[motor], left, x, v, a, trial)
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         lines: list[str] = []
