@@ -19,7 +19,7 @@ from ee_dist.basics.files import write_whole
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
 from ee_dist.effects.described import check_written
-from ee_dist.robots.describe import load_robot
+from ee_dist.robots.describe import READERS, load_robot
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.ranges import drive_of
 from ee_dist.robots.serial import robot_to_dict
@@ -46,11 +46,20 @@ class ModelFile:
 
 
 def read_model(path: str | Path) -> ModelFile:
-    """Raises RobotError or EffectError in one line: no such file, not YAML, an unknown robot, effect, target or value."""
+    """A model file, or the description of a robot that names its file: a model without effects.
+
+    Raises RobotError or EffectError in one line: no such file, not YAML, an unknown robot, effect, target or value.
+    """
     file = Path(path)
     data = read_text(file, "a model file (YAML)")
+    if isinstance(data, Mapping) and any(key in data for key in (*READERS, "version")):
+        if "effects" in data:
+            raise RobotError(f"{file}: 'effects' beside the description of a robot: put the description below 'robot:'")
+        data = {"robot": data}
     if not isinstance(data, Mapping) or "robot" not in data:
-        raise RobotError(f"{file}: a model file is a mapping with 'robot' and 'effects'")
+        raise RobotError(
+            f"{file}: a model file is a mapping with 'robot' and 'effects', or a robot's description with 'urdf' or 'mjcf'"
+        )
     for key in data:
         if key not in ("robot", "effects"):
             raise RobotError(f"{file}: unknown key {quoted(key)}; there are: robot, effects")

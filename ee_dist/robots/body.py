@@ -12,7 +12,8 @@ from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, Sensor, Vec3
 class Body:
     """Parts, each after the one that carries it; joints; and by joint, field by field, what the file knows of its drive.
 
-    ``driven`` are joints that the file itself gives a drive, or leaves without one on purpose. ``free_base``,
+    ``driven`` are joints that the file itself gives a drive, or leaves without one on purpose, ``unlimited`` those
+    with a torque limit of 0, which is how tools write that they know none. ``free_base``,
     ``gravity_m_s2`` and ``time_step_s`` are None where the file does not say. ``notes`` are for people; ``assumed`` are those
     of them that stand in for a missing number.
     """
@@ -22,6 +23,7 @@ class Body:
     joints: tuple[Joint, ...]
     drives: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
     driven: tuple[str, ...] = ()
+    unlimited: tuple[str, ...] = ()
     sensors: tuple[Sensor, ...] = ()
     root_without_mass: bool = False
     """Its root was given a mass that it does not state, which counts where the base is free."""

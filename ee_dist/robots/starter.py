@@ -14,6 +14,7 @@ from ee_dist.basics.names import counted, listed
 from ee_dist.robots.body import Body
 from ee_dist.robots.described import ASSUMED, GRAVITY_M_S2, robot_of_body
 from ee_dist.robots.inertia import felt_inertia
+from ee_dist.robots.limits import guessed_limit, placeholders, told
 from ee_dist.robots.model import Joint, Robot
 from ee_dist.robots.ranges import travel
 
@@ -21,8 +22,6 @@ SETTLING_RAD, SETTLING_M = 0.1, 0.01
 """Error at which an assumed position controller asks for all the torque that there is."""
 DAMPING = 0.7
 """Of an assumed controller against the inertia that its joint feels, as a share of critical."""
-TORQUE_PER_INERTIA = 50.0
-"""rad/s^2 that an assumed torque limit gives a joint beside holding a metre's weight of what it carries."""
 ROTOR_SPEEDS_UP = 250.0
 """rad/s^2 (m/s^2) that a motor gives its own rotor, seen through its gear: of hobby servos and the drives of arms 100 to 400.
 Without any rotor a light last link follows an assumed controller within microseconds, which no simulation steps through."""
@@ -68,7 +67,8 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         None if body.gravity_m_s2 is not None else "straight down, in the frame of the root",
     )
     inertia = _inertia(body)
-    drives = {j.name: _drive(j, body, inertia) for j in body.moving}
+    blank = placeholders(body, inertia)
+    drives = {j.name: _drive(j, body, inertia[j.name], j.name in blank) for j in body.moving}
     lines.append("drives:" if drives else "drives: {}")
     for name, (entry, guessed) in drives.items():
         known = [g for g in guessed if g in entry]
@@ -76,6 +76,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         line(f"  {_plain(name)}: {_flow(marked)}", ", ".join(guessed) or None, known != guessed)
     assumed += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if names[3:] else ''}: {mark}"
                 for mark, names in by_mark.items()]  # fmt: skip
+    assumed += told(blank, body)
     if body.sensors:
         lines.append(f"# sensors: the file's own {len(body.sensors)}; a list here takes their place")
     else:
@@ -116,18 +117,16 @@ def _inertia(body: Body) -> Mapping[str, float]:
     return dict(zip(robot.motor_names, (float(v) for v in felt_inertia(robot)), strict=True))
 
 
-def _drive(joint: Joint, body: Body, inertia: Mapping[str, float]) -> tuple[dict[str, Any], list[str]]:
-    """Fields of a drive as they are written down, and those of them that are assumed."""
+def _drive(joint: Joint, body: Body, inertia: float, blank: bool) -> tuple[dict[str, Any], list[str]]:
+    """Fields of a drive as they are written down, and those of them that are assumed. ``blank``: the limit stated is none."""
     known = dict(body.drives.get(joint.name, {}))
     guessed: list[str] = []
-    if "torque_limit" not in known:
-        carried = sum(p.mass_kg for p in body.parts) * GRAVITY_M_S2
-        scale = TORQUE_PER_INERTIA * inertia[joint.name] + 0.5 * carried * (1.0 if joint.kind == "slide" else 0.5)
-        known["torque_limit"] = _rounded(scale)
+    if blank or "torque_limit" not in known:
+        known["torque_limit"] = _rounded(guessed_limit(joint, body, inertia))
         guessed.append("torque_limit")
     if joint.name not in body.driven:
         limit = float(known["torque_limit"])
-        moved, rotor = inertia[joint.name], []
+        moved, rotor = inertia, []
         if not known.get("rotor_inertia"):
             known["rotor_inertia"] = behind = _rounded(limit / ROTOR_SPEEDS_UP)
             moved, rotor = moved + behind, ["rotor_inertia"]

@@ -132,6 +132,7 @@ class _Reader:
             parts=tuple(kept_parts),
             joints=tuple(kept_joints),
             drives={name: self.known(elements[name], f"joint {quoted(name)}") for name in moving},
+            unlimited=tuple(name for name in moving if self.unlimited(elements[name], f"joint {quoted(name)}")),
             root_without_mass=root_given,
             free_base=True if floats is not None else None,
             start_position_m=start[0],
@@ -175,6 +176,10 @@ class _Reader:
             if value > 0 or name != "torque_limit":
                 found[name] = value
         return found
+
+    def unlimited(self, e: ET.Element, where: str) -> bool:
+        limit = e.find("limit")
+        return limit is not None and limit.get("effort") is not None and self.number(limit, "effort", where) == 0
 
     def without_mass(self, name: str, e: ET.Element, joint: Joint) -> str:
         inertial = e.find("inertial")

@@ -34,7 +34,9 @@ def run(config: Config, options: Options, out: Path) -> None:
     watch = Stopwatch()
     to = one_of("to", options.to if config.to is None else config.to, FORMATS)
     if not config.model:
-        raise ConfigError("model=: which model file? one that task=improve wrote, or one with 'robot' and 'effects'")
+        raise ConfigError(
+            "model=: which model file? one that task=improve wrote, or one with 'robot' and 'effects', or a robot's description"
+        )
     found = read_model(config.model)
     model, told = found.model, fates(found.robot, found.terms, to)
     files = files_of(found, model, to, told)

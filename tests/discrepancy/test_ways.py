@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from way_samples import measure, measured, problem, problem_by, samples
 
+from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
 from ee_dist.discrepancy.problem import error, joined
@@ -135,3 +137,22 @@ def test_windows_of_a_trial_are_one_curve_that_breaks_off_between_them() -> None
 def test_a_robot_that_has_lost_all_that_moves_needs_no_force() -> None:
     balance = problem("pendulum", "force_balance")
     assert np.isfinite(balance.residuals([(term("part_lost", "arm"),)])).all()
+
+
+def test_what_a_balance_says_of_a_joint_is_of_all_trials_as_in_the_table() -> None:
+    balance = problem("arm", "force_balance")
+    assert isinstance(balance, ForceBalance) and len(balance.measured) > 1
+    table = {c.name: c.rmse for c in compare(balance, balance.residuals([()])[0]).channels}
+    said = [line for line in balance.remarks(()) if "root mean square" in line]
+    for line, name in zip(said, balance.channels, strict=True):
+        rms, most = (float(n) for n in re.findall(r"([\d.]+) N\.m", line))
+        assert line.startswith(f"{name}: ") and line.endswith(f"over {len(balance.measured)} trials")
+        assert rms == pytest.approx(table[name], rel=0.01) and rms <= most
+
+
+def test_a_pass_ends_with_its_trial() -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 200)] * 3)
+    left, v = np.sin(40 * x), np.ones(len(x))
+    found = remains("carriage", left, x, v, np.zeros(len(x)), np.repeat(np.arange(3), 200))
+    assert found.trials == 3 and [r.passes for r in found.ripples] == [3]
+    assert remains("carriage", left, x, v, np.zeros(len(x))).ripples[0].passes == 1

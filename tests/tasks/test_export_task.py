@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -66,6 +67,17 @@ def test_what_a_model_has_put_right_is_no_longer_assumed(cli, tmp_path):
     robot, _ = load_robot(run / "robot.yaml")
     assert robot.drives[0].kp == pytest.approx(15)
     assert robot.assumed == (("elbow", "kd"),)
+
+
+def test_a_plain_description_is_a_model_without_effects(cli, tmp_path):
+    shutil.copy(ARM, tmp_path / "arm.urdf")
+    file = tmp_path / "arm.yaml"
+    file.write_text("urdf: arm.urdf\ndrives: {elbow: {kp: 10, kd: 0.2}}\n")
+    outcome = cli("task=export", f"model={file}", "to=yaml")
+    assert outcome.status == 0, outcome.err
+    (run,) = outcome.runs()
+    assert outcome.summary()["effects"] == []
+    assert load_robot(run / "robot.yaml")[0] == load_robot(file)[0] == read_model(run / "robot.yaml").model
 
 
 def test_a_yaml_is_the_whole_robot_and_a_urdf_says_what_it_cannot_hold(cli, model):

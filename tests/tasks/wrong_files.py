@@ -154,6 +154,7 @@ def texts() -> dict[str, str]:
         "deep.yaml": "robot: " + "[" * 200 + "]" * 200,
         "mapping.yaml": "robot: {robot: {robot: quadruped}}\n",
         "list.yaml": "- 1\n- 2\n",
+        "beside.yaml": "urdf: arm.urdf\neffects: []\n",
         "tab.yaml": "robot:\n\tservo\n",
         "binary.yaml": "\x00\x01",
         "heavy.json": json.dumps(heavy),

@@ -16,6 +16,7 @@ from ee_dist.measurements.sampling import LowPass
 from ee_dist.robots.instruments import MOTOR_TORQUE
 from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, parameters, regressor, weights
 from ee_dist.robots.model import Robot
+from ee_dist.robots.ranges import travel
 from ee_dist.trials.log import Array, SensorLog
 
 ROOM = 150_000_000
@@ -28,6 +29,8 @@ REST_NOISE = 3.0
 """Standard deviations of the readings' slope below which a joint rests."""
 REST_WINDOWS = 1
 """Lengths of that line that a rest lasts at least."""
+GIVE_RAD, GIVE_M, GIVE_SHARE = 0.01, 1e-4, 0.01
+"""What teeth, gears and bearings give before anything slides; of half a joint's range no more than this share."""
 FEWEST = 10
 """Rows of forces that a log must leave."""
 FINEST = 1e-5
@@ -150,7 +153,7 @@ def motion_of(trial: MeasuredTrial, robot: Robot, processing: Processing) -> Mot
     return Motion(
         *processing.differentiated(joints, dt),
         processing.smooth(torques, dt),
-        processing.settled(at_rest(joints, dt, processing)),
+        processing.settled(at_rest(joints, dt, processing, give(robot))),
         None if log.external is None else processing.smooth(log.external, dt),
     )
 
@@ -162,15 +165,29 @@ def of_the_step_after(readings: Array) -> Array:
     return np.concatenate([readings[1:], readings[-1:]])
 
 
-def at_rest(joints: Array, dt: float, processing: Processing) -> Mask:
+def give(robot: Robot) -> Array:
+    """(M,) rad (m) that a joint moves although it sticks: dry friction is then what it has to be, up to its limit."""
+    joints = [robot.joint(name) for name in robot.motor_names]
+    most = [GIVE_RAD if j.kind == "hinge" else GIVE_M for j in joints]
+    return np.array([min(m, GIVE_SHARE * travel(j)) for m, j in zip(most, joints, strict=True)])
+
+
+def at_rest(joints: Array, dt: float, processing: Processing, give: Array) -> Mask:
     """(T, M): where readings (T, M) tell no motion: a line laid through them over half a period of the filter's cut-off does
-    not rise by more than their noise allows. A filter smears the moment in which a joint sticks; the readings do not."""
-    rows = max(int(0.5 / processing.filter_for(dt).cutoff_hz / dt) // 2 * 2 + 1, 5)
+    not rise by more than their noise allows. A filter smears the moment in which a joint sticks; the readings do not. Nor does a
+    joint slide that moves from rest to rest by no more than it gives (M,)."""
+    low_pass = processing.filter_for(dt)
+    rows = max(int(0.5 / low_pass.cutoff_hz / dt) // 2 * 2 + 1, 5)
     slope = scipy.signal.savgol_filter(joints, rows, 1, deriv=1, delta=dt, axis=0)
     noise = np.maximum(noise_of(joints), FINEST * np.ptp(joints, axis=0))
     still = np.abs(slope) <= REST_NOISE * noise * math.sqrt(12.0 / rows**3) / dt
     # A reversal is slow for a moment too: rest lasts.
-    return np.asarray(scipy.ndimage.binary_opening(still, np.ones((REST_WINDOWS * rows, 1), dtype=bool)))
+    still = np.asarray(scipy.ndimage.binary_opening(still, np.ones((REST_WINDOWS * rows, 1), dtype=bool)))
+    for k, column in enumerate(joints.T):
+        smooth = low_pass(column, dt)
+        for run in np.split(np.arange(len(smooth)), np.flatnonzero(np.diff(still[:, k])) + 1):
+            still[run, k] |= np.ptp(smooth[run]) <= give[k]
+    return still
 
 
 def noise_of(readings: Array) -> Array:

@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read
 from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.discrepancy.ways.force_balance.balance import INSTANT_S, Balance, told_by
@@ -158,20 +159,29 @@ class ForceBalance(Problem):
                 out.append(Series(k, c, unit, self.times_s[k], force[:, c], (force - rest)[:, c]))
         return out
 
-    def remains(self, hypothesis: Hypothesis, motor: int = 0, trial: int = 0) -> Remains:
-        """When, in which direction and over which position the hypothesis leaves something at one drive in one trial."""
-        every = self.processing.keep_every
-        rows = self.residuals([hypothesis], [trial])[0][self.slices[trial]]
-        left = rows.reshape(-1, len(self.channels))[:, motor] * self.scale[motor]
-        motion = self.motions[trial]
-        x, v, a = (decimated(s[:, motor], every) for s in (motion.position, motion.speed, motion.acceleration))
-        return remains(self.channels[motor], left, x, v, a)
+    def remains(self, hypothesis: Hypothesis, motor: int = 0) -> Remains:
+        """When, in which direction and over which position the hypothesis leaves something at one drive, over all trials."""
+        left = self.raw(self.residuals([hypothesis])[0])[self.channel_of == motor]
+        x, v, a = (
+            np.concatenate([decimated(series[:, motor], self.processing.keep_every) for series in of_all])
+            for of_all in zip(*((m.position, m.speed, m.acceleration) for m in self.motions), strict=True)
+        )
+        trial = np.repeat(np.arange(len(self.times_s)), [len(t) for t in self.times_s])
+        return remains(self.channels[motor], left, x, v, a, trial)
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         lines: list[str] = []
         for k, unit in enumerate(self.layout.units):
-            lines += describe(self.remains(hypothesis, k), unit, "m" if unit == "N" else "rad")
+            found = describe(self.remains(hypothesis, k), unit, "m" if unit == "N" else "rad")
+            # Of a joint that sticks, speeds and directions say nothing.
+            lines += found[:1] if self.channels[k] in self.stuck else found
         return lines
+
+    @cached_property
+    def stuck(self) -> tuple[str, ...]:
+        """Drives whose joint does not slide in any trial."""
+        never = np.all([m.rest.all(axis=0) for m in self.motions], axis=0)
+        return tuple(name for name, still in zip(self.channels, never, strict=True) if still)
 
     def shows(self, effect: str, target: str) -> bool:
         """A controller's gain, a delay or play in a gear would be proposed for nothing, and named beside what is found."""
@@ -192,6 +202,11 @@ class ForceBalance(Problem):
     @property
     def notes(self) -> list[str]:
         lines = []
+        if self.stuck:
+            lines.append(
+                f"{listed(self.stuck)} hardly {'moves' if len(self.stuck) == 1 else 'move'} in any trial: what friction takes "
+                "there may be anything up to its limit, and no more of it can be told."
+            )
         if self.left_to_give < CANCELLED:
             lines.append(
                 f"Gravity and inertia cancel in these motions but for {self.left_to_give:.0%}: a tenth off in one of them looks "

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ee_dist.discrepancy.problem import Index, Mask
 from ee_dist.trials.log import Array
 
 SLOW_SHARE, CALM_SHARE = 0.15, 0.1
@@ -46,14 +46,17 @@ class Ripple:
 @dataclass(frozen=True)
 class Remains:
     motor: str
+    trials: int
     rms: float
     largest: float
     regimes: tuple[Regime, ...]
     ripples: tuple[Ripple, ...]
 
 
-def remains(motor: str, left: Array, x: Array, v: Array, a: Array) -> Remains:
-    """What is left over at a drive: forces (T,) with position, speed and acceleration at the same instants."""
+def remains(motor: str, left: Array, x: Array, v: Array, a: Array, trial: Index | None = None) -> Remains:
+    """What is left over at a drive: forces (T,) with position, speed and acceleration at the same instants; ``trial`` (T,) is
+    which trial a row is of, without it all are of one."""
+    trial = np.zeros(len(left), dtype=np.int64) if trial is None else trial
     slow = np.abs(v) < SLOW_SHARE * np.abs(v).max()
     calm = np.abs(a) < CALM_SHARE * np.abs(a).max()
     groups = (
@@ -63,25 +66,28 @@ def remains(motor: str, left: Array, x: Array, v: Array, a: Array) -> Remains:
         ("cruising down", ~slow & calm & (v < 0)),
     )
     regimes = tuple(_regime(name, left, m) for name, m in groups if m.any())
-    ripples = tuple(r for name, m in (("up", v > 0), ("down", v < 0)) if (r := _ripple(name, x, left, m & ~slow)))
-    return Remains(motor, _rms(left), float(np.abs(left).max()), regimes, ripples)
+    ripples = tuple(
+        r for name, m in (("up", v > 0), ("down", v < 0)) if (r := _ripple(name, x, left, m & ~slow, trial))
+    )
+    return Remains(motor, len(np.unique(trial)), _rms(left), float(np.abs(left).max()), regimes, ripples)
 
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _regime(name: str, left: Array, mask: NDArray[np.bool_]) -> Regime:
+def _regime(name: str, left: Array, mask: Mask) -> Regime:
     share = float(np.sum(left[mask] ** 2) / np.sum(left**2))
     return Regime(name, float(mask.mean()), share, _rms(left[mask]), float(left[mask].mean()))
 
 
-def _ripple(name: str, x: Array, left: Array, mask: NDArray[np.bool_]) -> Ripple | None:
+def _ripple(name: str, x: Array, left: Array, mask: Mask, trial: Index) -> Ripple | None:
     at = np.flatnonzero(mask)
     if len(at) < 100:
         return None
     span = float(np.ptp(x[at]))
-    passes = [p for p in np.split(at, np.flatnonzero(np.diff(at) > 3) + 1) if np.ptp(x[p]) > 0.2 * span]
+    ends = np.flatnonzero((np.diff(at) > 3) | (np.diff(trial[at]) != 0)) + 1
+    passes = [p for p in np.split(at, ends) if np.ptp(x[p]) > 0.2 * span]
     where = np.linspace(x[at].min(), x[at].max(), BINS)
     profiles = np.array([_profile(where, x[p], left[p]) for p in passes]) if passes else np.zeros((0, BINS))
     wavelengths = np.geomspace(span / 150, span / 2, 400)
@@ -115,7 +121,9 @@ def _explained(x: Array, left: Array, wavelength: float) -> float:
 
 def describe(found: Remains, unit: str, length: str) -> Sequence[str]:
     """The account in words, a line each."""
-    lines = [f"{found.motor}: {found.rms:.2f} {unit} root mean square, {found.largest:.1f} {unit} at most"]
+    several = f", over {found.trials} trials" if found.trials > 1 else ""
+    # As many digits for both: rounded coarser, a maximum may look less than its root mean square.
+    lines = [f"{found.motor}: {found.rms:.3g} {unit} root mean square, {found.largest:.3g} {unit} at most{several}"]
     lines += [
         f"  {r.name}: {r.time_share:.0%} of the time, {r.energy_share:.0%} of the residual's energy, {r.rms:.2f} {unit} "
         f"(mean {r.mean:+.2f})"

@@ -1,0 +1,88 @@
+"""Which torque limits of a file are none: tools write 0 or a large round number where nobody knew."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.basics.names import listed
+from ee_dist.robots.body import Body
+from ee_dist.robots.described import GRAVITY_M_S2
+from ee_dist.robots.model import Joint
+
+TORQUE_PER_INERTIA = 50.0
+"""rad/s^2 (m/s^2) that an assumed torque limit gives a joint beside what it holds,"""
+LEVER_M = 0.25
+"""which is the weight of the whole robot on this lever; of a slide, half the weight."""
+PLACEHOLDER = 50.0
+"""Times what a robot needs from which a limit is none. Servos that CAD programs enter too strong have ten times as much."""
+
+
+@dataclass(frozen=True)
+class Placeholder:
+    """A stated ``limit`` of a joint that is none; ``needed``: to hold the whole robot stretched out and to speed the joint up."""
+
+    joint: Joint
+    limit: float
+    needed: float
+
+
+def guessed_limit(joint: Joint, body: Body, inertia: float) -> float:
+    """A torque limit, N.m (N), for a joint that feels this ``inertia``, where nothing is known of its motor."""
+    return TORQUE_PER_INERTIA * inertia + _weight(body) * (0.5 if joint.kind == "slide" else LEVER_M)
+
+
+def placeholders(body: Body, inertia: Mapping[str, float]) -> dict[str, Placeholder]:
+    """By joint, of those whose drive the file leaves open. ``inertia`` is what each joint feels."""
+    stretched = max(_stretched(body), LEVER_M * _weight(body))
+    found = {}
+    for joint in body.moving:
+        limit = body.drives.get(joint.name, {}).get("torque_limit")
+        if joint.name in body.driven or limit is None:
+            continue
+        hold = _weight(body) if joint.kind == "slide" else stretched
+        needed = hold + TORQUE_PER_INERTIA * inertia[joint.name]
+        if float(limit) > PLACEHOLDER * needed:
+            found[joint.name] = Placeholder(joint, float(limit), needed)
+    return found
+
+
+def told(found: Mapping[str, Placeholder], body: Body) -> list[str]:
+    """A line for each limit that is none, of all joints that have it."""
+    lines = []
+    for limit, kind in dict.fromkeys((p.limit, p.joint.kind) for p in found.values()):
+        alike = [p for p in found.values() if (p.limit, p.joint.kind) == (limit, kind)]
+        most, unit = max(p.needed for p in alike), "N" if kind == "slide" else "N.m"
+        lines.append(
+            f"effort {limit:g} of {listed(p.joint.name for p in alike)} is no real limit: to hold all of the robot, stretched "
+            f"out, and to speed it up takes {most:.2g} {unit}; drives are guessed from what it needs"
+        )
+    if body.unlimited:
+        lines.append(
+            f"effort 0 of {listed(body.unlimited)} is no real limit: drives are guessed from what the robot needs"
+        )
+    return lines
+
+
+def _weight(body: Body) -> float:
+    return sum(p.mass_kg for p in body.parts) * GRAVITY_M_S2
+
+
+def _stretched(body: Body) -> float:
+    """N.m about the first joints with all that they carry in one line: no torque that only holds is more."""
+    above = {j.child: j for j in body.joints}
+    torque = 0.0
+    for part in body.parts:
+        reach, joint = float(np.linalg.norm(part.com_m)), above.get(part.name)
+        chain = []
+        while joint is not None:
+            chain.append(joint)
+            joint = above.get(joint.parent)
+        while chain and chain[-1].kind == "fixed":
+            chain.pop()
+        if chain:
+            reach += sum(float(np.linalg.norm(j.position_m)) for j in chain[:-1])
+            torque += part.mass_kg * reach * GRAVITY_M_S2
+    return torque

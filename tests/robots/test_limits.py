@@ -1,0 +1,67 @@
+"""Limits of a file that are none: what nobody knew, written as 0 or as a large round number, leads no guess of a drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ee_dist.robots.starter import Starter, starter
+from ee_dist.robots.urdf import read_urdf
+
+LINK = """<link name="{name}"><inertial><origin xyz="0 0 {com}"/><mass value="{mass}"/>
+<inertia ixx="0.001" iyy="0.001" izz="0.0002" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="0 0 0.2"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" {effort} velocity="3"/></joint>"""
+
+
+def begun(folder: Path, first: str, second: str, mass: float = 0.3, kind: str = "revolute") -> Starter:
+    """The description to begin with of two links on a base, whose joints have these limits."""
+    parts = [
+        '<link name="base"/>',
+        JOINT.format(name="a", kind=kind, parent="base", child="upper", effort=first),
+        LINK.format(name="upper", com=0.1, mass=mass),
+        JOINT.format(name="b", kind="revolute", parent="upper", child="lower", effort=second),
+        LINK.format(name="lower", com=0.1, mass=mass),
+    ]
+    file = folder / "arm.urdf"
+    file.write_text(f'<robot name="arm">{"".join(parts)}</robot>')
+    return starter(read_urdf(file), "urdf", "arm.urdf", "arm.urdf")
+
+
+def test_a_limit_far_beyond_what_the_arm_needs_is_none_and_said_so(tmp_path: Path) -> None:
+    found, open_ = begun(tmp_path, 'effort="10000"', 'effort="10000"'), begun(tmp_path, "", "")
+    (said,) = [line for line in found.assumed if line.startswith("effort ")]
+    assert said.startswith("effort 10000 of a, b is no real limit: ") and "\n" not in said
+    assert found.robot.drives == open_.robot.drives
+    for drive in found.robot.drives:
+        assert drive.torque_limit < 10 and drive.kp < 100 and drive.rotor_inertia < 0.1
+        assert drive.joint in found.robot.assumed_joints("torque_limit")
+
+
+def test_only_the_joint_that_states_it_is_guessed(tmp_path: Path) -> None:
+    found = begun(tmp_path, 'effort="10000"', 'effort="3"')
+    assert [line.split(" is no")[0] for line in found.assumed if "no real" in line] == ["effort 10000 of a"]
+    assert found.robot.drives[1].torque_limit == 3.0
+
+
+def test_an_effort_of_0_is_said_to_be_none(tmp_path: Path) -> None:
+    found = begun(tmp_path, 'effort="0"', 'effort="3"')
+    assert [line.split(":")[0] for line in found.assumed if "no real" in line] == ["effort 0 of a is no real limit"]
+    assert found.robot.drives[0].torque_limit == begun(tmp_path, "", 'effort="3"').robot.drives[0].torque_limit
+
+
+def test_what_cad_programs_enter_for_a_light_servo_arm_stays_its_limit(tmp_path: Path) -> None:
+    found = begun(tmp_path, 'effort="10"', 'effort="10"')
+    assert not [line for line in found.assumed if "no real" in line]
+    assert [(d.torque_limit, d.kp) for d in found.robot.drives] == [(10.0, 100.0)] * 2
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("revolute", "N.m"), ("prismatic", "N")])
+def test_a_heavy_robot_needs_what_a_light_one_does_not(tmp_path: Path, kind: str, unit: str) -> None:
+    light = begun(tmp_path, 'effort="5000"', 'effort="3"', 0.3, kind)
+    assert [line.partition(" takes ")[2].split(";")[0].split()[1] for line in light.assumed if "no real" in line] == [
+        unit
+    ]
+    heavy = begun(tmp_path, 'effort="5000"', 'effort="300"', 30.0, kind)
+    assert not [line for line in heavy.assumed if "no real" in line]
