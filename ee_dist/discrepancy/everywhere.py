@@ -61,8 +61,8 @@ def everywhere(
 ) -> Everywhere | None:
     """On top of the current model, whose first ``own`` parts stay. None where it does not earn its place on the data held out
     in each of ``cuts``. ``again``: after such effects were added, only from neutral: beside what was added since, and beside
-    whatever else promises most, for its twin may have been added; and beside each of ``twins``, which were tied with the part whose
-    number they have, with the values that suited."""
+    whatever else promises most, for its twin may have been added; and beside each of ``twins``, which were tied with the part
+    whose number they have, with the values that suited."""
     as_it_is = search.on(current.hypothesis).base()
     without = [as_it_is for _ in cuts]
     if current.parts:

@@ -39,8 +39,8 @@ from ee_dist.trials.log import Array
 FEW = 1
 """Effects that the search adds before it looks whether much is a little wrong everywhere, if the next one does not do."""
 OFTEN = 2
-"""How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it: beside several that come at
-once, and again beside those of them that stay."""
+"""How often all that is a little wrong everywhere is fitted anew, once other effects have come beside it: beside several that
+come at once, and again beside those of them that stay."""
 REFUSED = 1
 """How often that may not earn its place before it is not looked for any more: it takes as long as all the rest."""
 EXCHANGES, LOOKED_AT = 2, 2

@@ -1,8 +1,9 @@
 """Over the ridges between valleys, which slopes do not see.
 
 A delay of more than a row of the log and one of less are two valleys: as the reaction moves past a reading, what a row shows
-changes its slope. Where a joint sticks, it is alike. So from where a descent ended each value is moved by itself, farther than slopes
-look, and what the others would make up for is reckoned from their slopes there (profile likelihood, linearised): one simulation a move.
+changes its slope. Where a joint sticks, it is alike. So from where a descent ended each value is moved by itself, farther than
+slopes look, and what the others would make up for is reckoned from their slopes there (profile likelihood, linearised): one
+simulation a move.
 """
 
 from __future__ import annotations
