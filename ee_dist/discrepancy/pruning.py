@@ -20,6 +20,8 @@ AGAIN = 0.03
 """Finite differences where the values are nearly right already."""
 NONE = 1e-9
 """Share of its range at which a value is neutral."""
+SURE = 0.01
+"""What a channel is at least believed to vary, as a share of the one that varies most: a computed command has no noise."""
 ROUNDS = 3
 """How often terms are left out and the rest is fitted anew."""
 
@@ -41,24 +43,20 @@ def pruned(search: Search, fit: Fit, own: int, tried: int, newest: int = 0) -> C
 
 def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> tuple[list[int], Array]:
     """Numbers of the parts to keep, and values (P,) of all to start from, into which went what the others make up for."""
-    problem, places = search.problem, fit.model.places
-    count = max(1, int(fit.mask.sum()))
-    floor = float(problem.floor[fit.mask].sum())
-    pieces = PIECES * len(np.unique(problem.segment_of[fit.mask]))
-    # Noise averages out from value to value, what is above it at best from piece to piece.
-    luck = floor / count + max(0.0, fit.energy - floor) / pieces
+    places, luck = fit.model.places, _luck(search.problem, fit)
+    slopes = fit.slopes / np.sqrt(luck)[:, None]
+    prior = PRIOR / max(float(luck.mean()), 1e-12)
     kept, units = list(range(len(fit.model.parts))), _units(fit.model, own, len(fit.model.parts) - newest)
     values = fit.u.copy()
     while units:
         at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
-        normal = fit.slopes[:, at].T @ fit.slopes[:, at] + PRIOR * np.eye(len(at))
+        normal = slopes[:, at].T @ slopes[:, at] + prior * np.eye(len(at))
         inverse, u = np.linalg.inv(normal), values[at]
         where = [
             np.flatnonzero(np.isin(at, np.concatenate([np.arange(len(fit.u))[places[k]] for k in m]))) for m in units
         ]
         costs = [
-            float(u[mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine]))
-            - luck * least_energy(tried, len(mine))
+            float(u[mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine])) - least_energy(tried, len(mine))
             for mine in where
         ]
         cheapest = int(np.argmin(costs))
@@ -70,6 +68,20 @@ def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> tup
         gone = units.pop(cheapest)
         kept = [k for k in kept if k not in gone]
     return kept, values
+
+
+def _luck(problem: Problem, fit: Fit) -> Array:
+    """(n,) variance that luck moves each fitted value by. Noise averages out from value to value, what is above it at best from
+    piece to piece; and what one channel leaves is no doubt about what the others say."""
+    channel, squares = problem.channel_of[fit.mask], fit.residual[fit.mask] ** 2
+    count, energy, floor = (
+        np.bincount(channel, weights=w, minlength=len(problem.channels))
+        for w in (np.ones(len(channel)), squares, problem.floor[fit.mask])
+    )
+    there = count > 0
+    pieces = PIECES * len(np.unique(problem.segment_of[fit.mask])) / max(1, int(there.sum()))
+    luck = np.divide(floor, count, out=np.zeros_like(floor), where=there) + np.maximum(energy - floor, 0.0) / pieces
+    return np.asarray(np.maximum(luck, max(SURE * float(luck.max()), 1e-12))[channel])
 
 
 def _units(model: Model, first: int, end: int) -> list[list[int]]:
