@@ -10,7 +10,18 @@ import numpy as np
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.other_names import other_names
-from ee_dist.measurements.proposal.words import OTHER, TIME, Reading, read_name, role_of, tokens, unit_word
+from ee_dist.measurements.proposal.pairs import spelled_out
+from ee_dist.measurements.proposal.words import (
+    OTHER,
+    POSITION,
+    SPEED,
+    TIME,
+    Reading,
+    read_name,
+    role_of,
+    tokens,
+    unit_word,
+)
 from ee_dist.measurements.signals import derivative, relation
 from ee_dist.measurements.table import Recorded, Table
 from ee_dist.trials.log import Array
@@ -98,14 +109,15 @@ def blocks_of(
         series = {a: v for a, v in series_of(table, filled=True).items() if a != times.get(table.name)}
         words = joint_words(joints)
         named = {} if order is not None and _own_numbers(joints) else _named_in_full(list(series), joints)
+        pairs = spelled_out({_stem(a) for a in series})
         families: dict[tuple[str, bool], list[tuple[str, Reading, str | None]]] = {}
         for address in series:
             joint, stem = joint_in(address, words), _stem(address)
-            reading = read_name(
-                stem if joint is None or joint_in(stem, words) else address, words[joint] if joint else frozenset()
-            )
+            said = stem if joint is None or joint_in(stem, words) else address
+            reading = read_name(pairs.get(stem, said), words[joint] if joint else frozenset())
             if address in named:
-                joint, reading = named[address]
+                joint, full = named[address]
+                reading = reading if stem in pairs else full
             if reading.kind == TIME:
                 continue
             families.setdefault((reading.family, address in named), []).append((address, reading, joint))
@@ -231,14 +243,17 @@ def _number(address: str, reading: Reading) -> int | None:
 
 
 def _made(table: Table, columns: tuple[str, ...], reading: Reading, how: str, series: dict[str, Array]) -> Block:
-    units = tuple(
-        (unit_word(table.units[c]) if table.units.get(c) else None) or read_name(_stem(c)).unit or reading.unit
-        for c in columns
-    )
+    units = tuple((unit_word(table.units.get(c) or "")) or _said_unit(c, reading) for c in columns)
     if reading.command is None and reading is not SILENT:
         # Tables of one trial may have the same columns: what was asked for in one file, what was measured in another.
         reading = replace(reading, command=role_of(table.name))
     return Block(table, columns, reading, how, np.stack([series[c] for c in columns], axis=1), units)
+
+
+def _said_unit(column: str, reading: Reading) -> str | None:
+    own = read_name(_stem(column)).unit
+    # The a of pos_a is no ampere.
+    return reading.unit if own is None or (own == "A" and reading.kind in (POSITION, SPEED)) else own
 
 
 def _by_place(

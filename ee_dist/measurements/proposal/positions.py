@@ -43,13 +43,22 @@ def _called_by_joints(block: Block) -> bool:
 
 
 def _told_by_lead(v: View, found: list[Scored]) -> list[Scored]:
-    """Of two that could both be the positions, the one that follows the other was measured."""
+    """Of two that could both be the positions, the one that follows the other was measured, and the one with noise where the
+    other has none. Where these say opposite things neither is clearly the better, and a person is asked."""
     for one in found[:4]:
         for other in found[:4]:
-            if one is other or abs(one.score - other.score) >= TIED + 1 or one.block.reading.command is not None:
+            if one is other or one.block.reading.command is not None:
                 continue
             ahead = v.lead(other.block, one.block)
-            if ahead.correlation > 0.9 and ahead.lead_s > 1.5 * v.step(one.block):
+            if ahead.correlation <= 0.9:
+                continue
+            # However much else speaks for a plan, that its change was logged, too, makes no measurement of it.
+            noisy = other.block.reading.command is None and v.planned_beside(other.block, one.block)
+            near = noisy or abs(one.score - other.score) < TIED + 1
+            if noisy:
+                one.score += 1.5
+                one.why.append(f"carries noise, which {other.block.name} does not: that is a plan")
+            if near and ahead.lead_s > 1.5 * v.step(one.block):
                 one.score += 1.5
                 one.why.append(f"follows {other.block.name} by {1e3 * ahead.lead_s:.0f} ms")
     return sorted(found, key=lambda s: -s.score)

@@ -89,7 +89,7 @@ def _odd(v: View, block: Block) -> dict[int, str]:
     """Joints at which the speed is no unit's times the change of the position although it is at most others, and why: a
     gripper's position is often a share of its range. One such joint is no reason to ask about all."""
     relations = _compared(v, block) or []
-    moving = [k for k in range(len(relations)) if signals.moves(block.values[:, k])]
+    moving = signals.lively(block.values, v.position.block.values) if relations else []
     fine = [k for k in moving if _seen(v, k, relations[k])]
     if 2 * len(fine) <= len(moving):
         return {}
@@ -109,6 +109,7 @@ def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
         return UnitChoice((), UNKNOWN, "the unit of the positions is open")
     sure, why = SURE, ""
     entries: list[dict[str, Any]] = []
+    telling = signals.lively(v.position.block.values)
     for k, r in enumerate(relations):
         kind = v.joints[k].kind
         base = SPEEDS[kind][0]
@@ -117,7 +118,7 @@ def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
             continue
         seen = _seen(v, k, r)
         stated = block.units[k] if block.units and block.units[k] in SPEEDS[kind] else None
-        if seen is None and not signals.moves(block.values[:, k]):
+        if seen is None and (k not in telling or not signals.moves(block.values[:, k])):
             seen = stated or (entries[-1]["unit"] if entries else base)
         if stated and seen and stated != seen:
             return UnitChoice((), UNKNOWN, f"the name says {stated}, but beside the positions it is {seen}")

@@ -11,6 +11,7 @@ import numpy as np
 
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SHARE, SURE, UNKNOWN, Hints
+from ee_dist.measurements.standing import reach_of
 from ee_dist.measurements.units import TURNS_ON, UNITS
 from ee_dist.robots.model import Joint
 
@@ -47,7 +48,7 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
         worst = next((p for s in (UNKNOWN, LIKELY) for p in parts if p.sure == s), parts[0])
         return UnitChoice(tuple(p.entries[0] if p.entries else {} for p in parts), worst.sure, worst.why)
     allowed = LENGTHS if kinds == {"slide"} else (*ANGLES, "mrad")
-    reach = np.array([_reach(j) for j in joints])
+    reach = np.array([reach_of(j) for j in joints])
     if hints.unit == SHARE:
         return _share(block, joints)
     if hints.unit:
@@ -110,11 +111,6 @@ def _part(block: Block, keep: list[int]) -> Block:
 
 def _all(block: Block, unit: str, sure: str, why: str) -> UnitChoice:
     return UnitChoice(({"unit": unit},) * len(block.columns), sure, why)
-
-
-def _reach(joint: Joint) -> float:
-    reach = max(abs(joint.lower), abs(joint.upper))
-    return reach if reach > 0 and math.isfinite(reach) else TURNS_ON if joint.kind == "hinge" else math.inf
 
 
 def _lerobot(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitChoice:

@@ -149,6 +149,10 @@ class View:
             return signals.Lead(0.0, 0.0, 0.0)
         return signals.lead(values, measured.values, self.step(measured))
 
+    def planned_beside(self, plan: Block, measured: Block) -> bool:
+        """Whether one block is smooth where the other, beside it in one table, carries noise."""
+        return plan.table.name == measured.table.name and signals.planned_beside(plan.values, measured.values)
+
     def pick(self, found: list[Scored], least: float = 2.0) -> Scored | None:
         """The best, if it is good enough and clearly before the next. The same reading twice is no rival of itself: of counts
         and what a logger made of them, the one whose name states a unit is taken."""

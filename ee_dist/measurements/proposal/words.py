@@ -73,6 +73,7 @@ _MEASURED = frozenset(
         "sensed",
     ]
 )
+_ROLES = _COMMAND | _MEASURED
 _PRESENT = frozenset(["current", "curr", "cur"])
 """Before a position or a speed these say that it was measured, and name no motor's current."""
 _OF_NOW = frozenset(
@@ -135,7 +136,7 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     bare, unit = _unit_of(name)
     words = [w for w in tokens(bare) if w not in joint_words]
     numbers = [int(w) for w in words if w.isdigit()]
-    texts = [w for w in words if not w.isdigit()]
+    texts = [part for w in words if not w.isdigit() for part in _unglued(w)]
     texts = ["present" if w in _PRESENT and _OF_NOW & set(texts[k + 1 : k + 2]) else w for k, w in enumerate(texts)]
     kinds = [_KIND[w] for w in texts if w in _KIND]
     if unit is None and len(texts) > 1 and texts[-1] in _UNIT:
@@ -151,6 +152,23 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     return Reading(
         kind, command, unit, numbers[-1] if numbers else None, " ".join(texts), any(w in _SECOND for w in texts), weak
     )
+
+
+def quantity_of(word: str) -> str | None:
+    """The quantity of a joint that a word says; None for any other word."""
+    kind = _KIND.get(word)
+    return kind if kind in (POSITION, SPEED, TORQUE, CURRENT) else None
+
+
+def _unglued(word: str) -> tuple[str, ...]:
+    """qdes is q and des; cmdpos is cmd and pos; other words are one."""
+    if word in _KIND or word in _COMMAND or word in _MEASURED:
+        return (word,)
+    for k in range(1, len(word)):
+        first, second = word[:k], word[k:]
+        if any(quantity_of(a) and b in _ROLES for a, b in ((first, second), (second, first))):
+            return first, second
+    return (word,)
 
 
 def _amperes(name: str, texts: list[str]) -> bool:
