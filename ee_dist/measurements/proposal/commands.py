@@ -197,6 +197,10 @@ def _as_speed_command(v: View, b: Block) -> Scored | None:
 
 def _as_torque_command(v: View, b: Block) -> Scored | None:
     r = b.reading
-    if r.kind not in (TORQUE, CURRENT) or r.command is not True or r.weak:
+    if r.kind not in (TORQUE, CURRENT) or r.command is False or r.weak:
         return None
+    if r.command is None:
+        # Of a force that is called neither, and is the only one, nobody says that it was measured; see the torques.
+        only = r.kind == TORQUE and not r.second and v.moves(b) and not v.has("torques")
+        return Scored(b, 3.0, ["the only force (torque) there is: taken as what was asked for"]) if only else None
     return Scored(b, 4.0 - 2 * r.second + (r.kind == TORQUE), ["called a commanded torque"])

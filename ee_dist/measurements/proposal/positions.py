@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ee_dist.measurements.proposal.blocks import BY_NAME, Block, series_of
+from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, series_of
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
 from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
@@ -18,12 +18,14 @@ def ranked_positions(v: View) -> list[Scored]:
             continue
         score = 0.0
         why: list[str] = []
-        if r.kind == POSITION:
+        if b.how == BY_SENSOR:
+            score = 2.0
+        elif r.kind == POSITION:
             score, why = (1.0, ["maybe a position by its letter"]) if r.weak else (2.0, ["called a position"])
         elif _called_by_joints(b):
             score, why = 2.0, ["called by the joints alone"]
         if r.command is False:
-            score, why = score + 2, [*why, "called measured"]
+            score, why = score + 2, [*why, *["called measured"] * (b.how != BY_SENSOR)]
         elif r.command:
             score -= 4
         score -= r.second

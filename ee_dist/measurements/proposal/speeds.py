@@ -10,6 +10,7 @@ from typing import Any
 from ee_dist.measurements import signals
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
+from ee_dist.measurements.proposal.rest import by_its_name
 from ee_dist.measurements.proposal.units import UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View, can_be
 from ee_dist.measurements.proposal.words import SPEED
@@ -65,7 +66,10 @@ def add_speeds(v: View) -> None:
 def _estimate(v: View, names: list[str], positions: list[str], sure: str, why: list[str]) -> None:
     """Speeds that are estimated from the positions, for the sensors that have a name."""
     for k, (name, of) in enumerate(zip(names, positions, strict=True)):
-        if name and of:
+        called = by_its_name(v, next(s for s in v.robot.sensors if s.name == name)) if name else None
+        if called is not None:
+            v.out.choices.append(called)
+        elif name and of:
             entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / v.step(v.position.block), 3))}
             v.out.choices.append(Choice("sensors", name, entry, sure, why[k]))
 

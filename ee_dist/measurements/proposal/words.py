@@ -108,7 +108,7 @@ _LETTERS = {"s": "s", "m": "m", "a": "A", "v": "V", "n": "N"}
 """Units of one letter count only behind a word that says the quantity."""
 _SHORT = {"v": SPEED, "w": SPEED, "i": CURRENT, "p": POSITION, "u": OTHER, "f": TORQUE, "x": POSITION}
 """Letters that stand for a quantity where nothing else does; what the signals say goes before them."""
-_PER_SECOND = re.compile(r"(rad|deg|m|mm|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg)_s$", re.I)
+_PER_SECOND = re.compile(r"(rad|deg|m|mm|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg|(?<![^\W_])mm?)_s$", re.I)
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def tokens(name: str) -> list[str]:
 
 def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     """What a column's name says; ``joint_words`` are the words that name its joint, which say nothing else."""
-    bare, unit = _unit_of(name)
+    bare, unit = split_unit(name)
     words = [w for w in tokens(bare) if w not in joint_words]
     numbers = [int(w) for w in words if w.isdigit()]
     texts = [part for w in words if not w.isdigit() for part in _unglued(w)]
@@ -209,7 +209,7 @@ def _kind(kinds: list[str], texts: list[str], unit: str | None) -> tuple[str | N
     return (_SHORT[letters[0]], True) if letters else (None, False)
 
 
-def _unit_of(name: str) -> tuple[str, str | None]:
+def split_unit(name: str) -> tuple[str, str | None]:
     """A unit in brackets or a speed's at the end, and the name without it."""
     found = re.search(r"[(\[]\s*([^\d()\[\]]+?)\s*[)\]]\s*$", name)
     if found:
