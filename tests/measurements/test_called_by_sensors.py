@@ -19,7 +19,8 @@ from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot, Sensor
 
 URDF = """<robot name="cart"><link name="rail"/>
-<link name="cart"><inertial><mass value="0.5"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="cart"><inertial><mass value="0.5"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <link name="pole"><inertial><origin xyz="0 0 -0.3"/><mass value="0.2"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="slide" type="prismatic"><parent link="rail"/><child link="cart"/><axis xyz="1 0 0"/>
