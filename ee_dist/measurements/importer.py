@@ -15,6 +15,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.clocks import Clocked, check_grid
+from ee_dist.measurements.commanded import command_flaws
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.need import beside_need, torques_needed
@@ -22,7 +23,6 @@ from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
-    command_suspicion,
     speed_suspicion,
     suspicions,
     time_suspicion,
@@ -343,13 +343,8 @@ class _Import:
                 ]
             elif s.kind == "velocity" and s.target in position_of:
                 self._judge(speed_suspicion(s.name, self.channels[s.name], position_of[s.target], self.step_s), column)
-        for k, drive in enumerate(self.robot.drives):
-            obeyed = np.isfinite(commands[:, k])
-            if drive.joint in position_of and obeyed.sum() > 10 and command_kind(drive) == "position":
-                found = command_suspicion(
-                    drive.joint, commands[obeyed, k], position_of[drive.joint][obeyed], self.step_s
-                )
-                self._judge(found, self.mapping.commands.get(drive.joint))
+        for name, flaw in command_flaws(self.robot, self.mapping, commands, position_of, self.step_s):
+            self._judge(flaw, self.mapping.commands.get(name))
 
     def _look_at_torques(self, torques: Array | None, joints: Array) -> None:
         """Torques beside what the motion needs. Raises MeasurementError for a unit that cannot be."""

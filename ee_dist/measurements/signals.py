@@ -14,6 +14,8 @@ AS_GOOD = 0.02
 """Correlations this close to the best fit as well as it does."""
 AGAINST = -0.5
 """Correlation below which a joint runs against its command."""
+HARDLY = 0.02
+"""A joint that moves by less than this share of what is usual among its like hardly moves: it is stuck, or creeps."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,27 @@ class Lead:
     repeats: bool = False
 
 
+SMOOTHER = 0.05
+"""What was planned has less than this share of the noise of what was measured, in fourth differences of which a fifth may be
+larger: a plan has corners."""
+LEAST_GOING, MOST_HELD = 20, 0.3
+"""Rows in motion that are needed to tell, and the share of them in which what has noise may stand still."""
+
+
 def moves(values: Array) -> bool:
     """Whether a series does anything."""
     return bool(np.isfinite(values).all() and np.ptp(values) > 1e-12 * max(1.0, float(np.abs(values).max())))
+
+
+def lively(*blocks: Array) -> list[int]:
+    """The joints that move in each of some blocks (T, J), without those that hardly do beside the others: what such a joint
+    does is friction and noise, and says nothing of what blocks have to do with one another."""
+    found = set(range(blocks[0].shape[1]))
+    for values in blocks:
+        spans = np.array([float(np.ptp(c)) if moves(c) else 0.0 for c in values.T])
+        usual = float(np.median(spans[spans > 0])) if (spans > 0).any() else 0.0
+        found &= {k for k, span in enumerate(spans) if span > 0 and span >= HARDLY * usual}
+    return sorted(found)
 
 
 def smooth(values: Array, width: int) -> Array:
@@ -59,12 +79,12 @@ def change(values: Array, step_s: float, window_s: float = 0.04) -> Array:
 
 
 def relation(a: Array, b: Array) -> Relation:
-    """How far ``b`` (T, J) times a number is ``a`` (T, J): the joint that fits worst decides the correlation."""
+    """How far ``b`` (T, J) times a number is ``a`` (T, J): the joint that fits worst decides the correlation, of those that do
+    more than hardly move."""
     found = []
-    for x, y in zip(a.T, b.T, strict=True):
-        if moves(x) and moves(y):
-            x, y = x - x.mean(), y - y.mean()
-            found.append((float(x @ y / np.sqrt((x @ x) * (y @ y))), float(x @ y / (y @ y))))
+    for k in lively(a, b):
+        x, y = a[:, k] - a[:, k].mean(), b[:, k] - b[:, k].mean()
+        found.append((float(x @ y / np.sqrt((x @ x) * (y @ y))), float(x @ y / (y @ y))))
     if not found:
         return Relation(0.0, 0.0)
     worst = min(found, key=lambda f: abs(f[0]))
@@ -84,9 +104,9 @@ def derivative(position: Array, speed: Array, step_s: float) -> Relation:
 
 def lead(a: Array, b: Array, step_s: float) -> Lead:
     """By how much ``a`` (T, J) runs ahead of ``b`` (T, J), over shifts of half a second either way. Of shifts that fit alike the
-    one that turns the fewest signs is taken, then the shortest."""
+    one that turns the fewest signs is taken, then the shortest. Joints that hardly move do not count."""
     most = min(round(LONGEST_LAG_S / step_s), len(a) // 3)
-    columns = [k for k in range(a.shape[1]) if moves(a[:, k]) and moves(b[:, k])]
+    columns = lively(a, b)
     if not columns or most < 1:
         return Lead(0.0, 0.0, 0.0)
     x, y = a[:, columns], b[:, columns]
@@ -130,3 +150,19 @@ def roughness(values: Array) -> float:
     """How much of a series (T, J) changes from row to row, beside how much it changes at all; median over what moves."""
     found = [float(np.std(np.diff(c, 2)) / np.std(c)) for c in values.T if moves(c)]
     return float(np.median(found)) if found else 0.0
+
+
+def planned_beside(a: Array, b: Array) -> bool:
+    """Whether ``a`` (T, J) is smooth but for its rounding at every joint where ``b`` carries noise: nobody measured it."""
+    found = lively(a, b)
+    return bool(found) and all(_smoother(a[:, k], b[:, k]) for k in found)
+
+
+def _smoother(a: Array, b: Array) -> bool:
+    # Only while it moves: at rest both may stand still. A value that is held from row to row is no noise.
+    step = np.abs(np.diff(a))
+    going = step > 0.2 * step.max()
+    if going[:-3].sum() < LEAST_GOING or np.mean(np.diff(b)[going] == 0) > MOST_HELD:
+        return False
+    rough = [float(np.quantile(np.abs(np.diff(x, 4))[going[:-3]], 0.8)) / float(np.ptp(x)) for x in (a, b)]
+    return rough[0] < SMOOTHER * rough[1]

@@ -9,23 +9,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.proposal.by_sensor import called_as_sensors
 from ee_dist.measurements.proposal.other_names import other_names
-from ee_dist.measurements.proposal.words import OTHER, TIME, Reading, read_name, role_of, tokens, unit_word
-from ee_dist.measurements.signals import derivative, relation
+from ee_dist.measurements.proposal.pairs import spelled_out
+from ee_dist.measurements.proposal.places import hanging_together
+from ee_dist.measurements.proposal.words import (
+    OTHER,
+    POSITION,
+    SPEED,
+    TIME,
+    Reading,
+    read_name,
+    role_of,
+    tokens,
+    unit_word,
+)
 from ee_dist.measurements.table import Recorded, Table
+from ee_dist.robots.model import Sensor
 from ee_dist.trials.log import Array
 
-BY_NAME, BY_NUMBER, BY_PLACE, ONLY = "by name", "by number", "by place", "only one"
-MIXED = 6
-"""Columns a joint up to which two orders one behind the other are looked at,"""
-CLEARLY = 0.3
-"""and by how much of a correlation they must hang together better than one order does."""
-ROWS_APART = 0.01
-"""Seconds between rows, where a mean over some rows is wanted and nobody has looked at the time yet."""
-NEARLY = 12
-"""Power of a correlation: 0.99 counts 0.89, and 0.9 counts 0.28."""
-ALIKE = 0.5
-"""Share of one another that the ratios of speed and change of position have at all joints, or it is chance."""
+BY_NAME, BY_SENSOR, BY_NUMBER, BY_PLACE, ONLY = "by name", "by sensor", "by number", "by place", "only one"
 EMPTY = 0.2
 """Share of a column's cells that may be empty and yet be filled by straight lines: what a logger skips now and then, or reads
 in turn with something else."""
@@ -89,23 +92,27 @@ def empty_cells(table: Table, column: str) -> int:
 
 
 def blocks_of(
-    recorded: Recorded, joints: Sequence[str], order: Sequence[str] | None, times: dict[str, str]
-) -> list[Block]:
+    recorded: Recorded, joints: Sequence[str], order: Sequence[str] | None, times: dict[str, str],
+    sensors: Sequence[Sensor] = (),
+) -> list[Block]:  # fmt: skip
     """All blocks of a recording. ``order`` is the joints in the order of the columns where the user said it; ``times`` is
-    the column of the time by table."""
+    the column of the time by table; ``sensors`` are the robot's, by whose names columns may be called."""
     found: list[Block] = []
     for table in recorded.tables:
         series = {a: v for a, v in series_of(table, filled=True).items() if a != times.get(table.name)}
         words = joint_words(joints)
         named = {} if order is not None and _own_numbers(joints) else _named_in_full(list(series), joints)
+        sensed = called_as_sensors(list(series), sensors, joints, table.name)
+        named |= sensed
+        pairs = spelled_out({_stem(a) for a in series})
         families: dict[tuple[str, bool], list[tuple[str, Reading, str | None]]] = {}
         for address in series:
             joint, stem = joint_in(address, words), _stem(address)
-            reading = read_name(
-                stem if joint is None or joint_in(stem, words) else address, words[joint] if joint else frozenset()
-            )
+            said = stem if joint is None or joint_in(stem, words) else address
+            reading = read_name(pairs.get(stem, said), words[joint] if joint else frozenset())
             if address in named:
-                joint, reading = named[address]
+                joint, full = named[address]
+                reading = reading if stem in pairs and address not in sensed else full
             if reading.kind == TIME:
                 continue
             families.setdefault((reading.family, address in named), []).append((address, reading, joint))
@@ -113,7 +120,7 @@ def blocks_of(
         for members in families.values():
             block = _block(table, members, series, joints, order)
             if block is not None:
-                found.append(block)
+                found.append(replace(block, how=BY_SENSOR) if members[0][0] in sensed else block)
             elif all(m[1].kind is None for m in members):
                 mute += [m[0] for m in members]
         found += _by_place(table, [a for a in series if a in mute], series, joints, order)
@@ -214,7 +221,7 @@ def _block(
         if own and set(own.values()) == set(numbers):
             by_number = dict(zip(numbers, (m[0] for m in members), strict=True))
             columns, how = tuple(by_number[own[j]] for j in joints), BY_NAME
-            return _made(table, columns, {m[0]: m[1] for m in members}[columns[0]], how, series)
+            return _made(table, columns, [{m[0]: m[1] for m in members}[c] for c in columns], how, series)
         ranked = [a for _, a in sorted(zip(numbers, (m[0] for m in members), strict=True))]
         placed = dict(zip(order or joints, ranked, strict=True))
         if any(j not in placed for j in joints):
@@ -222,7 +229,7 @@ def _block(
         columns, how = tuple(placed[j] for j in joints), BY_NUMBER
     else:
         return None
-    return _made(table, columns, {m[0]: m[1] for m in members}[columns[0]], how, series)
+    return _made(table, columns, [{m[0]: m[1] for m in members}[c] for c in columns], how, series)
 
 
 def _number(address: str, reading: Reading) -> int | None:
@@ -230,15 +237,23 @@ def _number(address: str, reading: Reading) -> int | None:
     return int(re.findall(r"\d+", inside[1])[-1]) if inside else reading.number
 
 
-def _made(table: Table, columns: tuple[str, ...], reading: Reading, how: str, series: dict[str, Array]) -> Block:
-    units = tuple(
-        (unit_word(table.units[c]) if table.units.get(c) else None) or read_name(_stem(c)).unit or reading.unit
-        for c in columns
-    )
+def _made(
+    table: Table, columns: tuple[str, ...], readings: Sequence[Reading], how: str, series: dict[str, Array]
+) -> Block:
+    """A block of columns; ``readings`` is what each name says, or what all do."""
+    reading = readings[0]
+    own = readings if len(readings) == len(columns) else [reading] * len(columns)
+    units = tuple(unit_word(table.units.get(c) or "") or _said_unit(c, r) for c, r in zip(columns, own, strict=True))
     if reading.command is None and reading is not SILENT:
         # Tables of one trial may have the same columns: what was asked for in one file, what was measured in another.
         reading = replace(reading, command=role_of(table.name))
     return Block(table, columns, reading, how, np.stack([series[c] for c in columns], axis=1), units)
+
+
+def _said_unit(column: str, reading: Reading) -> str | None:
+    own = read_name(_stem(column)).unit
+    # The a of pos_a is no ampere.
+    return reading.unit if own is None or (own == "A" and reading.kind in (POSITION, SPEED)) else own
 
 
 def _by_place(
@@ -248,12 +263,12 @@ def _by_place(
     other, whichever hangs together."""
     size = len(order or joints)
     if size < 2:
-        return [_made(table, (a,), SILENT, ONLY, series) for a in mute]
+        return [_made(table, (a,), [SILENT], ONLY, series) for a in mute]
     if not mute or len(mute) % size:
         return []
-    chosen = _hanging_together(mute, size, series)
+    chosen = hanging_together(mute, size, series)
     places = [list(order or joints).index(j) for j in joints] if order is None or set(joints) <= set(order) else []
-    return [_made(table, tuple(part[p] for p in places), SILENT, BY_PLACE, series) for part in chosen if places]
+    return [_made(table, tuple(part[p] for p in places), [SILENT], BY_PLACE, series) for part in chosen if places]
 
 
 def _by_other_names(
@@ -267,43 +282,5 @@ def _by_other_names(
     for columns in quantities:
         placed = dict(zip(order, columns, strict=True))
         chosen = tuple(placed[j] for j in joints)
-        found.append(_made(table, chosen, read_name(chosen[0], frozenset(names)), BY_PLACE, series))
+        found.append(_made(table, chosen, [read_name(chosen[0], frozenset(names))], BY_PLACE, series))
     return [b for b in found if b.reading.kind != TIME]
-
-
-def _hanging_together(mute: list[str], size: int, series: dict[str, Array]) -> list[list[str]]:
-    count = len(mute) // size
-    runs = [mute[k * size : (k + 1) * size] for k in range(count)]
-    if count == 1:
-        return runs
-    plain = [runs, [mute[k::count] for k in range(count)]]
-    best = max(plain, key=lambda split: _ties(split, series))
-    if count > MIXED:
-        return best
-    # Such as position and speed of each joint in turn, and behind them what each motor gave.
-    mixed = [[*(mute[k : size * first : first] for k in range(first)), *runs[first:]] for first in range(2, count)] + [
-        [*runs[:last], *(mute[size * last + k :: count - last] for k in range(count - last))]
-        for last in range(1, count - 1)
-    ]
-    other = max(mixed, key=lambda split: _ties(split, series), default=best)
-    return other if _ties(other, series) > _ties(best, series) + CLEARLY else best
-
-
-def _ties(split: list[list[str]], series: dict[str, Array]) -> float:
-    """How well each column of a block hangs together with the column at its place in another block."""
-    total = 0.0
-    for k, one in enumerate(split):
-        for other in split[k + 1 :]:
-            a, b = (np.stack([series[c] for c in part], axis=1) for part in (one, other))
-            # Joints move alike by chance: only what is nearly the same, or nearly its change, counts.
-            total += max(abs(relation(a, b).correlation), _change(a, b), _change(b, a)) ** NEARLY
-    return total
-
-
-def _change(a: Array, b: Array) -> float:
-    """How far ``b`` (T, J) is the change of ``a`` (T, J), by one number for all joints that move."""
-    found = [derivative(a[:, [k]], b[:, [k]], ROWS_APART) for k in range(a.shape[1])]
-    slopes = [r.slope for r in found if r.slope]
-    if not slopes or min(slopes) * max(slopes) <= 0 or min(map(abs, slopes)) < ALIKE * max(map(abs, slopes)):
-        return 0.0
-    return min(abs(r.correlation) for r in found if r.slope)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.proposal.blocks import unreadable
 from ee_dist.measurements.proposal.commands import add_commands
-from ee_dist.measurements.proposal.model import FIT, UNKNOWN, Choice, Hints, Proposal
+from ee_dist.measurements.proposal.model import FIT, LIKELY, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.positions import add_positions, ask_for_positions, ranked_positions
+from ee_dist.measurements.proposal.rate import rate_by_speeds
 from ee_dist.measurements.proposal.rest import add_rest, add_switches
 from ee_dist.measurements.proposal.speeds import add_speeds
 from ee_dist.measurements.proposal.time import time_flaw, time_of
@@ -26,9 +28,7 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     v = View(recorded, robot, hints)
     flaws = _add_times(v)
     if not v.timed.tables:
-        cure = "mend that row or drop it, or say task.rate_hz=ROWS_A_SECOND"
-        v.out.ask(f"{flaws[0]}; {cure}" if flaws else "no column rises like a time; say task.rate_hz=ROWS_A_SECOND")
-        return v.out
+        return _without_time(v, flaws)
     flaws += [error for t in v.timed.tables for error in unreadable(t, v.robot.motor_names)]
     v.blocks = v.gathered()
     position = v.pick(ranked_positions(v))
@@ -58,6 +58,26 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     _ask_the_rest(v)
     _tell_flaws(v, flaws)
     return v.out
+
+
+def _without_time(v: View, flaws: list[str]) -> Proposal:
+    """All that can be found if rows come as often as speeds say, which is asked; else what is to be written."""
+    rate = None if flaws else rate_by_speeds(v.recorded, v.robot, v.hints)
+    if rate is None:
+        cure = "mend that row or drop it, or say task.rate_hz=ROWS_A_SECOND"
+        v.out.ask(f"{flaws[0]}; {cure}" if flaws else "no column rises like a time; say task.rate_hz=ROWS_A_SECOND")
+        why = "not looked for without a time"
+        v.out.choices.append(Choice("time", "", {"rate_hz": "???"}, UNKNOWN, "no column rises like a time"))
+        v.out.choices += [Choice("sensors", s.name, {"column": "???"}, UNKNOWN, why) for s in v.robot.sensors]
+        v.out.choices += [Choice("commands", m, {"column": "???"}, UNKNOWN, why) for m in command_units(v.robot)]
+        return v.out
+    hz, why = rate
+    out = propose(v.recorded, v.robot, replace(v.hints, rate_hz=hz))
+    out.choices = [replace(c, sure=LIKELY, why=f"no column; {why}") if c.group == "time" else c for c in out.choices]
+    out.questions.insert(
+        0, f"no column rises like a time; {why} if there are {hz:g} rows a second: say task.rate_hz={hz:g}"
+    )
+    return out
 
 
 def _add_times(v: View) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from ee_dist.measurements.proposal.units import LOOSE, UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE
 from ee_dist.measurements.robot_channels import command_kinds
+from ee_dist.measurements.standing import reach_of, stands_still
+from ee_dist.measurements.units import UNITS
+from ee_dist.trials.log import Array
 
 CLOSE = 0.9
 """Correlation below which commands are likely at best, whatever they are called."""
@@ -114,12 +118,13 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
     ahead = v.lead(b, v.position.block)
     entries, why, sure = [], "in the unit of the positions", v.units.sure
     turned: list[str] = []
+    still = [] if values is None else _standing_still(v, values)
     shift = round(ahead.lead_s / v.step(v.position.block))
     for k, base in enumerate(v.units.entries):
         entry = dict(base)
         stated = b.units[k] if b.units and b.units[k] in ("rad", "deg", "mrad", "turn", "m", "mm", "cm") else None
-        if values is not None and signals.moves(values[:, k]) and signals.moves(v.position.block.values[:, k]):
-            x, y = values[:, [k]], v.position.block.values[:, [k]]
+        x, y = values[:, [k]] if values is not None else None, v.position.block.values[:, [k]]
+        if x is not None and k not in still and signals.moves(x) and signals.moves(y):
             r = (
                 signals.relation(x[: len(x) - shift], y[shift:])
                 if shift >= 0
@@ -143,12 +148,37 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
         elif stated:
             entry = {"unit": stated}
         entries.append(entry)
+    if still:
+        _as_the_others(v, entries, [k for k in still if not (b.units and b.units[k])])
+        why += f"; {', '.join(v.joints[k].name for k in still)} does not follow, and shows no unit"
     if turned:
         why += f"; sign of {', '.join(turned)} turned: the positions run against the commands"
     if 0 < len(turned) < len(entries):
         # One encoder may be mounted the other way round, or one command be wrong: a person should look.
         sure = LIKELY
     return UnitChoice(tuple(entries), sure, why)
+
+
+def _as_the_others(v: View, entries: list[dict[str, Any]], still: list[int]) -> None:
+    """One family of columns has one unit: what stands still and shows none gets that of the others."""
+    for k in still:
+        units = {e["unit"] for i, e in enumerate(entries) if i not in still and v.joints[i].kind == v.joints[k].kind}
+        if len(units) == 1 and "scale" not in entries[k]:
+            entries[k]["unit"] = units.pop()
+
+
+def _standing_still(v: View, values: Array) -> list[int]:
+    """Joints that do next to nothing of what they are asked for, in the unit of the positions or in that of the others."""
+    seen, found = v.metric(), []
+    relations = signals.each(values, v.position.block.values)
+    followed = signals.lively(values, v.position.block.values)
+    for k, e in enumerate(v.units.entries):
+        like = [abs(relations[i].slope) for i in followed if i != k and v.joints[i].kind == v.joints[k].kind]
+        asked = values[:, k] / (float(np.median(like)) if like and min(like) > 0 else 1.0)
+        asked = (e.get("scale", 1.0) * asked + e.get("offset", 0.0)) * UNITS[str(e["unit"])][1]
+        if stands_still(asked, seen[:, k], reach_of(v.joints[k])):
+            found.append(k)
+    return found
 
 
 def _as_speed_command(v: View, b: Block) -> Scored | None:
@@ -167,6 +197,10 @@ def _as_speed_command(v: View, b: Block) -> Scored | None:
 
 def _as_torque_command(v: View, b: Block) -> Scored | None:
     r = b.reading
-    if r.kind not in (TORQUE, CURRENT) or r.command is not True or r.weak:
+    if r.kind not in (TORQUE, CURRENT) or r.command is False or r.weak:
         return None
+    if r.command is None:
+        # Of a force that is called neither, and is the only one, nobody says that it was measured; see the torques.
+        only = r.kind == TORQUE and not r.second and v.moves(b) and not v.has("torques")
+        return Scored(b, 3.0, ["the only force (torque) there is: taken as what was asked for"]) if only else None
     return Scored(b, 4.0 - 2 * r.second + (r.kind == TORQUE), ["called a commanded torque"])

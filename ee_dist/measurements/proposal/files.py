@@ -47,8 +47,9 @@ def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints)
 
 def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Table]] | None:
     """Files of two or more kinds, equally many, with a word of its own in each kind's names: (pattern, table) by word. Of
-    files with the same columns those called commands are another kind than those called measurements."""
-    kinds: dict[tuple[bool | None, tuple[str, ...]], list[tuple[Path, Table]]] = {}
+    files with the same columns those called commands are another kind than those called measurements. Loggers write columns
+    in whatever order, so that only which there are counts; a file with nothing but some of another's columns is of its kind."""
+    kinds: dict[tuple[bool | None, frozenset[str]], list[tuple[Path, Table]]] = {}
     roles = [role_of(f.stem) for f in files]
     told = True in roles and False in roles
     for k, file in enumerate(files):
@@ -56,7 +57,12 @@ def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Tabl
         if len(found) != 1 or len(found[0].tables) != 1:
             return None
         table = found[0].tables[0]
-        kinds.setdefault((roles[k] if told else None, tuple(table.columns)), []).append((file, table))
+        role, columns = roles[k] if told else None, frozenset(table.columns)
+        # What is called the same in each of several folders is what it is called.
+        within = len({f.stem for f in files}) == len(files)
+        alike = [a for a in kinds if a[0] == role and within and (a[1] <= columns or columns <= a[1])]
+        kind = alike[0] if alike else (role, columns)
+        kinds.setdefault(kind, []).append((file, table))
     if len(kinds) < 2 or len({len(v) for v in kinds.values()}) != 1:
         return None
     stems = [{f.stem for f, _ in v} for v in kinds.values()]

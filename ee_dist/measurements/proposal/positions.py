@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ee_dist.measurements.proposal.blocks import BY_NAME, Block, series_of
+from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, series_of
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
 from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
@@ -18,12 +18,14 @@ def ranked_positions(v: View) -> list[Scored]:
             continue
         score = 0.0
         why: list[str] = []
-        if r.kind == POSITION:
+        if b.how == BY_SENSOR:
+            score = 2.0
+        elif r.kind == POSITION:
             score, why = (1.0, ["maybe a position by its letter"]) if r.weak else (2.0, ["called a position"])
         elif _called_by_joints(b):
             score, why = 2.0, ["called by the joints alone"]
         if r.command is False:
-            score, why = score + 2, [*why, "called measured"]
+            score, why = score + 2, [*why, *["called measured"] * (b.how != BY_SENSOR)]
         elif r.command:
             score -= 4
         score -= r.second
@@ -43,13 +45,22 @@ def _called_by_joints(block: Block) -> bool:
 
 
 def _told_by_lead(v: View, found: list[Scored]) -> list[Scored]:
-    """Of two that could both be the positions, the one that follows the other was measured."""
+    """Of two that could both be the positions, the one that follows the other was measured, and the one with noise where the
+    other has none. Where these say opposite things neither is clearly the better, and a person is asked."""
     for one in found[:4]:
         for other in found[:4]:
-            if one is other or abs(one.score - other.score) >= TIED + 1 or one.block.reading.command is not None:
+            if one is other or one.block.reading.command is not None:
                 continue
             ahead = v.lead(other.block, one.block)
-            if ahead.correlation > 0.9 and ahead.lead_s > 1.5 * v.step(one.block):
+            if ahead.correlation <= 0.9:
+                continue
+            # However much else speaks for a plan, that its change was logged, too, makes no measurement of it.
+            noisy = other.block.reading.command is None and v.planned_beside(other.block, one.block)
+            near = noisy or abs(one.score - other.score) < TIED + 1
+            if noisy:
+                one.score += 1.5
+                one.why.append(f"carries noise, which {other.block.name} does not: that is a plan")
+            if near and ahead.lead_s > 1.5 * v.step(one.block):
                 one.score += 1.5
                 one.why.append(f"follows {other.block.name} by {1e3 * ahead.lead_s:.0f} ms")
     return sorted(found, key=lambda s: -s.score)

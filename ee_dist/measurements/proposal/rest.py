@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ee_dist.measurements.proposal.blocks import series_of
-from ee_dist.measurements.proposal.model import LIKELY, UNKNOWN, Choice
+from ee_dist.measurements.proposal.by_sensor import column_of
+from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.view import View
-from ee_dist.measurements.proposal.words import tokens
+from ee_dist.measurements.proposal.words import role_of, tokens
 from ee_dist.measurements.units import UNITS
+from ee_dist.robots.model import Sensor
 
 ENABLED = frozenset(["enable", "enabled", "active", "released", "powered", "on"])
 OTHER_SWITCHES = frozenset([
@@ -25,17 +27,28 @@ def add_rest(v: View) -> None:
     filled = {c.name for c in v.out.choices if c.group == "sensors"}
     for s in v.robot.sensors:
         if s.name not in filled:
-            exact = [(t, a) for t in v.recorded.tables for a in t.addresses() if a == s.name]
-            if len(exact) == 1:
-                place = {"table": exact[0][0].name} if len(v.recorded.tables) > 1 else {}
-                entry = place | {"column": exact[0][1], "unit": s.unit}
-                v.out.choices.append(Choice("sensors", s.name, entry, LIKELY, "a column of that name; unit assumed"))
+            choice = by_its_name(v, s)
+            if choice is not None:
+                v.out.choices.append(choice)
             else:
                 v.out.choices.append(Choice("sensors", s.name, {"column": "???"}, UNKNOWN, "not found"))
                 v.out.ask(
                     f"{s.name} ({s.kind} of {s.target or 'the base'}): no column looks like it; write it into the mapping, "
                     "or take the sensor out of the robot's description"
                 )
+
+
+def by_its_name(v: View, sensor: Sensor) -> Choice | None:
+    """The one column that is called as a sensor is, in the unit that it states or else in the sensor's."""
+    tables = [t for t in v.timed.tables if role_of(t.name) is not True]
+    found = [(t, hit) for t in tables if (hit := column_of(sensor, t.addresses())) is not None]
+    if len(found) != 1:
+        return None
+    table, (column, unit) = found[0]
+    place = {"table": table.name} if len(v.recorded.tables) > 1 else {}
+    said = f"its name says {unit}" if unit else "unit assumed"
+    entry = place | {"column": column, "unit": unit or sensor.unit}
+    return Choice("sensors", sensor.name, entry, SURE if unit else LIKELY, f"called as the sensor is; {said}")
 
 
 def add_switches(v: View) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from ee_dist.measurements import signals
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
+from ee_dist.measurements.proposal.rest import by_its_name
 from ee_dist.measurements.proposal.units import UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View, can_be
 from ee_dist.measurements.proposal.words import SPEED
@@ -65,7 +66,10 @@ def add_speeds(v: View) -> None:
 def _estimate(v: View, names: list[str], positions: list[str], sure: str, why: list[str]) -> None:
     """Speeds that are estimated from the positions, for the sensors that have a name."""
     for k, (name, of) in enumerate(zip(names, positions, strict=True)):
-        if name and of:
+        called = by_its_name(v, next(s for s in v.robot.sensors if s.name == name)) if name else None
+        if called is not None:
+            v.out.choices.append(called)
+        elif name and of:
             entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / v.step(v.position.block), 3))}
             v.out.choices.append(Choice("sensors", name, entry, sure, why[k]))
 
@@ -89,7 +93,7 @@ def _odd(v: View, block: Block) -> dict[int, str]:
     """Joints at which the speed is no unit's times the change of the position although it is at most others, and why: a
     gripper's position is often a share of its range. One such joint is no reason to ask about all."""
     relations = _compared(v, block) or []
-    moving = [k for k in range(len(relations)) if signals.moves(block.values[:, k])]
+    moving = signals.lively(block.values, v.position.block.values) if relations else []
     fine = [k for k in moving if _seen(v, k, relations[k])]
     if 2 * len(fine) <= len(moving):
         return {}
@@ -109,6 +113,7 @@ def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
         return UnitChoice((), UNKNOWN, "the unit of the positions is open")
     sure, why = SURE, ""
     entries: list[dict[str, Any]] = []
+    telling = signals.lively(v.position.block.values)
     for k, r in enumerate(relations):
         kind = v.joints[k].kind
         base = SPEEDS[kind][0]
@@ -117,7 +122,7 @@ def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
             continue
         seen = _seen(v, k, r)
         stated = block.units[k] if block.units and block.units[k] in SPEEDS[kind] else None
-        if seen is None and not signals.moves(block.values[:, k]):
+        if seen is None and (k not in telling or not signals.moves(block.values[:, k])):
             seen = stated or (entries[-1]["unit"] if entries else base)
         if stated and seen and stated != seen:
             return UnitChoice((), UNKNOWN, f"the name says {stated}, but beside the positions it is {seen}")

@@ -187,6 +187,12 @@ def _gains(v: View, relations: list[signals.Relation] | None) -> list[float]:
     return found
 
 
+def _in_thousandths(relations: list[signals.Relation] | None, telling: list[int], block: Block) -> bool:
+    """Whether columns of one family, whose unit nothing says, are mN.m (mN): at most joints hundreds of times the need."""
+    sizes = [abs(relations[k].slope) for k in telling if abs(relations[k].correlation) > 0.7] if relations else []
+    return bool(sizes) and not any(block.units) and float(np.median(sizes)) > 200
+
+
 def torque_units(v: View, block: Block) -> UnitChoice:
     """N.m or N; a current through the gain that was said. A sign turned against the motion's need is turned back."""
     kinds = ["N.m" if j.kind == "hinge" else "N" for j in v.joints]
@@ -205,6 +211,9 @@ def torque_units(v: View, block: Block) -> UnitChoice:
         v.gained.append(block.name)
     entries, turned, unclear, checked = [], [], [], 0
     sizes: dict[int, float] = {}
+    # What a joint that hardly moves is given is friction alone.
+    telling = signals.lively(v.position.block.values)
+    thousandth = not current and _in_thousandths(relations, telling, block)
     for k, unit in enumerate(kinds):
         stated = block.units[k] if block.units else None
         entry: dict[str, Any] = {"unit": stated if stated in ("N.m", "mN.m", "N", "mN") else unit}
@@ -212,14 +221,12 @@ def torque_units(v: View, block: Block) -> UnitChoice:
             # Estimated gains are of the numbers as they stand, whatever their unit.
             size = 1e-3 if stated == "mA" and v.hints.gains != FIT else 1.0
             entry = {"unit": unit, "scale": gains[k] * size}
-        elif relations is not None and abs(relations[k].correlation) > 0.7:
-            size = UNITS[entry["unit"]][1] * abs(relations[k].slope)
-            if size > 200 and stated is None:
-                entry["unit"] = f"m{unit}"
-                size *= 1e-3
-            checked += 0.3 < size < 3
-            sizes[k] = size
-        if relations is not None and relations[k].correlation < -0.4:
+        elif thousandth and stated is None:
+            entry["unit"] = f"m{unit}"
+        if not current and relations is not None and k in telling and abs(relations[k].correlation) > 0.7:
+            sizes[k] = UNITS[entry["unit"]][1] * abs(relations[k].slope)
+            checked += 0.3 < sizes[k] < 3
+        if relations is not None and k in telling and relations[k].correlation < -0.4:
             # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
             r = relations[k]
             size = abs(r.slope) * UNITS[entry["unit"]][1] * abs(float(entry.get("scale", 1.0)))

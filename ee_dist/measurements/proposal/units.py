@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ee_dist.measurements.proposal.blocks import Block
+from ee_dist.measurements.proposal.blocks import BY_SENSOR, Block
 from ee_dist.measurements.proposal.model import LIKELY, SHARE, SURE, UNKNOWN, Hints
+from ee_dist.measurements.standing import reach_of
 from ee_dist.measurements.units import TURNS_ON, UNITS
 from ee_dist.robots.model import Joint
 
@@ -45,9 +46,11 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
     if kinds == {"hinge", "slide"}:
         parts = [position_units(_part(block, [k]), [j], hints) for k, j in enumerate(joints)]
         worst = next((p for s in (UNKNOWN, LIKELY) for p in parts if p.sure == s), parts[0])
-        return UnitChoice(tuple(p.entries[0] if p.entries else {} for p in parts), worst.sure, worst.why)
+        said = "; ".join(dict.fromkeys(f"{j.name}: {p.why}" for j, p in zip(joints, parts, strict=True)))
+        why = worst.why if worst.sure == UNKNOWN else said
+        return UnitChoice(tuple(p.entries[0] if p.entries else {} for p in parts), worst.sure, why)
     allowed = LENGTHS if kinds == {"slide"} else (*ANGLES, "mrad")
-    reach = np.array([_reach(j) for j in joints])
+    reach = np.array([reach_of(j) for j in joints])
     if hints.unit == SHARE:
         return _share(block, joints)
     if hints.unit:
@@ -69,6 +72,15 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
     # Of a joint that turns on and on, or has no stops in the file, a motion is large beside a turn or two.
     room = np.minimum(reach, [TURNS_ON if j.kind == "hinge" else math.pi for j in joints])
     lively = [u for u in fits if (span * UNITS[u][1] > STILL * room).any()]
+    if allowed[0] in fits and not {*lively} & {*allowed[:2]}:
+        if block.how == BY_SENSOR:
+            return _all(
+                block, allowed[0], LIKELY, f"no unit is stated: in {allowed[0]}, as the robot's sensors, a small motion"
+            )
+        if lively:
+            return UnitChoice(
+                (), UNKNOWN, f"numbers to {seen.max():.4g}: a small motion in {allowed[0]}, or {lively[0]}"
+            )
     if not lively:
         why = f"numbers to {seen.max():.4g} fit no unit of {allowed[0]} within the joints' limits{_counts(block)}"
         return UnitChoice((), UNKNOWN, why)
@@ -110,11 +122,6 @@ def _part(block: Block, keep: list[int]) -> Block:
 
 def _all(block: Block, unit: str, sure: str, why: str) -> UnitChoice:
     return UnitChoice(({"unit": unit},) * len(block.columns), sure, why)
-
-
-def _reach(joint: Joint) -> float:
-    reach = max(abs(joint.lower), abs(joint.upper))
-    return reach if reach > 0 and math.isfinite(reach) else TURNS_ON if joint.kind == "hinge" else math.inf
 
 
 def _lerobot(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitChoice:

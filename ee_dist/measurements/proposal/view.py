@@ -14,6 +14,7 @@ from ee_dist.measurements.proposal.blocks import (
     BY_NAME,
     BY_NUMBER,
     BY_PLACE,
+    BY_SENSOR,
     Block,
     blocks_of,
     empty_cells,
@@ -68,7 +69,7 @@ class View:
         """The blocks of all tables that have a time."""
         known = {n: t.column for n, t in self.times.items() if t.column is not None}
         known |= {t.name: t.clock for t in self.recorded.tables if t.clock is not None}
-        found = blocks_of(self.timed, self.robot.motor_names, self.hints.joints, known)
+        found = blocks_of(self.timed, self.robot.motor_names, self.hints.joints, known, self.robot.sensors)
         return [self.even(b) for b in found if len(b.values) > 20]
 
     def driven(self) -> View:
@@ -149,6 +150,10 @@ class View:
             return signals.Lead(0.0, 0.0, 0.0)
         return signals.lead(values, measured.values, self.step(measured))
 
+    def planned_beside(self, plan: Block, measured: Block) -> bool:
+        """Whether one block is smooth where the other, beside it in one table, carries noise."""
+        return plan.table.name == measured.table.name and signals.planned_beside(plan.values, measured.values)
+
     def pick(self, found: list[Scored], least: float = 2.0) -> Scored | None:
         """The best, if it is good enough and clearly before the next. The same reading twice is no rival of itself: of counts
         and what a logger made of them, the one whose name states a unit is taken."""
@@ -169,7 +174,7 @@ class View:
             return LIKELY, f"joints {block.how}, in the robot's order"
         if block.how in (BY_NUMBER, BY_PLACE):
             return SURE, "joints in the order you said"
-        return SURE, "joint by its name" if block.how == BY_NAME else ""
+        return SURE, {BY_NAME: "joint by its name", BY_SENSOR: "called as the robot's sensors are"}.get(block.how, "")
 
     def entry(self, block: Block, k: int, more: dict[str, Any]) -> dict[str, Any]:
         place = {"table": block.table.name} if len(self.recorded.tables) > 1 else {}

@@ -73,6 +73,7 @@ _MEASURED = frozenset(
         "sensed",
     ]
 )
+_ROLES = _COMMAND | _MEASURED
 _PRESENT = frozenset(["current", "curr", "cur"])
 """Before a position or a speed these say that it was measured, and name no motor's current."""
 _OF_NOW = frozenset(
@@ -107,7 +108,7 @@ _LETTERS = {"s": "s", "m": "m", "a": "A", "v": "V", "n": "N"}
 """Units of one letter count only behind a word that says the quantity."""
 _SHORT = {"v": SPEED, "w": SPEED, "i": CURRENT, "p": POSITION, "u": OTHER, "f": TORQUE, "x": POSITION}
 """Letters that stand for a quantity where nothing else does; what the signals say goes before them."""
-_PER_SECOND = re.compile(r"(rad|deg|m|mm|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg)_s$", re.I)
+_PER_SECOND = re.compile(r"(rad|deg|m|mm|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg|(?<![^\W_])mm?)_s$", re.I)
 
 
 @dataclass(frozen=True)
@@ -132,10 +133,10 @@ def tokens(name: str) -> list[str]:
 
 def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     """What a column's name says; ``joint_words`` are the words that name its joint, which say nothing else."""
-    bare, unit = _unit_of(name)
+    bare, unit = split_unit(name)
     words = [w for w in tokens(bare) if w not in joint_words]
     numbers = [int(w) for w in words if w.isdigit()]
-    texts = [w for w in words if not w.isdigit()]
+    texts = [part for w in words if not w.isdigit() for part in _unglued(w)]
     texts = ["present" if w in _PRESENT and _OF_NOW & set(texts[k + 1 : k + 2]) else w for k, w in enumerate(texts)]
     kinds = [_KIND[w] for w in texts if w in _KIND]
     if unit is None and len(texts) > 1 and texts[-1] in _UNIT:
@@ -151,6 +152,23 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     return Reading(
         kind, command, unit, numbers[-1] if numbers else None, " ".join(texts), any(w in _SECOND for w in texts), weak
     )
+
+
+def quantity_of(word: str) -> str | None:
+    """The quantity of a joint that a word says; None for any other word."""
+    kind = _KIND.get(word)
+    return kind if kind in (POSITION, SPEED, TORQUE, CURRENT) else None
+
+
+def _unglued(word: str) -> tuple[str, ...]:
+    """qdes is q and des; cmdpos is cmd and pos; other words are one."""
+    if word in _KIND or word in _COMMAND or word in _MEASURED:
+        return (word,)
+    for k in range(1, len(word)):
+        first, second = word[:k], word[k:]
+        if any(quantity_of(a) and b in _ROLES for a, b in ((first, second), (second, first))):
+            return first, second
+    return (word,)
 
 
 def _amperes(name: str, texts: list[str]) -> bool:
@@ -191,7 +209,7 @@ def _kind(kinds: list[str], texts: list[str], unit: str | None) -> tuple[str | N
     return (_SHORT[letters[0]], True) if letters else (None, False)
 
 
-def _unit_of(name: str) -> tuple[str, str | None]:
+def split_unit(name: str) -> tuple[str, str | None]:
     """A unit in brackets or a speed's at the end, and the name without it."""
     found = re.search(r"[(\[]\s*([^\d()\[\]]+?)\s*[)\]]\s*$", name)
     if found:

@@ -1,0 +1,34 @@
+"""Joints that stand still although they are commanded: no unit explains it, and what they do tells nothing of units."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ee_dist.measurements.units import TURNS_ON
+from ee_dist.robots.model import Joint
+from ee_dist.trials.log import Array
+
+PART = 0.1
+"""Of its command's way a joint that stands still goes less than this share,"""
+REST = 0.02
+"""and less than this share of its reach,"""
+WITHIN = 1.15
+"""while its command stays within its reach, times this, as no number in another unit would,"""
+ASKED = 0.01
+"""and goes through more than this share of it."""
+
+
+def stands_still(asked: Array, seen: Array, reach: float) -> bool:
+    """Whether a joint does next to nothing of what it was asked for; both (T,) in the unit of its ``reach``."""
+    way, moved = float(np.ptp(asked)), float(np.ptp(seen))
+    return bool(
+        moved < PART * way and moved < REST * reach and way > ASKED * reach and np.abs(asked).max() <= WITHIN * reach
+    )
+
+
+def reach_of(joint: Joint) -> float:
+    """How far from zero a joint gets; of one that turns without an end, by a few turns."""
+    reach = max(abs(joint.lower), abs(joint.upper))
+    return reach if reach > 0 and math.isfinite(reach) else TURNS_ON if joint.kind == "hinge" else math.inf

@@ -1,0 +1,79 @@
+"""A joint that is commanded and stands still: a remark, no question of units; and the columns of one family have one unit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import measurement_files as samples
+import numpy as np
+import pandas as pd
+import pytest
+import small_logs as logs
+
+from ee_dist.measurements import signals
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.importer import import_files
+from ee_dist.measurements.mapping_file import mapping_of
+from ee_dist.measurements.proposal.torques import _in_thousandths
+from ee_dist.robots.describe import load_robot
+
+JOINTS = ("shoulder", "elbow", "wrist")
+T = np.arange(500) / 100
+
+
+def frame(unit: float = 1.0, wrist: float = 1 / 700, joints: int = 3) -> pd.DataFrame:
+    """Commands in times ``unit`` the positions; the last joint creeps by a share of what it is asked for."""
+    asked = np.stack(
+        [0.5 * np.sin(1.7 * T) + 0.2 * np.sin(4.1 * T), 0.4 * np.cos(2.3 * T), 0.5 * np.sin(2.9 * T)], axis=1
+    )
+    seen = np.stack([np.interp(T - 0.05, T, c) for c in asked.T], axis=1) * [1, 1, wrist]
+    return logs.frame_of(
+        T, seen[:, 3 - joints :], unit * asked[:, 3 - joints :], "{joint}_{what}", JOINTS[3 - joints :]
+    )
+
+
+@pytest.mark.parametrize("unit", [1.0, 180 / np.pi])
+def test_it_is_a_remark_and_the_unit_is_that_of_the_others(tmp_path: Path, unit: float) -> None:
+    log, report = logs.imported(tmp_path, logs.written(tmp_path, frame(unit)), JOINTS)
+    assert any(s == "wrist does not move although it is commanded by 1 rad" for s in report.suspicious)
+    assert np.ptp(log.commands[:, 2]) == pytest.approx(1.0, rel=0.01)
+
+
+def mapped(tmp_path: Path, table: pd.DataFrame, joints: tuple[str, ...], **commands: str) -> list[str]:
+    logs.written(tmp_path, table)
+    robot, _ = load_robot(samples.robot_file(tmp_path, joints))
+    sensors: dict[str, Any] = {f"position_{j}": {"column": f"{j}_pos", "unit": "rad"} for j in joints}
+    sensors |= {f"velocity_{j}": {"speed_of": f"position_{j}", "cutoff_hz": 20} for j in joints}
+    told = {j: {"column": f"{j}_goal", "unit": commands.get(j, "rad")} for j in joints}
+    raw = {"time": {"column": "time", "unit": "s"}, "sensors": sensors, "commands": told}
+    ((_, report),) = import_files([tmp_path / "log.csv"], mapping_of(raw, tmp_path / "map.yaml"), robot)
+    return report.suspicious
+
+
+@pytest.mark.parametrize("share", [1 / 700, 1 / 57.3])
+def test_whoever_wrote_the_mapping(tmp_path: Path, share: float) -> None:
+    said = [s for s in mapped(tmp_path, frame(wrist=share), JOINTS) if "wrist" in s]
+    assert said == ["wrist does not move although it is commanded by 1 rad"]
+
+
+def test_a_unit_that_was_written_wrongly_at_one_joint_is_still_refused(tmp_path: Path) -> None:
+    table = frame(wrist=1.0)
+    table["wrist_pos"] *= 0.1
+    table["wrist_goal"] *= 0.1
+    with pytest.raises(MeasurementError, match=r"wrist: its commands are 0\.0175 times its positions"):
+        mapped(tmp_path, table, JOINTS, wrist="deg")
+
+
+def test_of_one_joint_alone_a_ratio_between_units_is_a_unit(tmp_path: Path) -> None:
+    assert any("does not move" in s for s in mapped(tmp_path, frame(joints=1), JOINTS[2:]))
+    with pytest.raises(MeasurementError, match="another unit"):
+        mapped(tmp_path, frame(wrist=1 / 57.3, joints=1), JOINTS[2:])
+
+
+def test_torques_of_one_family_have_one_unit() -> None:
+    block = cast(Any, SimpleNamespace(units=(None, None, None)))
+    relations = [signals.Relation(0.9, size) for size in (1.1, 0.8, 900.0)]
+    assert not _in_thousandths(relations, [0, 1, 2], block), "at one joint alone it is friction"
+    assert _in_thousandths([signals.Relation(0.9, s) for s in (1100.0, 800.0, 3.0)], [0, 1, 2], block)
