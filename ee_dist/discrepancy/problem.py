@@ -45,6 +45,8 @@ class Layout:
     channels: tuple[str, ...]
     units: tuple[str, ...]
     joint_of_channel: tuple[int | None, ...]
+    by_segment: bool = False
+    """Whether what is ``known`` differs from segment to segment by itself, as starts do, and not from robot to robot."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from ee_dist.discrepancy.measured_trial import (
 )
 from ee_dist.discrepancy.slow_noise import slow_noise
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array, State
+from ee_dist.trials.log import Array, SensorLog, State
 
 AROUND, CUBIC = (9, 5), 3
 """Readings that the curve is laid through, and fewer, which part from the first where it is too stiff; its order."""
@@ -88,8 +88,14 @@ def speeds_off(trial: MeasuredTrial, robot: Robot) -> Array:
     noise = slow_noise(even.times_s, sensed)
     if not trial.commands_held or even.joints is None or len(even) < AROUND[0]:
         return noise
-    _, own, better = _curve(trial, sensors, read)
-    return np.where(better, own, noise)
+    _, _, better = _curve(trial, sensors, read)
+    stiff, supple = _through(even)
+    long, short = (scipy.signal.savgol_coeffs(n, CUBIC, deriv=1, delta=_step(even)) for n in AROUND)
+    apart = long - np.pad(short, (len(long) - len(short)) // 2)
+    read_noise = slow_noise(even.times_s, even.joints)
+    # By what the curve is too stiff, beyond what noise makes it part from the more supple one.
+    bent = np.maximum(_size(stiff - supple) ** 2 - (read_noise * np.linalg.norm(apart)) ** 2, 0.0)
+    return np.where(better, np.sqrt((read_noise * np.linalg.norm(long)) ** 2 + bent), noise)
 
 
 def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> Array:
@@ -104,15 +110,29 @@ def _curve(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> tuple[Ar
     """Speeds by positions (T, M), their standard deviations (M,), and whether they know better than what was read (M,)."""
     even = evenly_read(trial.log)
     assert even.joints is not None
-    step_s = float(np.median(np.diff(even.times_s)))
-    stiff, supple = (scipy.signal.savgol_filter(even.joints, n, CUBIC, deriv=1, delta=step_s, axis=0) for n in AROUND)
-    weights = scipy.signal.savgol_coeffs(AROUND[0], CUBIC, deriv=1, delta=step_s)
+    stiff, supple = _through(even)
+    weights = scipy.signal.savgol_coeffs(AROUND[0], CUBIC, deriv=1, delta=_step(even))
     own = np.hypot(slow_noise(even.times_s, even.joints) * np.linalg.norm(weights), _size(stiff - supple))
     sensed = np.stack([np.interp(even.times_s, trial.log.times_s, v) for v in read.T], axis=1)
     alone = np.isin(np.arange(read.shape[1]), [joint for joint, _, _ in sensors], invert=True)
     better = (_size(sensed - stiff) > BEYOND * own) | alone
     slopes = np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in stiff.T], axis=1)
     return slopes, own, better
+
+
+def _through(even: SensorLog) -> tuple[Array, Array]:
+    """(T, M) speeds by the two curves through the positions."""
+    assert even.joints is not None
+    stiff, supple = (
+        np.asarray(scipy.signal.savgol_filter(even.joints, n, CUBIC, deriv=1, delta=_step(even), axis=0))
+        for n in AROUND
+    )
+    return stiff, supple
+
+
+def _step(even: SensorLog) -> float:
+    """s from one reading to the next."""
+    return float(np.median(np.diff(even.times_s)))
 
 
 def _size(values: Array) -> Array:

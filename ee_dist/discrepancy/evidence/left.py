@@ -69,10 +69,13 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
         mean_floor = np.divide(f[mine] - b[mine], n[mine], out=np.zeros_like(s[mine]), where=n[mine] > 0)
         for c in np.flatnonzero(count):
             events = EVENT if floor[c] < 0.3 * count[c] else 0.0
-            quick_z = (energy[c] - floor[c]) / (math.sqrt(2.0 * max(floor[c], 1.0)) + events + VARIES * bias[c])
+            varies = VARIES * bias[c]
+            if problem.layout.by_segment:
+                varies = math.sqrt(2.0 * float((b[mine][:, c] ** 2).sum()))
+            quick_z = (energy[c] - floor[c]) / (math.sqrt(2.0 * max(floor[c], 1.0)) + events + varies)
             windows = float((n[mine][:, c] > 0).sum())
             sd = math.sqrt(2.0) * math.sqrt(max(float((mean_floor[:, c] ** 2).sum()), 1.0)) + events
-            sd += VARIES * bias[c]
+            sd += varies
             slow_z = (slow[:, c].sum() - mean_floor[:, c].sum() - bias[c]) / sd if windows else 0.0
             if max(quick_z, slow_z) <= limit:
                 continue

@@ -21,17 +21,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
-from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, error, joints_of
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.problem import TIMES_NOISE, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.slow_noise import slow_noise, without_motion
-from ee_dist.discrepancy.starting import speeds_off, starting_speeds
+from ee_dist.discrepancy.starting import speeds_off
+from ee_dist.discrepancy.ways.free_run.pieces import Piece, pieces
 from ee_dist.effects.catalogue import Hypothesis, apply
-from ee_dist.engines.contract import Rollout
-from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array, SensorLog, State
+from ee_dist.trials.log import Array, SensorLog
 from ee_dist.trials.noise import channel_range
 
 
@@ -52,9 +51,6 @@ class ToPositions:
 
 RESTART_S = 0.5
 """Length of windows that start anew from the measured state."""
-RUN_UP = 20
-"""Rows before a window from which it is simulated: as long as the longest delay that a drive may have. What drives hold within
-them when it begins (commands on their way, play) comes from there."""
 MEAN_ABSOLUTE, MEDIAN_ABSOLUTE = math.sqrt(2 / math.pi), 0.6745
 """Of normal noise with a standard deviation of 1."""
 GROWN = 1.2
@@ -94,7 +90,7 @@ class FreeRun(Problem):
         self.columns = tuple(columns)
         # What is predicted is the motion: noise of its sensors would count against every model.
         self.setups = [noiseless(apply(robot, t.setup)) for t in trials]
-        self.pieces = [p for k, t in enumerate(trials) for p in _pieces(k, t, robot, windows_s, every)]
+        self.pieces = [p for k, t in enumerate(trials) for p in pieces(k, t, robot, windows_s, every)]
         by_unit = _noise_by_unit(self.pieces, robot, columns)
         self.noise = np.array([by_unit[robot.sensors[k].unit] for k in columns])
         """(C,) mean absolute error that noise alone would leave, in the unit of each channel."""
@@ -102,7 +98,7 @@ class FreeRun(Problem):
         if windows_s is not None:
             noise, grown = self.layout.floor, self._by_start()
             # What a start does stays of one sign for the rest of its window.
-            self.layout = replace(self.layout, floor=noise * grown, known=noise * (grown - 1.0))
+            self.layout = replace(self.layout, floor=noise * grown, known=noise * (grown - 1.0), by_segment=True)
         self.units = tuple(by_unit)
         self.natural_unit = self.units[0] if len(by_unit) == 1 else TIMES_NOISE
         how = "free runs of the whole record" if windows_s is None else f"windows of {windows_s:g} s"
@@ -302,114 +298,6 @@ def _listed(each: Sequence[str]) -> str:
 
 def noiseless(robot: Robot) -> Robot:
     return replace(robot, sensors=tuple(replace(s, noise=0.0) for s in robot.sensors))
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A stretch of a trial that is simulated in one go. ``log`` is what was measured of it, ``rows`` those of its rows that are
-    compared."""
-
-    trial: int
-    start_s: float
-    log: SensorLog
-    rows: range | tuple[int, ...]
-    commands: Array
-    enabled: Array | None
-    start: State
-    again: tuple[tuple[int, State], ...] = ()
-    """Rows at which it starts anew from the measured state."""
-
-    @property
-    def window(self) -> Index:
-        """(R,) which of the windows between the rows at which it starts anew each compared row is in."""
-        found = np.searchsorted([k for k, _ in self.again], np.asarray(self.rows), side="right")
-        return np.unique(found, return_inverse=True)[1].astype(np.int64)
-
-    @property
-    def times_s(self) -> Array:
-        """(R,) of the rows that are compared, since its start."""
-        return np.asarray(self.log.times_s[list(self.rows)] - self.log.times_s[0])
-
-    def measured(self, columns: Sequence[int]) -> Array:
-        """(R, C) of some channels."""
-        return np.asarray(self.log.sensors[np.ix_(self.rows, columns)])
-
-    def beside(self, positions: Array, speeds: Array) -> list[Piece]:
-        """The same from states that are off by these (M,), one joint's position or speed at a time."""
-        steps = [(d, 0.0 * d) for d in np.diag(positions) if d.any()] + [
-            (0.0 * d, d) for d in np.diag(speeds) if d.any()
-        ]
-
-        def moved(state: State, by: tuple[Array, Array]) -> State:
-            return State(state.joints + by[0], state.speeds + by[1])
-
-        return [
-            replace(self, start=moved(self.start, by), again=tuple((k, moved(s, by)) for k, s in self.again))
-            for by in steps
-        ]
-
-    def rollout(self, model: Robot, steps: int, switched: bool) -> Rollout:
-        """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
-        enabled = np.ones(len(self.log)) if self.enabled is None and switched else self.enabled
-        return Rollout(
-            model,
-            Commands(self.commands),
-            steps,
-            start=self.start,
-            supply_v=self.log.supply_v,
-            enabled=enabled,
-            external=self.log.external,
-            again=self.again,
-        )
-
-
-def _pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None, every: int) -> list[Piece]:
-    log = trial.log
-    if log.joints is None:
-        raise MeasurementError(
-            f"trial {trial.name!r}: no joint positions in its log: nothing to start a simulation from"
-        )
-    if log.motor_names != robot.motor_names or log.sensor_names != robot.sensor_names:
-        raise MeasurementError(
-            f"trial {trial.name!r} is of another robot: its channels are {', '.join(log.sensor_names)}; "
-            f"{robot.name} has {', '.join(robot.sensor_names)}"
-        )
-    dt = float(np.median(np.diff(log.times_s)))
-    if abs(dt / robot.time_step_s - 1) > 1e-3:
-        raise MeasurementError(
-            f"trial {trial.name!r} has a row every {dt:g} s, {robot.name} a time step of {robot.time_step_s:g} s; import it at "
-            f"{1 / robot.time_step_s:g} Hz"
-        )
-    speeds = starting_speeds(trial, robot)
-    commands, enabled = released(trial.obeyed(log.commands))
-    length = len(log) if windows_s is None else max(2, round(windows_s / dt))
-    # An integral is what a controller made of all that came before.
-    remembers = any(d.ki > 0 for d in robot.drives)
-    found = []
-    for first in range(0, len(log), len(log) if remembers else length):
-        last = len(log) if remembers else min(first + length, len(log))
-        if last - first < min(length, len(log)) // 2:
-            break
-        begin = max(0, first - RUN_UP)
-        anew = range(first + length, last - length // 2, length) if first == begin else [first]
-        part = log.part(begin, last)
-        seen = range(first - begin, len(part), every)
-        rows = seen if log.filled is None else tuple(r for r in part.readings.tolist() if r >= first - begin)
-        if not rows:
-            continue  # a gap in the log
-        found.append(
-            Piece(
-                index,
-                begin * dt,
-                part,
-                rows,
-                commands[begin:last],
-                None if enabled is None else enabled[begin:last],
-                State(log.joints[begin].copy(), speeds[begin].copy()),
-                tuple((k - begin, State(log.joints[k].copy(), speeds[k].copy())) for k in anew),
-            )
-        )
-    return found
 
 
 def _noise_by_unit(pieces: Sequence[Piece], robot: Robot, columns: Sequence[int]) -> dict[str, float]:

@@ -1,0 +1,131 @@
+"""Stretches of a record that are simulated in one go, each from where the robot was measured to be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
+from ee_dist.discrepancy.problem import Index
+from ee_dist.discrepancy.starting import starting_speeds
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array, SensorLog, State
+
+RUN_UP = 20
+"""Rows before a window from which it is simulated: as long as the longest delay that a drive may have. What drives hold within
+them when it begins (commands on their way, play) comes from there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A stretch of a trial that is simulated in one go. ``log`` is what was measured of it, ``rows`` those of its rows that are
+    compared."""
+
+    trial: int
+    start_s: float
+    log: SensorLog
+    rows: range | tuple[int, ...]
+    commands: Array
+    enabled: Array | None
+    start: State
+    again: tuple[tuple[int, State], ...] = ()
+    """Rows at which it starts anew from the measured state."""
+
+    @property
+    def window(self) -> Index:
+        """(R,) which of the windows between the rows at which it starts anew each compared row is in."""
+        found = np.searchsorted([k for k, _ in self.again], np.asarray(self.rows), side="right")
+        return np.unique(found, return_inverse=True)[1].astype(np.int64)
+
+    @property
+    def times_s(self) -> Array:
+        """(R,) of the rows that are compared, since its start."""
+        return np.asarray(self.log.times_s[list(self.rows)] - self.log.times_s[0])
+
+    def measured(self, columns: Sequence[int]) -> Array:
+        """(R, C) of some channels."""
+        return np.asarray(self.log.sensors[np.ix_(self.rows, columns)])
+
+    def beside(self, positions: Array, speeds: Array) -> list[Piece]:
+        """The same from states that are off by these (M,), one joint's position or speed at a time."""
+        steps = [(d, 0.0 * d) for d in np.diag(positions) if d.any()] + [
+            (0.0 * d, d) for d in np.diag(speeds) if d.any()
+        ]
+
+        def moved(state: State, by: tuple[Array, Array]) -> State:
+            return State(state.joints + by[0], state.speeds + by[1])
+
+        return [
+            replace(self, start=moved(self.start, by), again=tuple((k, moved(s, by)) for k, s in self.again))
+            for by in steps
+        ]
+
+    def rollout(self, model: Robot, steps: int, switched: bool) -> Rollout:
+        """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
+        enabled = np.ones(len(self.log)) if self.enabled is None and switched else self.enabled
+        return Rollout(
+            model,
+            Commands(self.commands),
+            steps,
+            start=self.start,
+            supply_v=self.log.supply_v,
+            enabled=enabled,
+            external=self.log.external,
+            again=self.again,
+        )
+
+
+def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None, every: int) -> list[Piece]:
+    """Of a trial by its number, in windows of ``windows_s`` or in one; of every so many rows is compared one. Raises
+    MeasurementError for a log that no simulation can start from."""
+    log = trial.log
+    if log.joints is None:
+        raise MeasurementError(
+            f"trial {trial.name!r}: no joint positions in its log: nothing to start a simulation from"
+        )
+    if log.motor_names != robot.motor_names or log.sensor_names != robot.sensor_names:
+        raise MeasurementError(
+            f"trial {trial.name!r} is of another robot: its channels are {', '.join(log.sensor_names)}; "
+            f"{robot.name} has {', '.join(robot.sensor_names)}"
+        )
+    dt = float(np.median(np.diff(log.times_s)))
+    if abs(dt / robot.time_step_s - 1) > 1e-3:
+        raise MeasurementError(
+            f"trial {trial.name!r} has a row every {dt:g} s, {robot.name} a time step of {robot.time_step_s:g} s; import it at "
+            f"{1 / robot.time_step_s:g} Hz"
+        )
+    speeds = starting_speeds(trial, robot)
+    commands, enabled = released(trial.obeyed(log.commands))
+    length = len(log) if windows_s is None else max(2, round(windows_s / dt))
+    # An integral is what a controller made of all that came before.
+    remembers = any(d.ki > 0 for d in robot.drives)
+    found = []
+    for first in range(0, len(log), len(log) if remembers else length):
+        last = len(log) if remembers else min(first + length, len(log))
+        if last - first < min(length, len(log)) // 2:
+            break
+        begin = max(0, first - RUN_UP)
+        anew = range(first + length, last - length // 2, length) if first == begin else [first]
+        part = log.part(begin, last)
+        seen = range(first - begin, len(part), every)
+        rows = seen if log.filled is None else tuple(r for r in part.readings.tolist() if r >= first - begin)
+        if not rows:
+            continue  # a gap in the log
+        found.append(
+            Piece(
+                index,
+                begin * dt,
+                part,
+                rows,
+                commands[begin:last],
+                None if enabled is None else enabled[begin:last],
+                State(log.joints[begin].copy(), speeds[begin].copy()),
+                tuple((k - begin, State(log.joints[k].copy(), speeds[k].copy())) for k in anew),
+            )
+        )
+    return found
