@@ -154,3 +154,18 @@ def test_what_is_not_told_from_neutral_goes_in_the_end(robot):
     assert told_only(Search(problem), start, len(parts), travelling(problem)[0], 20)[1] == (), (
         "the model's own terms stay"
     )
+
+
+def test_a_twin_is_tried_in_the_place_of_what_was_added(robot):
+    """The search has not what it would take to put the twin there by itself."""
+    truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2, "zero_offset": -0.15, "load_friction": 0.6}
+    problem, pool = Curved(robot, truth), pool_of(robot)
+    added, twin = (next(c for c in pool if c.effect.name == n) for n in ("motor_weak", "load_friction"))
+    rest = [c for c in pool if c is not twin]
+    current = Current((pool[0], added), np.array([0.1, 0.3]))
+    search, cuts = Search(problem), travelling(problem)
+    found = everywhere(search, current, 0, rest, cuts, True, [(1, twin, np.array([0.2]))])
+    assert names(found) == set(truth)
+    assert "motor_weak@servo" in found.rungs[0].dropped
+    without = everywhere(search, current, 0, rest, cuts, True)
+    assert without is None or "load_friction" not in names(without)

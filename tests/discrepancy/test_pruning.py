@@ -6,7 +6,7 @@ import numpy as np
 from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy.evidence.intervals import half_widths
-from ee_dist.discrepancy.pruning import pruned
+from ee_dist.discrepancy.pruning import _luck, pruned
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
@@ -42,3 +42,14 @@ def test_trials_that_are_not_searched_are_no_evidence() -> None:
     assert first.within(first.everything) is first
     assert first.within(problem.trial_of == 0) is first
     assert Search(problem).within(problem.trial_of == 0).trials == (0,)
+
+
+def test_what_one_channel_leaves_is_no_doubt_about_another() -> None:
+    problem = Linear(())
+    problem.data[problem.channel_of == 1] *= 30.0
+    fit = fitted(Search(problem))
+    luck = _luck(problem, fit)
+    quiet, loud = (luck[problem.channel_of[fit.mask] == c] for c in (0, 1))
+    assert np.ptp(quiet) == np.ptp(loud) == 0.0
+    assert loud[0] > 50.0 * quiet[0]
+    assert quiet[0] >= problem.floor.mean()

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.explain import NOTHING_MISSING, explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.ways.free_run.problem import GROWN, RESTART_S, FreeRun
 from ee_dist.effects.catalogue import Hypothesis, apply, term
 from ee_dist.engines.contract import Rollout
@@ -37,11 +39,11 @@ def pole(folder: Path, top: float) -> Robot:
     return replace(robot, sensors=tuple(s for s in robot.sensors if s.kind == "position"))
 
 
-def problem(robot: Robot, hidden: Hypothesis = (), rows: int = ROWS) -> FreeRun:
+def problem(robot: Robot, hidden: Hypothesis = (), rows: int = ROWS, apart: float = 0.004) -> FreeRun:
     """Ten falls (or swings) from rest, their positions read with noise."""
     evaluator, rng = SerialEvaluator(MuJoCoEngine(1), 1024), np.random.default_rng(0)
     commands = Commands(np.zeros((rows, 1)))
-    starts = [State(np.array([0.004 * (k + 1) * (-1) ** k]), np.zeros(1)) for k in range(10)]
+    starts = [State(np.array([apart * (k + 1) * (-1) ** k]), np.zeros(1)) for k in range(10)]
     rollouts = [Rollout(apply(robot, hidden), commands, rows, start=s, pose=True) for s in starts]
     trials = []
     for k, log in enumerate(evaluator.engine.rollout(rollouts)):
@@ -67,6 +69,16 @@ def test_of_a_hanging_pole_too_and_it_is_lower(tmp_path: Path) -> None:
     floor, _ = found.noise_floor()
     assert floor < problem(pole(tmp_path, 0.15)).noise_floor()[0]
     assert 0.8 * floor < error(found.residuals([()])[0]) < 1.2 * floor
+
+
+def test_friction_that_tames_a_wrong_start_is_not_missing(tmp_path: Path) -> None:
+    """It makes the prediction of an upright pole better, and is not there."""
+    # It balances: all that a prediction does is what noise made of its start.
+    found = problem(pole(tmp_path, 0.15), rows=4 * ROWS, apart=0.0)
+    friction = candidate(found.robot, "viscous_friction", "hinge")
+    alone, with_it = found.residuals([(), (friction.term([0.03]),)])
+    assert error(with_it) < error(alone)
+    assert explain(found, [friction]).verdict == NOTHING_MISSING
 
 
 @pytest.mark.parametrize("top", [0.15, -0.15])

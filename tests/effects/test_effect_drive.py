@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from effect_robots import ARM_M, MASS_KG, Bench, G, block, lever, slider
 
 from ee_dist.effects import CATALOGUE, apply, term
-from ee_dist.effects.catalogue import Term
+from ee_dist.effects.catalogue import Term, find
 from ee_dist.engines.drive import DrivePath
 from ee_dist.export.plan import parameters
 from ee_dist.export.shim import Shim
@@ -262,3 +263,15 @@ def test_a_released_drive_keeps_its_friction(bench: Bench) -> None:
 
 def test_a_drive_without_a_floor_or_load_does_nothing_at_rest(bench: Bench) -> None:
     assert bench.run(block(), steps=20).joints == pytest.approx(0.0)
+
+
+def test_delays_worth_trying_do_not_shrink_with_the_step_of_a_simulation() -> None:
+    """A bus is as late however finely somebody simulates."""
+    robot = quadruped()
+    fine = replace(robot, time_step_s=0.0005)
+    for effect, target in (
+        ("command_delay", robot.motor_names[0]),
+        ("sensor_delay", next(x.name for x in robot.sensors if x.kind == "angle")),
+    ):
+        assert dict(find(effect).bounds(fine, target))["delay_s"][1] == 0.1
+        assert dict(find(effect).bounds(robot, target))["delay_s"][1] == 20.0 * robot.time_step_s > 0.1

@@ -137,8 +137,10 @@ def judge(
     # Where a model is wrong all over, useless effects take more off it by luck, in proportion.
     enough = least_energy(tried, max(1, proposal.size)) * dispersion + CAUTION * problem.gained
     above = max(total - floor, 1e-12)
+    # Anything that holds a motion back lets a start that is off grow less, and goes below the floor: no evidence for it.
+    counts = min(gain, total - floor) if problem.layout.by_segment else gain
     why = ""
-    if not np.isfinite(gain) or gain < enough:
+    if not np.isfinite(gain) or counts < enough:
         why = LUCK
     elif _may_be_zero(gained, low):
         why = MAY_BE_ZERO
