@@ -53,8 +53,9 @@ RESTART_S = 0.5
 """Length of windows that start anew from the measured state."""
 MEAN_ABSOLUTE, MEDIAN_ABSOLUTE = math.sqrt(2 / math.pi), 0.6745
 """Of normal noise with a standard deviation of 1."""
-GROWN = 1.2
-"""Floor over that of noise alone from which it is said that the starts of windows are in it."""
+GROWN = 10.0
+"""Error over that of noise alone, of a perfect model, from which the starts of windows decide: motions that are not stable.
+Below it noise is all of the floor: it is a bound, and hid what was found without it in simulated robots."""
 FINEST = 2.0**-20
 """Share of a joint's range that the finest encoders tell apart: one at rest reads the same all the time, and has noise."""
 BLOCKS = 6
@@ -95,8 +96,9 @@ class FreeRun(Problem):
         self.noise = np.array([by_unit[robot.sensors[k].unit] for k in columns])
         """(C,) mean absolute error that noise alone would leave, in the unit of each channel."""
         self._lay_out(BLOCKS if windows_s is None else 1)
-        if windows_s is not None:
-            noise, grown = self.layout.floor, self._by_start()
+        grown = self._by_start() if windows_s is not None else np.ones(1)
+        if grown.mean() >= GROWN:
+            noise = self.layout.floor
             # What a start does stays of one sign for the rest of its window.
             self.layout = replace(self.layout, floor=noise * grown, known=noise * (grown - 1.0), by_segment=True)
         self.units = tuple(by_unit)
@@ -199,8 +201,9 @@ class FreeRun(Problem):
     def noise_floor(self) -> tuple[float, str]:
         seldom = any(p.log.filled is not None for p in self.pieces)
         how = f"estimated: {'divided' if seldom else 'second'} differences of the measured positions"
-        grown = float(np.sqrt(self.floor.mean()))
-        return grown, f"{how}, and what they do to the start of each window" if grown > GROWN else how
+        if not self.layout.by_segment:
+            return 1.0, how
+        return float(np.sqrt(self.floor.mean())), f"{how}, and what they do to the start of each window"
 
     def smooth(self, residual: Array) -> Array:
         """The error itself, in units of the noise, instead of its root."""
