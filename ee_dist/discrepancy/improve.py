@@ -107,7 +107,7 @@ def improve(
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 twins = [(k, p.parts[0], u) for k, p, u in _twins(current, ladder, own)]
                 found = everywhere(search, current, own, pool, travelling(problem), spread > 0, twins)
-                looked, anew, beside = len(current.parts), anew + (spread > 0), special if spread else set()
+                looked, anew, beside = len(current.parts), anew + (spread > 0), special
                 if found is not None:
                     current, looked, spread = found.current, len(found.current.parts), spread + 1
                     for rung in found.rungs:
