@@ -40,6 +40,8 @@ of the drives). Windows of one motion share what a model gets wrong in it, and s
 without a load (UR10e) a payload takes 21 %, and a heavier last link as much."""
 FULLER = 0.8
 """Share of what a law leaves above the noise that the same with a further term must leave at most, to go before it in a tie."""
+STARTS = 3.0
+"""Standard deviations of what starts that are off do to a residual, beyond which it is not theirs."""
 LUCK = "its gain on held-out data is no more than luck"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes too little of what is above the noise"
@@ -137,8 +139,7 @@ def judge(
     # Where a model is wrong all over, useless effects take more off it by luck, in proportion.
     enough = least_energy(tried, max(1, proposal.size)) * dispersion + CAUTION * problem.gained
     above = max(total - floor, 1e-12)
-    # Anything that holds a motion back lets a start that is off grow less, and goes below the floor: no evidence for it.
-    counts = min(gain, total - floor) if problem.layout.by_segment else gain
+    counts = min(gain, total - floor - _of_starts(problem)) if problem.layout.by_segment else gain
     why = ""
     if not np.isfinite(gain) or counts < enough:
         why = LUCK
@@ -165,6 +166,13 @@ def judge(
         why_not=why,
         vague=_vague(problem, found, proposal),
     )
+
+
+def _of_starts(problem: Problem) -> float:
+    """Energy by which starts that are off may be above what they are on average. Anything that holds a motion back lets them grow
+    less, and goes below the floor: what it takes off there is no evidence for it."""
+    known = np.bincount(problem.segment_of, weights=problem.layout.known)
+    return STARTS * math.sqrt(2.0 * float(known @ known))
 
 
 def surely_better(problem: Problem, one: HeldOut, other: HeldOut, tried: int) -> bool:
