@@ -7,6 +7,7 @@ positions and its own lag explain, it is taken.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -81,58 +82,54 @@ def _starting(trial: MeasuredTrial, read: SpeedSensors) -> Array:
 
 def speeds_off(trial: MeasuredTrial, robot: Robot) -> Array:
     """(M,) standard deviations of ``starting_speeds``: of the noise that a sensor shows, or of the curve through positions."""
-    sensors = speed_sensors(robot)
-    read = read_speeds(trial.log, sensors)
-    even = evenly_read(trial.log)
-    sensed = np.stack([np.interp(even.times_s, trial.log.times_s, v) for v in read.T], axis=1)
+    sensors, even = speed_sensors(robot), evenly_read(trial.log)
+    sensed = _at(even, trial.log, read_speeds(trial.log, sensors))
     noise = slow_noise(even.times_s, sensed)
-    if not trial.commands_held or even.joints is None or len(even) < AROUND[0]:
-        return noise
-    _, _, better = _curve(trial, sensors, read)
-    stiff, supple = _through(even)
-    long, short = (scipy.signal.savgol_coeffs(n, CUBIC, deriv=1, delta=_step(even)) for n in AROUND)
-    apart = long - np.pad(short, (len(long) - len(short)) // 2)
-    read_noise = slow_noise(even.times_s, even.joints)
-    # By what the curve is too stiff, beyond what noise makes it part from the more supple one.
-    bent = np.maximum(_size(stiff - supple) ** 2 - (read_noise * np.linalg.norm(apart)) ** 2, 0.0)
-    return np.where(better, np.sqrt((read_noise * np.linalg.norm(long)) ** 2 + bent), noise)
+    curve = _curve(even) if trial.commands_held else None
+    return noise if curve is None else np.where(curve.better(sensors, sensed), curve.noise, noise)
 
 
 def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> Array:
     """(T, M): speeds as ``sensors`` ``read`` them (T, M), and of joints whose positions know better, or alone, from these."""
-    if evenly_read(trial.log).joints is None or len(evenly_read(trial.log)) < AROUND[0]:
-        return read
-    slopes, _, better = _curve(trial, sensors, read)
-    return np.where(better, slopes, read)
-
-
-def _curve(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> tuple[Array, Array, Array]:
-    """Speeds by positions (T, M), their standard deviations (M,), and whether they know better than what was read (M,)."""
     even = evenly_read(trial.log)
-    assert even.joints is not None
-    stiff, supple = _through(even)
-    weights = scipy.signal.savgol_coeffs(AROUND[0], CUBIC, deriv=1, delta=_step(even))
-    own = np.hypot(slow_noise(even.times_s, even.joints) * np.linalg.norm(weights), _size(stiff - supple))
-    sensed = np.stack([np.interp(even.times_s, trial.log.times_s, v) for v in read.T], axis=1)
-    alone = np.isin(np.arange(read.shape[1]), [joint for joint, _, _ in sensors], invert=True)
-    better = (_size(sensed - stiff) > BEYOND * own) | alone
-    slopes = np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in stiff.T], axis=1)
-    return slopes, own, better
+    curve = _curve(even)
+    if curve is None:
+        return read
+    slopes = np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in curve.speeds.T], axis=1)
+    return np.where(curve.better(sensors, _at(even, trial.log, read)), slopes, read)
 
 
-def _through(even: SensorLog) -> tuple[Array, Array]:
-    """(T, M) speeds by the two curves through the positions."""
-    assert even.joints is not None
-    stiff, supple = (
-        np.asarray(scipy.signal.savgol_filter(even.joints, n, CUBIC, deriv=1, delta=_step(even), axis=0))
-        for n in AROUND
-    )
-    return stiff, supple
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """Speeds by a curve through the positions (T, M); how far off they may be at most (M,), their noise and all by which a more
+    supple curve parts from it; and their standard deviations (M,), of that only what noise does not make."""
+
+    speeds: Array
+    off: Array
+    noise: Array
+
+    def better(self, sensors: SpeedSensors, sensed: Array) -> Array:
+        """(M,) whether they know better than what was ``sensed`` (T, M), or alone."""
+        alone = np.isin(np.arange(sensed.shape[1]), [joint for joint, _, _ in sensors], invert=True)
+        return np.asarray((_size(sensed - self.speeds) > BEYOND * self.off) | alone)
 
 
-def _step(even: SensorLog) -> float:
-    """s from one reading to the next."""
-    return float(np.median(np.diff(even.times_s)))
+def _curve(even: SensorLog) -> _Curve | None:
+    """None where too little was read."""
+    if even.joints is None or len(even) < AROUND[0]:
+        return None
+    step_s = float(np.median(np.diff(even.times_s)))
+    stiff, supple = (scipy.signal.savgol_filter(even.joints, n, CUBIC, deriv=1, delta=step_s, axis=0) for n in AROUND)
+    long, short = (scipy.signal.savgol_coeffs(n, CUBIC, deriv=1, delta=step_s) for n in AROUND)
+    read = slow_noise(even.times_s, even.joints)
+    noise, parts = read * np.linalg.norm(long), _size(stiff - supple)
+    apart = read * np.linalg.norm(long - np.pad(short, (len(long) - len(short)) // 2))
+    return _Curve(stiff, np.hypot(noise, parts), np.sqrt(noise**2 + np.maximum(parts**2 - apart**2, 0.0)))
+
+
+def _at(even: SensorLog, log: SensorLog, speeds: Array) -> Array:
+    """(R, M) speeds (T, M) of a log at the times of its even readings."""
+    return np.stack([np.interp(even.times_s, log.times_s, v) for v in speeds.T], axis=1)
 
 
 def _size(values: Array) -> Array:

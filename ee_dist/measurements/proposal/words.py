@@ -162,7 +162,7 @@ def quantity_of(word: str) -> str | None:
 
 def _unglued(word: str) -> tuple[str, ...]:
     """qdes is q and des; cmdpos is cmd and pos; other words are one."""
-    if word in _KIND or word in _COMMAND or word in _MEASURED:
+    if word in _KIND or word in _ROLES:
         return (word,)
     for k in range(1, len(word)):
         first, second = word[:k], word[k:]

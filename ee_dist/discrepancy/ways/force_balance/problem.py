@@ -161,18 +161,22 @@ class ForceBalance(Problem):
 
     def remains(self, hypothesis: Hypothesis, motor: int = 0) -> Remains:
         """When, in which direction and over which position the hypothesis leaves something at one drive, over all trials."""
-        left = self.raw(self.residuals([hypothesis])[0])[self.channel_of == motor]
+        return self._remains(self.raw(self.residuals([hypothesis])[0]), motor)
+
+    def _remains(self, forces: Array, motor: int) -> Remains:
+        """The same of the forces (n,) that are left."""
         x, v, a = (
             np.concatenate([decimated(series[:, motor], self.processing.keep_every) for series in of_all])
             for of_all in zip(*((m.position, m.speed, m.acceleration) for m in self.motions), strict=True)
         )
         trial = np.repeat(np.arange(len(self.times_s)), [len(t) for t in self.times_s])
-        return remains(self.channels[motor], left, x, v, a, trial)
+        return remains(self.channels[motor], forces[self.channel_of == motor], x, v, a, trial)
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         lines: list[str] = []
+        forces = self.raw(self.residuals([hypothesis])[0])
         for k, unit in enumerate(self.layout.units):
-            found = describe(self.remains(hypothesis, k), unit, "m" if unit == "N" else "rad")
+            found = describe(self._remains(forces, k), unit, "m" if unit == "N" else "rad")
             # Of a joint that sticks, speeds and directions say nothing.
             lines += found[:1] if self.channels[k] in self.stuck else found
         return lines

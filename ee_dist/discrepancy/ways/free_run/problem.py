@@ -175,11 +175,11 @@ class FreeRun(Problem):
         """(n,) by how much more than noise a perfect model would leave, for it starts from what was measured: where a motion is
         not stable, a pole that stands upright, what is wrong with that grows until the window ends. By the robot as it is
         described, a standard deviation beside each measured position and speed."""
-        jobs, count = [], []
-        off = [speeds_off(t, self.robot) for t in self.measured]
+        jobs, count, positions = [], [], self._positions_off()
+        of_trial = [(self._simulated(k, ()), speeds_off(t, self.robot)) for k, t in enumerate(self.measured)]
         for p in self.pieces:
-            model = self._simulated(p.trial, ())
-            beside = [p, *p.beside(self._off(p.trial), off[p.trial])]
+            model, speeds = of_trial[p.trial]
+            beside = [p, *p.beside(positions, speeds)]
             jobs += [Job(b.rollout(model, len(p.log), False), ToPositions(self.columns, p.rows)) for b in beside]
             count.append(len(beside))
         found, grown = iter(self.evaluator.evaluate(jobs)), []
@@ -190,7 +190,7 @@ class FreeRun(Problem):
             grown.append(np.hypot(1.0, np.where(np.isfinite(spread), spread, 0.0)).ravel())
         return np.concatenate(grown)
 
-    def _off(self, trial: int) -> Array:
+    def _positions_off(self) -> Array:
         """(M,) standard deviations of the joint positions that a simulation starts from."""
         joints = {s.target: n for s, n in zip((self.robot.sensors[k] for k in self.columns), self.noise, strict=True)}
         return np.array([joints.get(m, 0.0) / MEAN_ABSOLUTE for m in self.robot.motor_names])
