@@ -36,7 +36,9 @@ def quiet(robot: Robot) -> Robot:
     return replace(robot, sensors=tuple(replace(s, noise=0.0) for s in robot.sensors))
 
 
-@pytest.mark.parametrize("held", [{}, {"delay_s": 0.012}, {"ki": 30.0}, {"backlash": 0.03}, {"compliance": 0.02}])
+@pytest.mark.parametrize(
+    "held", [{}, {"delay_s": 0.012}, {"delay_s": 0.095}, {"ki": 30.0}, {"backlash": 0.03}, {"compliance": 0.02}]
+)
 def test_what_a_drive_holds_goes_on_where_a_window_begins(held: dict[str, float]) -> None:
     robot = quiet(samples()["pendulum"].robot)
     robot = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, **held))

@@ -10,15 +10,12 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
 from ee_dist.discrepancy.problem import Index
 from ee_dist.discrepancy.starting import starting_speeds
+from ee_dist.effects.scales import longest_delay
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog, State
-
-RUN_UP = 20
-"""Rows before a window from which it is simulated: as long as the longest delay that a drive may have. What drives hold within
-them when it begins (commands on their way, play) comes from there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +97,9 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
             f"{1 / robot.time_step_s:g} Hz"
         )
     speeds = starting_speeds(trial, robot)
+    # A window is simulated from as long before it as a delay may be: what drives hold within them when it begins (commands on
+    # their way, play) comes from there.
+    run_up = round(longest_delay(robot) / robot.time_step_s)
     commands, enabled = released(trial.obeyed(log.commands))
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
     # An integral is what a controller made of all that came before.
@@ -109,7 +109,7 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
         last = len(log) if remembers else min(first + length, len(log))
         if last - first < min(length, len(log)) // 2:
             break
-        begin = max(0, first - RUN_UP)
+        begin = max(0, first - run_up)
         anew = range(first + length, last - length // 2, length) if first == begin else [first]
         part = log.part(begin, last)
         seen = range(first - begin, len(part), every)
