@@ -14,12 +14,13 @@ import numpy as np
 from ee_dist.discrepancy.assumed import beside, puts_right
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
-from ee_dist.discrepancy.examine import Current, calm_trials
+from ee_dist.discrepancy.examine import FAR, Current, calm_trials
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment
 from ee_dist.discrepancy.pruning import pruned
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import screen
@@ -38,8 +39,10 @@ WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
 where it costs little, for fewer than MANY values."""
 TWINS = 2
 """Twins of effects that are tried in their place."""
-FEWEST_TRIED, MOST_TRIED, VALUES_TRIED = 3, 12, 120
-"""Effects that are tried one by one beside all that may be a little wrong, as far as ``VALUES_TRIED`` values in sum allow."""
+TRIED = 20
+"""Effects that are tried one by one beside all that may be a little wrong,"""
+HEATS = ((3, 5), (4, 2))
+"""in a race: how many of them go on after how many steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +158,18 @@ class _Look:
         widths = WIDTHS if len(u) >= MANY else MORE_WIDTHS
         (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=widths)
         fit = over_ridges(self.calm, fit, PRIOR)
+        alone = self._worth(fit, {})
+        if not more or (alone is not None and not self._far(fit)):
+            return alone
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
-        return self._worth(fit, {}) or (self._beside(model, u, fit) if more else None)
+        other = self._beside(model, u, fit)
+        if alone is None or other is None:
+            return other or alone
+        return other if other.held + self.luck(other.held) < alone.held else alone
+
+    def _far(self, fit: Fit) -> bool:
+        """Whether much more than noise is left."""
+        return fit.energy > FAR**2 * float(self.search.problem.floor[fit.mask].sum())
 
     def _worth(self, fit: Fit, ties: Mapping[str, list[str]]) -> _Kept | None:
         """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data."""
@@ -190,16 +203,16 @@ class _Look:
         screened = screen(now, possible(search.problem.robot, now.fixed, self._others(model)), refit=refit)
         few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
         starts = []
-        for s in few[: max(FEWEST_TRIED, min(MOST_TRIED, VALUES_TRIED // max(len(start), 1)))]:
+        for s in few[:TRIED]:
             more = s.starts[0] if s.candidate.size > 1 else np.zeros(s.candidate.size)
             starts.append((Model((*model.parts, s.candidate)), np.concatenate([start, more])))
         if not starts:
             return None
-        fits = follow_valley(search, starts, search.everything, PRIOR)
-        best = min(fits, key=lambda f: f.energy)
+        best, *others = race(search, starts, search.everything, HEATS, PRIOR)
+        best = over_ridges(search, best, PRIOR)
         own = search.everything
         noise = max(float(search.problem.floor[own].mean()), best.energy / int(own.sum()))
-        ties = [f.model.parts[-1].name for f in fits if f is not best and f.energy - best.energy < TIE_ENERGY * noise]
+        ties = [f.model.parts[-1].name for f in others if f.energy - best.energy < TIE_ENERGY * noise]
         return self._worth(best, {best.model.parts[-1].name: ties})
 
     def _others(self, model: Model) -> list[Candidate]:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
+from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
 from ee_dist.effects.catalogue import Parameter, effect, find
 from ee_dist.effects.scales import Range
@@ -46,7 +46,7 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     scale = 1.0 + values["change"]
 
     def stronger(d: Drive) -> Drive:
-        return replace(
+        return altered(
             d,
             kp=d.kp * scale,
             ki=d.ki * scale,
@@ -74,7 +74,7 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     searchable=False,
 )
 def current_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, current_gain=d.current_gain * values["factor"]))
+    return robot.map_drive(target, lambda d: altered(d, current_gain=d.current_gain * values["factor"]))
 
 
 def _slopes(robot: Robot, target: str) -> dict[str, Range]:
@@ -97,7 +97,7 @@ def _slopes(robot: Robot, target: str) -> dict[str, Range]:
     searchable=False,
 )
 def back_emf(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, speed_limit=d.speed_limit / (1.0 + values["change"])))
+    return robot.map_drive(target, lambda d: altered(d, speed_limit=d.speed_limit / (1.0 + values["change"])))
 
 
 GAIN_KNOWN, GAIN_ASSUMED = (0.2, 5.0), (0.02, 20.0)
@@ -129,7 +129,7 @@ def _gains(robot: Robot, target: str) -> dict[str, Range]:
     guesses=Assumed("kp"),
 )
 def position_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, kp=d.kp * values["factor"]))
+    return robot.map_drive(target, lambda d: altered(d, kp=d.kp * values["factor"]))
 
 
 def _steepest(robot: Robot, drive: Drive) -> tuple[float, float]:
@@ -161,7 +161,7 @@ def _damping(robot: Robot, target: str) -> dict[str, Range]:
     guesses=Assumed("kd"),
 )
 def speed_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, kd=d.kd * values["factor"]))
+    return robot.map_drive(target, lambda d: altered(d, kd=d.kd * values["factor"]))
 
 
 def _heavier(robot: Robot, target: str) -> dict[str, Range]:
@@ -186,7 +186,7 @@ def _heavier(robot: Robot, target: str) -> dict[str, Range]:
     guesses=uneven_rotors,
 )
 def rotor_factor(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, rotor_inertia=d.rotor_inertia * values["factor"]))
+    return robot.map_drive(target, lambda d: altered(d, rotor_inertia=d.rotor_inertia * values["factor"]))
 
 
 def _gears(robot: Robot, target: str) -> dict[str, Range]:
@@ -217,7 +217,7 @@ def gear_ratio(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 
     def geared(d: Drive) -> Drive:
         # The motor turns n times as far, with torque over n: n^2 is in every gain, and a command counts for 1/n of the way.
-        return replace(
+        return altered(
             d,
             kp=d.kp * n * n,
             ki=d.ki * n * n,

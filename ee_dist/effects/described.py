@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
+from ee_dist.basics.altered import altered
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Parameter, apply, find
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Drive, Robot, RobotError
@@ -19,7 +18,7 @@ def with_more(robot: Robot, target: str, law: str, value: float) -> Robot:
     """The robot with so much more of a drive's number, or less, down to none: two effects of a search may take off the same."""
 
     def changed(drive: Drive) -> Drive:
-        return replace(drive, **{law: max(getattr(drive, law) + value, 0.0)})
+        return altered(drive, **{law: max(getattr(drive, law) + value, 0.0)})
 
     return robot.map_drive(target, changed)
 

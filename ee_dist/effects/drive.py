@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
+from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
@@ -36,7 +36,7 @@ MOTORS = "Hughes and Drury 2013, Electric Motors and Drives, chapter 3"
 )
 def motor_weak(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def weaker(drive: Drive) -> Drive:
-        return replace(drive, strength=drive.strength * (1.0 - values["loss"]))
+        return altered(drive, strength=drive.strength * (1.0 - values["loss"]))
 
     return robot.map_drive(target, weaker)
 
@@ -57,7 +57,7 @@ def torque_limit(robot: Robot, target: str, values: Mapping[str, float]) -> Robo
 
     def capped(drive: Drive) -> Drive:
         # Speed falls along, so that the back-EMF of a given speed stays what it was.
-        return replace(drive, torque_limit=drive.torque_limit * left, speed_limit=drive.speed_limit * left)
+        return altered(drive, torque_limit=drive.torque_limit * left, speed_limit=drive.speed_limit * left)
 
     return robot.map_drive(target, capped)
 
@@ -75,7 +75,7 @@ def torque_limit(robot: Robot, target: str, values: Mapping[str, float]) -> Robo
 def speed_limit(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def slower(drive: Drive) -> Drive:
         own = drive.torque_limit / drive.speed_limit
-        return replace(drive, back_emf=(own + drive.back_emf) / (1.0 - values["loss"]) - own)
+        return altered(drive, back_emf=(own + drive.back_emf) / (1.0 - values["loss"]) - own)
 
     if values["loss"] == 0:
         return robot
@@ -108,7 +108,7 @@ def supply_sag(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 )
 def command_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def scaled(drive: Drive) -> Drive:
-        return replace(drive, command_gain=drive.command_gain * (1.0 + values["change"]))
+        return altered(drive, command_gain=drive.command_gain * (1.0 + values["change"]))
 
     return robot.map_drive(target, scaled)
 
@@ -154,7 +154,7 @@ def _zeros(robot: Robot, target: str) -> dict[str, Range]:
 )
 def zero_offset(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def shifted(drive: Drive) -> Drive:
-        return replace(drive, zero_offset=drive.zero_offset + values["offset_rad"])
+        return altered(drive, zero_offset=drive.zero_offset + values["offset_rad"])
 
     return robot.map_drive(target, shifted)
 
@@ -176,7 +176,7 @@ def _widths(robot: Robot, target: str) -> dict[str, Range]:
 )
 def deadband(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def wider(drive: Drive) -> Drive:
-        return replace(drive, deadband=drive.deadband + values["half_width_rad"])
+        return altered(drive, deadband=drive.deadband + values["half_width_rad"])
 
     return robot.map_drive(target, wider)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
+from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.described import with_more
@@ -96,7 +96,7 @@ def _sticking(drive: Drive, what: str, speed: str, more: float, fades: float) ->
     has, within = getattr(drive, what), getattr(drive, speed)
     if has and within != fades:
         fades = (has * within + more * fades) / (has + more)
-    return replace(drive, **{what: has + more, speed: fades})
+    return altered(drive, **{what: has + more, speed: fades})
 
 
 def _stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
@@ -138,7 +138,7 @@ def stribeck_friction(robot: Robot, target: str, values: Mapping[str, float]) ->
     ranges=always(share=(0.0, 0.8)),
 )
 def load_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, load_friction=d.load_friction + values["share"]))
+    return robot.map_drive(target, lambda d: altered(d, load_friction=d.load_friction + values["share"]))
 
 
 @effect(
@@ -157,7 +157,7 @@ def load_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
     ranges=always(share=(-0.8, 0.8)),
 )
 def backdrive_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, backdrive_friction=d.backdrive_friction + values["share"]))
+    return robot.map_drive(target, lambda d: altered(d, backdrive_friction=d.backdrive_friction + values["share"]))
 
 
 def _quadratic_range(robot: Robot, target: str) -> dict[str, Range]:
@@ -180,7 +180,7 @@ def _quadratic_range(robot: Robot, target: str) -> dict[str, Range]:
     ranges=_quadratic_range,
 )
 def quadratic_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, quadratic_friction=d.quadratic_friction + values["per_nm"]))
+    return robot.map_drive(target, lambda d: altered(d, quadratic_friction=d.quadratic_friction + values["per_nm"]))
 
 
 def _load_stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
@@ -239,7 +239,7 @@ def _own_friction(robot: Robot, target: str) -> dict[str, Range]:
 )
 def friction_asymmetry(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def sided(drive: Drive) -> Drive:
-        return replace(
+        return altered(
             drive,
             friction_asymmetry=drive.friction_asymmetry + values["dry_nm"],
             viscous_asymmetry=drive.viscous_asymmetry + values["viscous_nm_s_rad"],

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
+from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
@@ -46,7 +46,7 @@ def _gaps(robot: Robot, target: str) -> dict[str, Range]:
     ranges=_gaps,
 )
 def backlash(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, backlash=d.backlash + values["gap_rad"]))
+    return robot.map_drive(target, lambda d: altered(d, backlash=d.backlash + values["gap_rad"]))
 
 
 def _twists(robot: Robot, target: str) -> dict[str, Range]:
@@ -68,7 +68,7 @@ def _twists(robot: Robot, target: str) -> dict[str, Range]:
     ranges=_twists,
 )
 def elastic_transmission(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, compliance=d.compliance + values["compliance_rad_nm"]))
+    return robot.map_drive(target, lambda d: altered(d, compliance=d.compliance + values["compliance_rad_nm"]))
 
 
 def _springs(robot: Robot, target: str) -> dict[str, Range]:
@@ -100,7 +100,7 @@ def parallel_spring(robot: Robot, target: str, values: Mapping[str, float]) -> R
     def sprung(drive: Drive) -> Drive:
         # Two springs on one joint pull like one: stiffnesses add, and it rests between their rests.
         total = drive.spring + stiffness
-        return replace(drive, spring=total, spring_rest=(drive.spring * drive.spring_rest + stiffness * rest) / total)
+        return altered(drive, spring=total, spring_rest=(drive.spring * drive.spring_rest + stiffness * rest) / total)
 
     return robot.map_drive(target, sprung)
 
@@ -121,4 +121,4 @@ def _offsets(robot: Robot, target: str) -> dict[str, Range]:
     ranges=_offsets,
 )
 def offset_torque(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: replace(d, offset_torque=d.offset_torque + values["torque_nm"]))
+    return robot.map_drive(target, lambda d: altered(d, offset_torque=d.offset_torque + values["torque_nm"]))

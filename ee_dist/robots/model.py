@@ -13,10 +13,11 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
+from ee_dist.basics.altered import altered
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 
@@ -318,32 +319,32 @@ class Robot:
     # -- changes -----------------------------------------------------------------------------------------------------
 
     def with_part(self, name: str, **changes: Any) -> Robot:
-        return replace(self, parts=_changed(self.parts, "name", name, "part", changes))
+        return altered(self, parts=_changed(self.parts, "name", name, "part", changes))
 
     def with_joint(self, name: str, **changes: Any) -> Robot:
-        return replace(self, joints=_changed(self.joints, "name", name, "joint", changes))
+        return altered(self, joints=_changed(self.joints, "name", name, "joint", changes))
 
     def with_drive(self, joint: str, **changes: Any) -> Robot:
-        return replace(self, drives=_changed(self.drives, "joint", joint, "drive", changes))
+        return altered(self, drives=_changed(self.drives, "joint", joint, "drive", changes))
 
     def with_sensor(self, name: str, **changes: Any) -> Robot:
-        return replace(self, sensors=_changed(self.sensors, "name", name, "sensor", changes))
+        return altered(self, sensors=_changed(self.sensors, "name", name, "sensor", changes))
 
     def with_world(self, **changes: Any) -> Robot:
-        return replace(self, world=replace(self.world, **changes))
+        return altered(self, world=altered(self.world, **changes))
 
     def with_law(self, law: Law) -> Robot:
-        return replace(self, laws=(*self.laws, law))
+        return altered(self, laws=(*self.laws, law))
 
     def map_drive(self, joint: str, change: Callable[[Drive], Drive]) -> Robot:
         _find(self.drives, "joint", joint, "drive")
-        return replace(self, drives=tuple(change(d) if d.joint == joint else d for d in self.drives))
+        return altered(self, drives=tuple(change(d) if d.joint == joint else d for d in self.drives))
 
     def without(self, part: str) -> Robot:
         """The robot after ``part`` broke off at its joint, with all that it carried."""
         self.joint_of(part)
         gone = set(self.lost) | set(self.subtree(part))
-        return replace(self, lost=tuple(p.name for p in self.parts if p.name in gone))
+        return altered(self, lost=tuple(p.name for p in self.parts if p.name in gone))
 
 
 _texts: dict[int, tuple[object, str]] = {}
@@ -372,4 +373,4 @@ def _find(items: tuple[Any, ...], key: str, value: str, what: str) -> Any:
 
 def _changed(items: tuple[Any, ...], key: str, value: str, what: str, changes: dict[str, Any]) -> tuple[Any, ...]:
     _find(items, key, value, what)
-    return tuple(replace(item, **changes) if getattr(item, key) == value else item for item in items)
+    return tuple(altered(item, **changes) if getattr(item, key) == value else item for item in items)

@@ -13,6 +13,7 @@ from ee_dist.discrepancy.problem import Layout, Problem, error
 from ee_dist.discrepancy.pruning import pruned, told_only
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
 from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.effects.catalogue import Hypothesis
@@ -114,6 +115,26 @@ def test_what_stands_out_beside_it_is_found_too(robot):
     found = improve(Curved(robot, truth), pool_of(robot))
     assert {t.effect for t in found.terms} == set(truth)
     assert found.ladder[-1].error_heldout < 1.2 * NOISE
+
+
+def test_what_stands_out_is_looked_for_though_the_rest_alone_is_worth_something(robot):
+    """Small values without it leave much, and take in what is not theirs."""
+    truth = {"coulomb_friction": 0.3, "viscous_friction": 0.2, "zero_offset": -0.15, "load_friction": 0.5}
+    problem = Curved(robot, truth)
+    assert names(look(problem, [c for c in pool_of(robot) if c.effect.name in PLAIN])) <= set(PLAIN)
+    assert names(look(problem, pool_of(robot))) == set(truth)
+
+
+def test_of_many_starts_the_best_go_on(robot):
+    truth = {"coulomb_friction": 0.3, "motor_weak": 0.4}
+    problem = Curved(robot, truth)
+    search, pool = Search(problem), pool_of(robot)
+    starts = [(Model((pool[0], c)), np.zeros(2)) for c in pool[1:]]
+    fits = race(search, starts, search.everything, ((2, 3), (2, 2)))
+    assert len(fits) == 2
+    assert [c.effect.name for c in fits[0].model.parts] == ["coulomb_friction", "motor_weak"]
+    assert fits[0].u == pytest.approx([0.3, 0.4], abs=0.02)
+    assert fits[0].energy < fits[1].energy
 
 
 def test_an_untouched_robot_gets_nothing(robot):

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from ee_dist.discrepancy.search.fitted import Fit
+from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
-from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.trials.log import Array
 
 MOVES = (0.0125, 0.03, 0.1, 0.3)
@@ -22,6 +22,10 @@ PROMISE = 0.05
 """Share of what is above the noise that a move must promise to take off, and the descent from there must."""
 TRIED, ROUNDS = 3, 3
 """Descents at once, each from another value's best move, and how often from where one of them ended."""
+HEATS = ((6, 1),)
+"""Which of them goes to its end, and after how many steps."""
+NOISE = 1.05
+"""Energy over the floor's up to which nothing is looked for any more."""
 WIDTH, PROBED = 0.03, 0.02
 """Finite differences of a descent, and of the slopes at its start."""
 
@@ -31,13 +35,10 @@ def over_ridges(search: Search, fit: Fit, prior: float = 0.0) -> Fit:
     floor = float(search.problem.floor[fit.mask].sum())
     for _ in range(ROUNDS):
         wanted = fit.energy - PROMISE * max(fit.energy - floor, 0.0)
-        starts = _beyond(search, fit, wanted, prior) if fit.energy > floor else []
+        starts = _beyond(search, fit, wanted, prior) if fit.energy > NOISE * floor else []
         if not starts:
             break
-        best = min(
-            follow_valley(search, [(fit.model, u) for u in starts], fit.mask, prior, widths=(WIDTH,)),
-            key=lambda f: f.energy,
-        )
+        best = race(search, [(fit.model, u) for u in starts], fit.mask, HEATS, prior, WIDTH)[0]
         if not best.energy < wanted:
             break
         fit = best
