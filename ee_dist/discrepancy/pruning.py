@@ -72,16 +72,18 @@ def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> tup
 
 def _luck(problem: Problem, fit: Fit) -> Array:
     """(n,) variance that luck moves each fitted value by. Noise averages out from value to value, what is above it at best from
-    piece to piece; and what one channel leaves is no doubt about what the others say."""
+    piece to piece; and what one channel leaves is no doubt about what the others say, nor what its readings leave one about its
+    texture: a sensor is told to be noisy by that, whatever the noise leaves in its readings."""
     channel, squares = problem.channel_of[fit.mask], fit.residual[fit.mask] ** 2
+    group = channel + len(problem.channels) * ~problem.layout.reading[fit.mask]
     count, energy, floor = (
-        np.bincount(channel, weights=w, minlength=len(problem.channels))
-        for w in (np.ones(len(channel)), squares, problem.floor[fit.mask])
+        np.bincount(group, weights=w, minlength=2 * len(problem.channels))
+        for w in (np.ones(len(group)), squares, problem.floor[fit.mask])
     )
     there = count > 0
-    pieces = PIECES * len(np.unique(problem.segment_of[fit.mask])) / max(1, int(there.sum()))
+    pieces = PIECES * len(np.unique(problem.segment_of[fit.mask])) / max(1, len(np.unique(channel)))
     luck = np.divide(floor, count, out=np.zeros_like(floor), where=there) + np.maximum(energy - floor, 0.0) / pieces
-    return np.asarray(np.maximum(luck, max(SURE * float(luck.max()), 1e-12))[channel])
+    return np.asarray(np.maximum(luck, max(SURE * float(luck.max()), 1e-12))[group])
 
 
 def _units(model: Model, first: int, end: int) -> list[list[int]]:

@@ -31,6 +31,7 @@ from ee_dist.discrepancy.accounts.account import (
     was_or_were,
 )
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
+from ee_dist.discrepancy.evidence.intervals import at_bound
 from ee_dist.discrepancy.evidence.judge import LUCK, Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
@@ -91,7 +92,7 @@ def explain_account(
         head += " More than noise is left with it." if rest else f" {THAT_NOISE if found.left else nothing}"
         error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor)
         sure = f"How sure: it explains {taken_off(best)}{unexplained_rest(best.explained, not found.left)}. "
-        sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}."
+        sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}.{_at_bounds(best)}"
         advice = slower(unsure) if unsure else ""
         guessed = best.proposal.label == LABEL
         lines.append(GUESSED if guessed else entry.physics)
@@ -143,6 +144,20 @@ def _rivals(tried: int, tied: Sequence[str], more: str) -> str:
         return f"Of {counted(tried, 'explanation')} no other does as well"
     told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
     return f"Of {counted(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+
+
+def _at_bounds(best: Judged) -> str:
+    """Which of its values ended where the search may not go farther."""
+    found, at = [], 0
+    for c in best.proposal.parts:
+        for k, parameter in enumerate(c.effect.parameters):
+            found += [(parameter.name, said)] if (said := at_bound(c, k, float(best.own[at + k]))) else []
+        at += c.size
+    by_words: dict[str, list[str]] = {}
+    for name, said in found:
+        names = by_words.setdefault(said, [])
+        names += [plain(name)] if plain(name) not in names else []
+    return "".join(f" Its {' and '.join(names)} ended {said}." for said, names in by_words.items())
 
 
 def _counted_right(confidence: float | None) -> str:

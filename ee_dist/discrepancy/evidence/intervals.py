@@ -12,6 +12,7 @@ import scipy  # which loads its parts when they are used; scipy.stats, which cal
 
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.problem import Mask, Problem
+from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.fitted import Fit
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
@@ -64,10 +65,8 @@ def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = ()) -> lis
             # By the data alone: what earned its place is told, though something else may have gone into its value.
             if not np.isfinite(s[k]) or float(s[k]) * room > max(room, 1e-12):
                 flag = NOT_DETERMINED
-            elif abs(u[k]) > AT_BOUND:
-                flag = NONE_LEFT if u[k] < 0 and c.effect.parameters[k].on_top else BOUND
-            elif abs(u[k]) < s[k]:
-                flag = NEUTRAL
+            else:
+                flag = at_bound(c, k, float(u[k])) or (NEUTRAL if abs(u[k]) < s[k] else "")
             doubt = "" if w[k] <= s[k] else ALL_OF_IT if abs(u[k]) < w[k] else WIDER
             low, high = value - half, value + half
             if math.isfinite(half):  # no farther than physics allows
@@ -76,6 +75,13 @@ def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = ()) -> lis
             out.append(ParameterReport(index, name, value, low, high, flag, doubt))
         at += c.size
     return out
+
+
+def at_bound(c: Candidate, k: int, u: float) -> str:
+    """What to think of the value of a candidate's parameter number ``k`` if it ended where the search may not go farther."""
+    if abs(u) <= AT_BOUND:
+        return ""
+    return NONE_LEFT if u < 0 and c.effect.parameters[k].on_top else BOUND
 
 
 def called(reports: Sequence[ParameterReport]) -> str:

@@ -19,6 +19,9 @@ from ee_dist.trials.log import Array
 
 SHOWS = 30.0
 """Energy (in variances of noise) of a change of the prediction from which its shape tells what more of it would do."""
+FAR = 4.0
+"""Error over the noise floor from which a small probe speaks against no side: a leg whose described rotors are ten times too heavy
+swings beyond its resonance, where a little more is better and so is much less."""
 FURTHER = 40
 """Candidates at most whose small probes show and that are looked at further on: of fewer all are. Of 160 effects drawn on
 six robots the hidden one was among the first twenty as often as with all."""
@@ -46,8 +49,9 @@ def screen(
     the model so far can make up for by themselves is no promise.
 
     The smallest probes come first, to one side. What shows in them and is not among the FURTHER best by them needs no more, and
-    the larger ones go to the side that they promise. What does not show in them may show further on. One ``trial`` of the search,
-    where one is named, is enough for all this, but for what does not show in it at all."""
+    the larger ones go to the side that they promise; to both for guesses, and where the model is FAR off. What does not show in
+    them may show further on. One ``trial`` of the search, where one is named, is enough for all this, but for what does not show
+    in it at all."""
     whole = _Ground.of(search, refit)
     alone = whole if trial is None or search.trials == (trial,) else _Ground.of(search.among([trial]), refit)
     if alone.total <= 0:
@@ -69,7 +73,8 @@ def screen(
     first = len(small) / (len(small) + (every - len(small)) / (3 if len(pool) > FURTHER else 1))
     ask(alone, small, 0.0, first)
     further = _further(pool, rows)
-    ask(alone, [(i, u) for i in further for u in _larger(pool[i], shares, rows[i])], first, 0.9)
+    both = [c.guess or alone.far for c in pool]
+    ask(alone, [(i, u) for i in further for u in _larger(pool[i], shares, rows[i], both[i])], first, 0.9)
     if whole is not alone:
         hidden = [i for i, found in enumerate(rows) if not any(p.shows for p in found)]
         ask(whole, [(i, u) for i in hidden for u in pool[i].probes((max(shares),))], 0.9, 1.0)
@@ -91,6 +96,11 @@ class _Ground:
         refit = refit.among(search)
         base = refit(search.base())
         return cls(search, refit, base, float(base @ base))
+
+    @property
+    def far(self) -> bool:
+        """Whether the model is off by so much that slopes say little."""
+        return self.total > FAR**2 * float(self.search.problem.floor[self.search.everything].sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,10 +141,11 @@ def _further(pool: Sequence[Candidate], rows: Sequence[Sequence[_Probe]]) -> lis
     return [i for i in free if i not in needless]
 
 
-def _larger(c: Candidate, shares: Sequence[float], found: Sequence[_Probe]) -> list[Array]:
-    """The other probes, without those of a parameter to the one of its two sides that its smallest one speaks against."""
+def _larger(c: Candidate, shares: Sequence[float], found: Sequence[_Probe], both: bool) -> list[Array]:
+    """The other probes, unless to ``both`` sides without those of a parameter to the one of its two sides that its smallest one
+    speaks against."""
     against = {}
-    for p in found:
+    for p in () if both else found:
         k = _moved(p.u)
         if p.shows and p.along and _two_sided(c, k):
             against[k] = -np.sign(p.along * p.u[k])
