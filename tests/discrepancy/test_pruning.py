@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from linear_problem import ROBOT, Linear
 
@@ -53,3 +55,14 @@ def test_what_one_channel_leaves_is_no_doubt_about_another() -> None:
     assert np.ptp(quiet) == np.ptp(loud) == 0.0
     assert loud[0] > 50.0 * quiet[0]
     assert quiet[0] >= problem.floor.mean()
+
+
+def test_what_the_readings_of_a_channel_leave_is_no_doubt_about_its_texture() -> None:
+    """A noisy sensor is told by its texture, and its noise stays in what it reads."""
+    problem = Linear(())
+    texture = np.arange(len(problem.data)) % 8 == 0
+    problem.layout = replace(problem.layout, reading=~texture)
+    problem.data[~texture] *= 30.0
+    fit = fitted(Search(problem))
+    luck = _luck(problem, fit)[texture[fit.mask]]
+    assert luck.max() < 50.0 * problem.floor.mean() < _luck(problem, fit).max()

@@ -184,6 +184,30 @@ def test_screening_looks_further_on_where_a_small_step_promises_something(monkey
     assert best == "joint_jam@hip_rear_left" and found[best] == every[best]
 
 
+class Resonant(Asked):
+    """A little more of what is too much already is better, and so is much less: the far side of a resonance."""
+
+    def shift(self, hypothesis: Hypothesis) -> Array:
+        total = 0.0
+        for t in hypothesis:
+            change = t.values[0][1]
+            total += -60.0 * change if change > -0.15 else 100.0 * change
+        return np.asarray(total * np.random.default_rng(7).standard_normal(len(self.trial_of)))
+
+
+@pytest.mark.parametrize(("far", "sides"), [(4.0, {-1.0, 1.0}), (1e9, {1.0})])
+def test_screening_looks_to_both_sides_where_the_model_is_far_off(
+    monkeypatch: pytest.MonkeyPatch, far: float, sides: set[float]
+) -> None:
+    """Nearer to the noise the side that a small step promises is enough."""
+    monkeypatch.setattr(screening, "FAR", far)
+    problem = Resonant((term("command_gain", "hip_rear_left", change=-0.3),))
+    problem.asked = []
+    (found,) = screen(Search(problem), [candidate(ROBOT, "command_gain", "hip_rear_left")])
+    assert {float(np.sign(t.values[0][1])) for t in problem.asked} == sides
+    assert (found.starts[0][0] < 0.0) == (-1.0 in sides)
+
+
 def test_what_shows_in_no_small_step_is_looked_at_further_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(screening, "FURTHER", 0)
     monkeypatch.setattr(Asked, "dead", 0.3)

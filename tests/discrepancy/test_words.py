@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
-from ee_dist.discrepancy.accounts.of_explain import explain_account
+from ee_dist.discrepancy.accounts.of_explain import _at_bounds, explain_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
+from ee_dist.discrepancy.search.candidates import Proposal, candidate
+from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.words import percent, phrase, plain, span, told, told_all
 from ee_dist.effects.catalogue import Term, term
@@ -31,7 +34,8 @@ def account(
 ) -> Account:  # fmt: skip
     best = SimpleNamespace(
         terms=(what,), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
-        explained=explained, held_out="windows", error_heldout=1.1, proposal=SimpleNamespace(label="", guess=False),
+        explained=explained, held_out="windows", error_heldout=1.1, own=np.zeros(len(what.values)),
+        proposal=SimpleNamespace(label="", guess=False, parts=(candidate(servo_pendulum(), what.effect, what.target),)),
     )  # fmt: skip
     found = SimpleNamespace(
         candidates=[],
@@ -298,3 +302,14 @@ def test_the_ends_of_an_interval_differ(low: float, high: float, said: str) -> N
 )
 def test_a_share_is_never_all_of_it_where_something_is_left(share: float, said: str) -> None:
     assert percent(share) == said
+
+
+def test_explain_says_which_value_ended_at_its_bound() -> None:
+    robot = servo_pendulum()
+    parts = tuple(candidate(robot, name, "servo") for name in ("coulomb_friction", "speed_limit", "viscous_friction"))
+    u = np.array([1.0, 0.4, 0.99])
+    best = SimpleNamespace(proposal=Proposal(parts), own=u, terms=Model(parts).hypothesis(u))
+    said = _at_bounds(best, robot)  # type: ignore[arg-type]
+    assert said == " Its torque and damping ended at its bound: the range is too small, or the effect is another."
+    best.own = np.array([0.2, 0.4, 0.3])
+    assert _at_bounds(best, robot) == ""  # type: ignore[arg-type]

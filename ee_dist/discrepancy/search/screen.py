@@ -20,7 +20,7 @@ from ee_dist.trials.log import Array
 SHOWS = 30.0
 """Energy (in variances of noise) of a change of the prediction from which its shape tells what more of it would do."""
 FAR = 4.0
-"""Error over the noise floor from which a small probe speaks against no side: a leg whose described rotors are ten times too heavy
+"""Error over the noise floor from which a small probe speaks against no side: a leg described with rotors ten times too heavy
 swings beyond its resonance, where a little more is better and so is much less."""
 FURTHER = 40
 """Candidates at most whose small probes show and that are looked at further on: of fewer all are. Of 160 effects drawn on
