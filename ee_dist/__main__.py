@@ -53,7 +53,7 @@ from ee_dist.tasks.folder import (
 )
 from ee_dist.tasks.help import answer
 from ee_dist.tasks.sweep import Jobs
-from ee_dist.tasks.unfinished import can_go_on, finished, unfinished
+from ee_dist.tasks.unfinished import FOLDER, SO_FAR, can_go_on, finished, unfinished
 
 MISTAKE, DEFECT = 2, 1
 _jobs = Jobs()
@@ -134,7 +134,9 @@ def _what_is_kept(out: Path) -> str:
 
 
 def _how_to_go_on(out: Path) -> str:
-    return f"; go on with the same command and resume={shown(_whole(out))}" if can_go_on(out) else ""
+    so_far = out / FOLDER / SO_FAR
+    model = f"; the model so far: {shown(so_far)}" if so_far.exists() else ""
+    return f"; go on with the same command and resume={shown(_whole(out))}{model}" if can_go_on(out) else ""
 
 
 def _whole(out: Path) -> Path:

@@ -34,6 +34,8 @@ from ee_dist.trials.log import SensorLog
 
 FOLDER = "unfinished"
 _RUN, _SIMULATED = "run.json", "simulated.bin"
+SO_FAR = "model.yaml"
+"""The model that a search had reached when it was stopped, for those who cannot wait."""
 _PACKAGES = ("ee_dist", "pybullet", "mujoco", "numpy", "numba")
 
 
@@ -102,7 +104,7 @@ class Unfinished:
         """Remove what was kept: only files of ours, by name."""
         self.close()
         for path in (*self.folder.glob("*.mcap"), *self.folder.glob("*.part"),
-                     self.folder / _SIMULATED, self.folder / _RUN):  # fmt: skip
+                     self.folder / _SIMULATED, self.folder / _RUN, self.folder / SO_FAR):  # fmt: skip
             path.unlink(missing_ok=True)
         with suppress(OSError):
             self.folder.rmdir()

@@ -161,6 +161,25 @@ def test_explain_and_improve_go_on_where_they_stopped(cli, tmp_path, stopping, v
     assert not (tmp_path / "run" / "unfinished").exists()
 
 
+def test_the_model_that_a_stopped_search_had_reached_can_be_used(cli, tmp_path, stopping):
+    log, run = tmp_path / "log", tmp_path / "run"
+    assert cli(
+        "task=trial", "robot=servo_pendulum", "+hidden=coulomb_friction@servo", "engine=mujoco", "seed=1",
+        "task.excitations=['multisine:seconds=1,seed=1','slow_sines:seconds=1,seed=2']", f"hydra.run.dir={log}",
+    ).status == 0  # fmt: skip
+    same = (f"measured={log}", "engine=mujoco", "evaluator=serial", "task.by=open_loop", "task.rerun=false")
+    ask = ("task=improve", "effect=auto", "task.only=[coulomb_friction,viscous_friction]", *same)
+    so_far = run / "unfinished" / "model.yaml"
+    stopping(when=so_far.exists)
+    assert cli(*ask, f"hydra.run.dir={run}").status == 1
+    text = so_far.read_text()
+    assert text.startswith("# Not the end of the search") and "effect: coulomb_friction" in text
+    stopping()
+    assert cli("task=compare", *same, f"model={so_far}", f"hydra.run.dir={tmp_path}/compare").status == 0
+    assert cli(*ask, f"resume={run}").status == 0
+    assert not so_far.parent.exists() and (run / "model.yaml").exists()
+
+
 def test_a_sweep_goes_on_where_it_stopped(cli, tiny, tmp_path, stopping):
     sweep = ("-m", *tiny, *FAST[1:], "+scenario=1,9")
     stopping(when=lambda: any((tmp_path / "sweep").rglob("summary.json")))
