@@ -73,13 +73,15 @@ def everywhere(
         without = [cross_fit(search, [(model, current.u)], cut)[0].residual for cut in cuts]
     calm = search.among(calm_trials(search.problem, as_it_is))
     look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
-    found, places = None if again else look.kept(current), Model(current.parts).places
-    robot = search.problem.robot
+    robot, places = search.problem.robot, Model(current.parts).places
+    begun = list(instead(robot, current, own))
+    # From neutral, which the model as it is may be, small values take in least of what is not theirs.
+    found = None if again else look.kept(current, beside_all=not begun)
     # Of what was added last the most is not yet decided.
     alike = [t for t in reversed(twins) if again and stands_out(robot, current.parts[t[0]])][:TWINS]
-    for keep in instead(robot, current, own):
+    for keep in begun:
         for base in _with_twins(current, places, keep, alike):
-            other = look.kept(base, more=not keep[own:])
+            other = look.kept(base, more=not keep[own:], beside_all=not keep[own:] and not again)
             if other is not None and (
                 found is None or other.held < found.held + (0.0 if keep[own:] else look.luck(other.held))
             ):
@@ -144,9 +146,10 @@ class _Look:
         problem = self.search.problem
         return least_energy(len(self.pool)) * max(float(problem.floor.mean()), energy / len(problem.floor))
 
-    def kept(self, base: Current, more: bool = True) -> _Kept | None:
+    def kept(self, base: Current, more: bool = True, beside_all: bool = False) -> _Kept | None:
         """The base with all that is worth keeping, and (``more``), if need be, one effect beside; None where that is not worth
-        more than the current model."""
+        more than the current model. ``beside_all``: the one effect is looked for wherever much is left, though that is long work:
+        small values that had to stand in for it are worth something too."""
         robot = self.search.problem.robot
         base = _apart(robot, base, self.own)
         few = [c for c in self._others(Model(base.parts)) if c.effect.everywhere and not c.members(robot)]
@@ -159,7 +162,7 @@ class _Look:
         (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=widths)
         fit = over_ridges(self.calm, fit, PRIOR)
         alone = self._worth(fit, {})
-        if not more or (alone is not None and not self._far(fit)):
+        if not more or (alone is not None and not (beside_all and self._far(fit))):
             return alone
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
         other = self._beside(model, u, fit)
