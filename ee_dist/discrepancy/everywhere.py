@@ -14,7 +14,7 @@ import numpy as np
 from ee_dist.discrepancy.assumed import beside, puts_right
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
-from ee_dist.discrepancy.examine import FAR, Current, calm_trials
+from ee_dist.discrepancy.examine import FAR, Current, calm_trials, telling
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment
 from ee_dist.discrepancy.pruning import pruned
@@ -43,6 +43,8 @@ TRIED = 20
 """Effects that are tried one by one beside all that may be a little wrong,"""
 HEATS = ((3, 5), (4, 2))
 """in a race: how many of them go on after how many steps."""
+MOST_OF_IT = 0.5
+"""Share of what is above the noise that must be left at one joint for an effect to stand out there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +150,8 @@ class _Look:
 
     def kept(self, base: Current, more: bool = True, beside_all: bool = False) -> _Kept | None:
         """The base with all that is worth keeping, and (``more``), if need be, one effect beside; None where that is not worth
-        more than the current model. ``beside_all``: the one effect is looked for wherever much is left, though that is long work:
-        small values that had to stand in for it are worth something too."""
+        more than the current model. ``beside_all``: the one effect is looked for also where much is left at one joint: small
+        values that had to stand in for it are worth something too."""
         robot = self.search.problem.robot
         base = _apart(robot, base, self.own)
         few = [c for c in self._others(Model(base.parts)) if c.effect.everywhere and not c.members(robot)]
@@ -162,7 +164,7 @@ class _Look:
         (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=widths)
         fit = over_ridges(self.calm, fit, PRIOR)
         alone = self._worth(fit, {})
-        if not more or (alone is not None and not (beside_all and self._far(fit))):
+        if not more or (alone is not None and not (beside_all and self._one_sided(fit))):
             return alone
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
         other = self._beside(model, u, fit)
@@ -170,9 +172,15 @@ class _Look:
             return other or alone
         return other if other.held + self.luck(other.held) < alone.held else alone
 
-    def _far(self, fit: Fit) -> bool:
-        """Whether much more than noise is left."""
-        return fit.energy > FAR**2 * float(self.search.problem.floor[fit.mask].sum())
+    def _one_sided(self, fit: Fit) -> bool:
+        """Whether much more than noise is left, and most of it at one joint."""
+        problem, own = self.search.problem, fit.mask
+        above = fit.residual[own] ** 2 - problem.floor[own]
+        if fit.energy <= FAR**2 * float(problem.floor[own].sum()):
+            return False
+        joints = [len(problem.channels) + c if j is None else j for c, j in enumerate(problem.layout.joint_of_channel)]
+        at = np.bincount(np.array(joints)[problem.channel_of[own]], weights=above)
+        return bool(at.max() > MOST_OF_IT * above.sum())
 
     def _worth(self, fit: Fit, ties: Mapping[str, list[str]]) -> _Kept | None:
         """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data."""
@@ -211,10 +219,12 @@ class _Look:
             starts.append((Model((*model.parts, s.candidate)), np.concatenate([start, more])))
         if not starts:
             return None
-        best, *others = race(search, starts, search.everything, HEATS, PRIOR)
+        problem, own = search.problem, search.everything
+        trial = telling(problem, alone.residual, np.unique(problem.trial_of[own]).tolist())
+        heats = own if trial is None else problem.trial_of == trial
+        best, *others = race(search, starts, own, HEATS, PRIOR, heats_on=heats)
         best = over_ridges(search, best, PRIOR)
-        own = search.everything
-        noise = max(float(search.problem.floor[own].mean()), best.energy / int(own.sum()))
+        noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))
         ties = [f.model.parts[-1].name for f in others if f.energy - best.energy < TIE_ENERGY * noise]
         return self._worth(best, {best.model.parts[-1].name: ties})
 

@@ -27,12 +27,16 @@ def race(
     heats: Heats,
     prior: float = 0.0,
     width: float = WIDEST,
+    heats_on: Mask | None = None,
 ) -> list[Fit]:
-    """Fits of the last that are left of the (model, start), the best first; each heat ends with those of the least energy."""
+    """Fits to the residual values of ``mask`` (n,) of the last that are left of the (model, start), the best first; each heat
+    ends with those of the least energy, on fewer values (``heats_on``) where these tell enough."""
     fits: list[Fit] = []
     for iterations, left in heats:
         if len(starts) > left:
-            fits = follow_valley(search, starts, mask, prior, iterations, widths=(width,))
+            fits = follow_valley(
+                search, starts, mask if heats_on is None else heats_on, prior, iterations, widths=(width,)
+            )
             best = np.argsort([f.energy for f in fits], kind="stable")[:left]
             starts = [(fits[k].model, fits[k].u) for k in best]
     fits = follow_valley(search, starts, mask, prior, ITERATIONS, widths=(width,))
