@@ -29,6 +29,7 @@ from ee_dist.measurements.proposal.model import FIT, UNITS_TO_ASK, Hints, Propos
 from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.measurements.readers import FORMATS, kind_of
 from ee_dist.measurements.report import Report, describe
+from ee_dist.measurements.stated_gains import with_gains
 from ee_dist.recording.records import TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.agree import SOURCES, sources_text
@@ -81,7 +82,8 @@ def run(config: Config, options: Options, out: Path) -> None:
             )
         proposal = proposal_for(files, robot, replace(hints, written=written_orders(config)))
         mapping = written(proposal, config, files, out, console)
-    notes = (*notes, *left)
+    robot, remarks = with_gains(robot, mapping)
+    notes = (*notes, *left, *remarks)
     found = import_files(files, mapping, robot)
     reports = [report for _, report in found]
     text = describe(reports)
