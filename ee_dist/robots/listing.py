@@ -32,11 +32,11 @@ def listings(*files: Any) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 
 def _of_body(path: Path) -> list[tuple[str, tuple[str, ...]]]:
-    if not path.is_file():
-        return []
     try:
-        root = read_xml(path)[0]
-    except XmlError:
+        root = read_xml(path)[0] if path.is_file() else None
+    except (XmlError, OSError):
+        return []
+    if root is None:
         return []
     # Wherever they stand: a URDF lists joints side by side, an MJCF in the bodies that they move.
     return [(f"as {path.name} lists them", tuple(e.get("name", "") for e in root.iter("joint")))]

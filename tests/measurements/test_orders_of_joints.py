@@ -150,6 +150,26 @@ def test_named_positions_tell_the_order_of_numbered_speeds_and_commands(tmp_path
     assert sure["position_left_knee"] == SURE and sure["velocity_left_knee"] == LIKELY
 
 
+def test_numbered_columns_that_go_with_no_joint_ask_for_no_order(tmp_path: Path) -> None:
+    described = robot_file(tmp_path, WIDE)
+    frame = pd.read_csv(written(tmp_path, LIMBS, named=True))
+    rng = np.random.default_rng(0)
+    frame = frame.rename(
+        columns={f"{what}{k}": f"{what}_{j}" for k, j in enumerate(LIMBS) for what in ("vel", "pos_des")}
+    )
+    frame = frame.assign(**{f"motor_speed{k}": rng.standard_normal(len(T)) for k in range(4)})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    found = proposed(tmp_path / "log.csv", described)
+    assert not found.questions and columns_of(found)["velocity_left_knee"] == "vel_left_knee"
+
+
+def test_files_that_say_nothing_of_joints_list_none(tmp_path: Path) -> None:
+    (tmp_path / "list.yaml").write_text("- 1")
+    (tmp_path / "far.yaml").write_text(f"urdf: {'x' * 5000}.urdf")
+    (tmp_path / "torn.urdf").write_text("<robot")
+    assert listings(*tmp_path.iterdir(), tmp_path / "nowhere.yaml", "urdf") == ()
+
+
 def test_orders_of_a_robot(tmp_path: Path) -> None:
     mixed = ("right_hip", "left_hip", "right_knee", "left_knee")
     described = robot_file(tmp_path, TRUE, mixed)

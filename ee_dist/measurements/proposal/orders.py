@@ -97,6 +97,8 @@ def told_by_data(v: View) -> Hints | None:
             return None
         block, ways = followers[0], []
         left = _with_positions(v, followers, orders)
+        if not left:  # something else that is numbered
+            return None
     # Limits are told apart at a glance; torques take the model's masses, and come second.
     held = _by_need(v, left) if len(left) > 1 else left
     if len(held) > 1:
@@ -181,7 +183,7 @@ def _beyond(v: View, order: Order, units: dict[str, str], mirrored: bool) -> _Wa
 
 
 def _with_positions(v: View, followers: Sequence[Block], orders: Sequence[Order]) -> list[Order]:
-    """The orders in which numbered speeds and commands go with positions that have names."""
+    """The orders in which numbered speeds and commands go with positions that have names; none where they do in no order."""
     fits = []
     for order in orders:
         own = []
@@ -193,7 +195,7 @@ def _with_positions(v: View, followers: Sequence[Block], orders: Sequence[Order]
                 own.append(abs(v.lead(placed, v.position.block).correlation))
         fits.append(float(np.mean(own)) if own else 0.0)
     best = max(fits)
-    return [o for o, fit in zip(orders, fits, strict=True) if best < FITS or fit > best - WORSE]
+    return [o for o, fit in zip(orders, fits, strict=True) if best >= FITS and fit > best - WORSE]
 
 
 def _by_need(v: View, orders: list[Order]) -> list[Order]:
