@@ -23,6 +23,7 @@ from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
+    pace_suspicion,
     speed_suspicion,
     suspicions,
     time_suspicion,
@@ -343,8 +344,21 @@ class _Import:
                 ]
             elif s.kind == "velocity" and s.target in position_of:
                 self._judge(speed_suspicion(s.name, self.channels[s.name], position_of[s.target], self.step_s), column)
+        self._look_at_pace()
         for name, flaw in command_flaws(self.robot, self.mapping, commands, position_of, self.step_s):
             self._judge(flaw, self.mapping.commands.get(name))
+
+    def _look_at_pace(self) -> None:
+        """Measured speeds of all joints beside the change of their positions."""
+        of = {(s.kind, s.target): s.name for s in self.robot.sensors}
+        pairs = [(of.get(("velocity", m)), of.get(("position", m))) for m in self.robot.motor_names]
+        both = [p for p in pairs if all(n and isinstance(self.mapping.sensors.get(n), Column) for n in p)]
+        if not both:
+            return
+        speed, position = (np.stack([self.channels[str(p[k])] for p in both], axis=1) for k in (0, 1))
+        note = pace_suspicion(speed, position, self.step_s, self.report.rate_read_hz)
+        if note:
+            self.report.suspicious.append(note)
 
     def _look_at_torques(self, torques: Array | None, joints: Array) -> None:
         """Torques beside what the motion needs. Raises MeasurementError for a unit that cannot be."""

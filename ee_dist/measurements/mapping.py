@@ -107,6 +107,8 @@ class Mapping:
     supply: Column | None = None
     enabled: Column | None = None
     settings: tuple[Setting, ...] = ()
+    gains: Dictionary[str, Dictionary[str, float]] = field(default_factory=dict)
+    """Gains of drives (kp, kd) that a file states and the robot's description only assumes, by joint or for all_joints."""
     reading: Options = Options()
     tables: Dictionary[str, Clock] = field(default_factory=dict)
     split: Split | None = None

@@ -17,6 +17,7 @@ from ee_dist.robots.untrusted import UntrustedError, yaml_of
 
 LONGEST_S = 60.0
 """Leads and means beyond this are a slip of the unit."""
+GAINS = ("kp", "kd")
 MOST = 1e12
 """Of a number that a person states: beyond it sums of squares leave what numbers can hold."""
 READ_ALIKE = ("unit", "sign", "scale", "offset", "signed_bits")
@@ -27,7 +28,7 @@ UNKNOWN = "???"
 
 _KEYS = (
     "robot", "format", "records", "separator", "header", "decimal", "tables", "split", "time", "rate_hz", "sensors",
-    "commands", "torques", "external", "supply", "enabled", "settings", "trial",
+    "commands", "torques", "external", "supply", "enabled", "settings", "gains", "trial",
 )  # fmt: skip
 
 
@@ -79,6 +80,7 @@ def mapping_of(data: Any, file: Path) -> Mapping:
         supply=single.get("supply"),
         enabled=single.get("enabled"),
         settings=_settings(data.get("settings"), where),
+        gains=_gains(data.get("gains") or {}, f"{where}: gains"),
         reading=_reading(data, where),
         tables={
             k: _clock(v, f"{where}: tables: {k}")
@@ -207,9 +209,21 @@ def _settings(value: Any, where: str) -> tuple[Setting, ...]:
     return tuple(_setting(s, f"{where}: settings[{i}]") for i, s in enumerate(value))
 
 
-def _table(value: Any, where: str) -> Dictionary[str, Any]:
+def _gains(value: Any, where: str) -> dict[str, dict[str, float]]:
+    found: dict[str, dict[str, float]] = {}
+    for joint, entry in _table(value, where, "{kp: number, kd: number}").items():
+        for key, number in _table(entry, f"{where}: {joint}", "number").items():
+            if key not in GAINS:
+                raise MeasurementError(f"{where}: {joint}: unknown key {quoted(key)}; {nearest(key, GAINS)}")
+            if (size := _number(number, f"{where}: {joint}: {key}")) < 0:
+                raise MeasurementError(f"{where}: {joint}: {key}: expected 0 or more, not {size:g}")
+            found.setdefault(joint, {})[key] = size
+    return found
+
+
+def _table(value: Any, where: str, entry: str = "{column: ..., unit: ...}") -> Dictionary[str, Any]:
     if not isinstance(value, Dictionary):
-        raise MeasurementError(f"{where}: expected 'name: {{column: ..., unit: ...}}', not {shown(value)}")
+        raise MeasurementError(f"{where}: expected 'name: {entry}', not {shown(value)}")
     return {str(k): v for k, v in value.items()}
 
 

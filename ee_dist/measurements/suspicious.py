@@ -27,6 +27,11 @@ OTHER_UNIT, OTHER_SIZE = 4.0, 20.0
 """A soft drive goes only part of the way to its command, and a model may be off by a lot: beyond these it is another unit."""
 
 
+PACE, CLEAR, ALIKE = 0.05, 0.95, 1.15
+"""Share by which speeds must be off the change of their positions to be told (clocks and encoders are ten times as good);
+correlation from which a joint tells it, and the largest ratio between two joints that are off by the same."""
+
+
 def suspicions(name: str, values: Array, turn: float = TURN) -> list[str]:
     """Sentences about one series (T,): stuck, clipped, a wrapped counter or angle; ``turn`` is a whole turn in its numbers."""
     found: list[str] = []
@@ -124,6 +129,35 @@ def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> 
         certain = correlation > 0.9 and _between_units(slope, RATIOS)
         return f"{name}: is {slope:.3g} times the change of its position: another unit of one of the two?", certain
     return None
+
+
+def pace_suspicion(speed: Array, position: Array, step_s: float, rate_hz: float) -> str | None:
+    """Whether measured speeds (T, J) are at all joints alike another number of times the change of their positions than one: then
+    the time or the speeds are off by that. ``rate_hz``: of the readings.
+
+    Noise, rounding and lags take from a correlation what they may add to or take off a ratio, so that joints that are slow or
+    coarsely read tell nothing, and what one tells lies between ratio * correlation and ratio / correlation.
+    """
+    if len(speed) < 3:
+        return None
+    # Differences over two rows are means by Simpson's rule of what lies between; both are smoothed alike then.
+    both = (speed[:-2] + 4 * speed[1:-1] + speed[2:]) / 6, (position[2:] - position[:-2]) / (2 * step_s)
+    width = max(3, round(0.04 / step_s))
+    measured, change = (signals.smooth(signals.smooth(x, width), width) for x in both)
+    moving = signals.lively(speed, position)
+    fits = {k: r for k in moving if (r := signals.relation(change[:, [k]], measured[:, [k]]).correlation) > CLEAR}
+    ratios = {k: float(np.std(measured[:, k]) / np.std(change[:, k])) for k in fits}
+    if 2 * len(fits) <= len(moving):
+        return None
+    least, most = min(ratios[k] * r for k, r in fits.items()), max(ratios[k] / r for k, r in fits.items())
+    low, high, ratio = min(ratios.values()), max(ratios.values()), float(np.median([*ratios.values()]))
+    if not (least > 1 + PACE or most < 1 / (1 + PACE)) or high / low > ALIKE or not 0.5 < ratio < 2:
+        return None
+    joints = f"{len(fits)} joints ({low:.3g} to {high:.3g})" if len(fits) > 1 else "the joint"
+    return (
+        f"speeds: {ratio:.3g} times the change of the positions at {joints}: either the time is off (rows would come at "
+        f"{rate_hz * ratio:.4g} Hz, not {rate_hz:.4g}), or the speeds are scaled by that"
+    )
 
 
 def command_suspicion(name: str, command: Array, position: Array, step_s: float) -> tuple[str, bool] | None:

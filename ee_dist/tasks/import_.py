@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +29,12 @@ from ee_dist.measurements.proposal.model import FIT, UNITS_TO_ASK, Hints, Propos
 from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.measurements.readers import FORMATS, kind_of
 from ee_dist.measurements.report import Report, describe
+from ee_dist.measurements.stated_gains import with_gains
 from ee_dist.recording.records import TrialRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.agree import SOURCES, sources_text
 from ee_dist.robots.describe import BUILT_IN, load_robot, robot_of
+from ee_dist.robots.listing import listings
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError, one_of
 from ee_dist.tasks.folder import check_file_name
@@ -78,9 +80,10 @@ def run(config: Config, options: Options, out: Path) -> None:
                 f"{robot.name} has no drives: 'task=robot urdf={config.robot.urdf or 'FILE.urdf'}' writes a description "
                 "with some to begin with; then robot=urdf robot.drives=FILE.yaml"
             )
-        proposal = proposal_for(files, robot, hints)
+        proposal = proposal_for(files, robot, replace(hints, written=written_orders(config)))
         mapping = written(proposal, config, files, out, console)
-    notes = (*notes, *left)
+    robot, remarks = with_gains(robot, mapping)
+    notes = (*notes, *left, *remarks)
     found = import_files(files, mapping, robot)
     reports = [report for _, report in found]
     text = describe(reports)
@@ -130,6 +133,12 @@ def hints_of(options: Options) -> Hints:
 
 def _listed(value: Any) -> list[Any]:
     return list(value) if isinstance(value, (list, tuple)) else [value]
+
+
+def written_orders(config: Config) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """The orders in which the files of the configured robot list its joints, which may be that of a log."""
+    robot = config.robot
+    return listings(*(f for f in (robot.name, robot.urdf, robot.drives) if f is not None))
 
 
 def written(proposal: Proposal, config: Config, files: list[Path], out: Path, console: Console) -> Mapping:

@@ -80,9 +80,8 @@ class Intake:
         self.path = path
         config = self._config(robot)
         chosen = config.robot
-        found = proposal_for(
-            [path], robot_of(chosen.name, chosen.urdf, chosen.drives)[0], import_.hints_of(options_of(answers))
-        )
+        hints = replace(import_.hints_of(options_of(answers)), written=import_.written_orders(config))
+        found = proposal_for([path], robot_of(chosen.name, chosen.urdf, chosen.drives)[0], hints)
         text = as_yaml(found, import_.robot_source(config), path.name)
         return Proposed(tuple(rows(found)), tuple(found.questions), tuple(found.notes), text)
 

@@ -129,3 +129,28 @@ def test_a_stop_that_the_log_passes_is_suspicious_and_stands_in_no_comparison(tm
         assert status == 0 and any("beyond the stop at 0.1" in w for w in found["words"]) == (upper == "0.1")
         errors.append(found["error"])
     assert errors[1] == pytest.approx(errors[0], rel=0.02)
+
+
+def test_the_recording_has_the_gains_of_the_log_where_the_description_only_assumed_some(
+    tmp_path: Path, command: Command
+) -> None:
+    """By the mapping that is written, too; and not where its line is taken out."""
+    described = samples.robot_file(tmp_path)
+    text = described.read_text().replace("kp: 20,", "kp: 90, kd: 0.5, assumed: [kp, rotor_inertia],")
+    described.write_text(text)
+    log = samples.csv(tmp_path)
+    lines = log.read_text().splitlines()
+    log.write_text("\n".join([f"{lines[0]},kp", *(f"{line},30" for line in lines[1:])]) + "\n")
+    status, said, _ = command(
+        f"measured={log}", "robot=urdf", f"robot.drives={described}", f"hydra.run.dir={tmp_path / 'out'}"
+    )
+    assert status == 0 and "the log states kp 30, where the description only assumes kp 90" in said
+    mapping = tmp_path / "out" / "mapping.yaml"
+    without = tmp_path / "without.yaml"
+    without.write_text("\n".join(line for line in mapping.read_text().splitlines() if not line.startswith("gains:")))
+    for name, used in (("again", mapping), ("without", without)):
+        command(f"measured={log}", f"task.mapping={used}", f"hydra.run.dir={tmp_path / name}")
+    robots = [read_run(tmp_path / d / "measured.mcap").robot for d in ("out", "again", "without")]
+    assert [{d.kp for d in r.drives} for r in robots] == [{30.0}, {30.0}, {90.0}]
+    assert [r.assumed_joints("kp") for r in robots] == [(), (), samples.JOINTS]
+    assert all(r.assumed_joints("rotor_inertia") == samples.JOINTS for r in robots)

@@ -458,9 +458,13 @@ IMPORTS: Rows = (
     ),
     ("task=import measured=t.csv task.mapping=unit.map", "did you mean rad or mrad or rad/s?"),
     ("task=import measured=t.csv task.mapping=metres.map", "expected one of angle: rad, mrad, deg, turn"),
+    (
+        "task=import measured=t.csv task.mapping=gains.map",
+        "servo_pendulum has no driven joint 'sevro'; did you mean servo",
+    ),
     ("task=import measured=t.csv task.mapping=column.map", "did you mean q?"),
     ("task=import measured=t.csv task.mapping=time.map", "name the column, or 'time: {rate_hz: 100}'"),
-    ("task=import measured=t.csv task.mapping=key.map", "did you mean commands or records or format?"),
+    ("task=import measured=t.csv task.mapping=key.map", "did you mean commands or records or gains?"),
     ("task=import measured=t.csv task.mapping=joint.map", "did you mean servo?"),
     (
         "task=import measured=t.csv task.mapping=push.map",

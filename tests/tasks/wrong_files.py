@@ -201,6 +201,7 @@ def texts() -> dict[str, str]:
         "key.map": MAPPING % "rad" + COMMANDS + "comands: {}\n",
         "joint.map": MAPPING % "rad" + COMMANDS.replace("servo", "sevro"),
         "push.map": MAPPING % "rad" + COMMANDS + "external: {sevro: {column: push, unit: N.m}}\n",
+        "gains.map": MAPPING % "rad" + COMMANDS + "gains: {sevro: {kp: 2}}\n",
         "sensor.map": (MAPPING % "rad").replace("position", "positon") + COMMANDS,
         "robot.map": (MAPPING % "rad").replace("servo_pendulum", "servo_pendulim") + COMMANDS,
         "scale.map": (MAPPING % "rad, scale: .nan") + COMMANDS,

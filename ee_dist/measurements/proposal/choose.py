@@ -9,6 +9,7 @@ from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.proposal.blocks import unreadable
 from ee_dist.measurements.proposal.commands import add_commands
 from ee_dist.measurements.proposal.model import FIT, LIKELY, UNKNOWN, Choice, Hints, Proposal
+from ee_dist.measurements.proposal.orders import told_by_data
 from ee_dist.measurements.proposal.positions import add_positions, ask_for_positions, ranked_positions
 from ee_dist.measurements.proposal.rate import rate_by_speeds
 from ee_dist.measurements.proposal.rest import add_rest, add_switches
@@ -41,6 +42,11 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
         _tell_flaws(v, flaws)
         return v.out
     v.position = position
+    if (found := told_by_data(v)) is not None:
+        return propose(recorded, robot, found)
+    if v.hints.told is not None:
+        v.out.questions += [v.hints.told.question] * bool(v.hints.told.question)
+        v.out.notes += [v.hints.told.note] * bool(v.hints.told.note)
     v.position.block.used = True
     _time_choice(v, v.position.block.table.name)
     v.units = position_units(v.position.block, v.joints, v.hints)

@@ -14,15 +14,29 @@ UNITS_TO_ASK = ("rad", "deg", "m", "mm", SHARE)
 
 
 @dataclass(frozen=True)
+class Told:
+    """What the data say of an order of joints that no person said: how sure, and why; a question where they leave it open, a note
+    where they do not."""
+
+    sure: str
+    why: str
+    question: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
 class Hints:
     """What a person said because no file can: ``joints`` in the order of the columns, the ``gains`` of the motors (N.m/A, in
     the same order; or FIT), the ``unit`` of positions (or "percent" of each joint's range), ``rate_hz`` of rows without a
-    time."""
+    time. ``written``: orders in which the robot's files list the joints, and what each is called; ``told``: where not a person
+    but the data gave ``joints``."""
 
     joints: Sequence[str] | None = None
     gains: Sequence[float] | str | None = None
     unit: str | None = None
     rate_hz: float | None = None
+    written: Sequence[tuple[str, Sequence[str]]] = ()
+    told: Told | None = None
 
 
 @dataclass(frozen=True)

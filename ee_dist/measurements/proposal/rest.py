@@ -54,7 +54,7 @@ def by_its_name(v: View, sensor: Sensor) -> Choice | None:
 def add_switches(v: View) -> None:
     """What tells when drives obey, and the supply where the robot's drives depend on it; then what is not used at all."""
     wants_supply = any(d.supply_nominal_v > 0 for d in v.robot.drives)
-    used = {(c.entry or {}).get("column") for c in v.out.choices}
+    used = {(c.entry or {}).get("column") for c in v.out.choices} | v.taken
     left: list[str] = []
     for table in v.recorded.tables:
         place = {"table": table.name} if len(v.recorded.tables) > 1 else {}

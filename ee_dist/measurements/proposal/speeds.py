@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
@@ -17,6 +18,8 @@ from ee_dist.measurements.proposal.words import SPEED
 
 AGREES = 0.8
 """Correlation from which a speed is the change of a position."""
+OFF = 0.1
+"""Share by which speeds may be off the change of the positions and still be said to agree with the time."""
 SPEEDS = {"hinge": ("rad/s", "deg/s", "rpm"), "slide": ("m/s", "mm/s")}
 
 
@@ -133,15 +136,16 @@ def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
         if r.correlation < -AGREES:
             entry["sign"] = -1
         entries.append(entry)
-    _checks_time(v, entries, sure)
+    _checks_time(v, entries, sure, [relations[k].slope for k in telling if k not in odd])
     return UnitChoice(
         tuple(entries) if sure != UNKNOWN else (), sure, why or f"{entries[0]['unit']} by its ratio to that change"
     )
 
 
-def _checks_time(v: View, entries: list[dict[str, Any]], sure: str) -> None:
-    """A speed that is the change of the position in units of ours has checked the unit of the time, too."""
-    if sure == SURE and all(e["unit"] in ("rad/s", "m/s") for e in entries):
+def _checks_time(v: View, entries: list[dict[str, Any]], sure: str, slopes: list[float]) -> None:
+    """A speed that is the change of the position in units of ours, and as large, has checked the time, too."""
+    large = bool(slopes) and abs(abs(statistics.median(slopes)) - 1) < OFF
+    if sure == SURE and large and all(e["unit"] in ("rad/s", "m/s") for e in entries):
         for k, c in enumerate(v.out.choices):
             if c.group == "time" and c.sure == LIKELY:
                 v.out.choices[k] = replace(c, sure=SURE, why=f"{c.why}; speeds agree")

@@ -9,14 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.model import LIKELY, Choice, Proposal
 from ee_dist.measurements.proposal.words import tokens
 from ee_dist.measurements.readers import read
+from ee_dist.measurements.stated_gains import ALL
 from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.robots.model import Robot
 
 HEADER, COLUMN = "header", "column"
+KEYS = {"position_gain": "kp", "speed_gain": "kd"}
+"""The field of a drive that such an effect changes."""
+FARTHEST = (1 / 50, 5.0)
+"""Times a guessed gain that a stated one may be and yet be in its unit: guesses are off by ten, the numbers of a servo's
+register by hundreds."""
 GAINS = {"kp": "position_gain", "pgain": "position_gain", "kd": "speed_gain", "dgain": "speed_gain"}
 """The effect that a controller's gain of a trial is told as, by what the number is called."""
 FILLING = frozenset(["gain", "gains", "position", "joint", "motor", "servo", "drive", "controller", "pid", "value"])
@@ -40,12 +47,13 @@ def add_stated(proposal: Proposal, files: Sequence[Path], first: Recorded, robot
         dict(_numbers(r)) for k, f in enumerate(files) for r in ([first] if k == 0 and len(files) == 1 else read(f))
     ]
     differ = []
+    known: dict[str, dict[str, float]] = {}
     for place, name in named:
         values, found = [t.get((place, name), math.nan) for t in trials], _gain(name, robot)
         if not np.isfinite(values).all():
             continue
         if len(set(values)) == 1:
-            if found is not None:
+            if found is not None and not _known(known, proposal, robot, found, name, values[0]):
                 proposal.notes.append(
                     f"{name} is {values[0]:g} in all trials: the description's gain is taken for it; say it as settings of the "
                     "mapping where it is not, or where other files, with other gains, are to be compared with the same model"
@@ -54,10 +62,62 @@ def add_stated(proposal: Proposal, files: Sequence[Path], first: Recorded, robot
             differ.append(f"{name} ({_listed(values)})")
         else:
             proposal.choices.append(_setting(found, place, name, values))
+    if known:
+        proposal.head["gains"] = known
+        proposal.notes.append(_offered(known, robot))
     if differ:
         proposal.notes.append(
             f"differs between trials, and is not used: {', '.join(differ)}; settings of the mapping can say what it changes"
         )
+
+
+def _known(
+    known: dict[str, dict[str, float]],
+    proposal: Proposal,
+    robot: Robot,
+    found: tuple[str, str],
+    name: str,
+    value: float,
+) -> bool:
+    """Whether a gain that is one in all trials is of drives whose gain was only assumed: it goes to ``known`` if it can be in the
+    unit of the assumed one, and is told otherwise. What somebody vouches for is not overruled by a column that is called so."""
+    effect, target = found
+    key = KEYS[effect]
+    guessed = {
+        d.joint: getattr(d, key) for d in robot.drives
+        if target in (ALL, d.joint) and (d.joint, key) in robot.assumed
+    }  # fmt: skip
+    if not guessed:
+        return False
+    if not all(FARTHEST[0] <= value / g <= FARTHEST[1] for g in guessed.values()):
+        proposal.notes.append(
+            f"{name} is {value:g} in all trials, where the description only assumes {key} {_listed([*guessed.values()])}: too "
+            f"far off to be taken for the same unit; if it is, write '{key}: {value:g}' at the drives of the description and "
+            f"take {key} off 'assumed'"
+        )
+        return True
+    for joint in [ALL] if len(guessed) == len(robot.drives) else guessed:
+        known.setdefault(joint, {})[key] = value
+    proposal.unused[:] = [column for column in proposal.unused if column != name]
+    return len(guessed) == len(robot.drives) or target != ALL
+
+
+def _offered(known: dict[str, dict[str, float]], robot: Robot) -> str:
+    """What is done with gains that were only assumed, and how to keep them."""
+    keys = [k for k in KEYS.values() if any(k in gains for gains in known.values())]
+    stated = " and ".join(f"{k} {_listed([g[k] for g in known.values() if k in g])}" for k in keys)
+    guessed = " and ".join(
+        f"{k} {_listed([getattr(d, k) for d in robot.drives if (d.joint, k) in robot.assumed])}" for k in keys
+    )
+    entries = dict.fromkeys(", ".join(f"{k}: {v:g}" for k, v in gains.items()) for gains in known.values())
+    where = "every drive" if [*known] == [ALL] else f"the drives of {listed(known)}"
+    off = " and ".join(keys)
+    return (
+        f"the log states {stated}, where the description only assumes {guessed}: the recorded robot gets those of the log "
+        f"('gains' of the mapping), which compare, explain and improve then use, in N.m/rad and N.m.s/rad (N/m and N.s/m); to "
+        f"keep them write {{{'} or {'.join(entries)}}} at {where} of the description and take {off} off 'assumed'; "
+        "if they are in other units, take 'gains' out of the mapping"
+    )
 
 
 def _setting(found: tuple[str, str], place: str, name: str, values: Sequence[float]) -> Choice:
@@ -118,7 +178,7 @@ def _gain(name: str, robot: Robot) -> tuple[str, str] | None:
     if not rest:
         if len(robot.drives) == 1:
             return (effect, able[0]) if able else None
-        return (effect, "all_joints") if len(able) == len(robot.drives) else None
+        return (effect, ALL) if len(able) == len(robot.drives) else None
     of_joint = [j for j in able if [w for w in tokens(j) if w not in FILLING] == rest]
     return (effect, of_joint[0]) if len(of_joint) == 1 else None
 

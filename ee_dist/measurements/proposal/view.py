@@ -46,7 +46,8 @@ class Scored:
 
 class View:
     """One proposal in the making. ``position`` and ``units`` are the block of the positions and its units, once known;
-    ``needed`` the torques (T, J) that the motion needs and its speeds; ``gained`` the blocks that the gains were applied to."""
+    ``needed`` the torques (T, J) that the motion needs and its speeds; ``gained`` the blocks that the gains were applied to;
+    ``taken`` the columns of channels, also of those whose joints are open."""
 
     position: Scored
     units: UnitChoice
@@ -59,6 +60,7 @@ class View:
         self.blocks: list[Block] = []
         self.needed: tuple[Array, Array] | None = None
         self.gained: list[str] = []
+        self.taken: set[str] = set()
 
     @property
     def timed(self) -> Recorded:
@@ -170,6 +172,8 @@ class View:
 
     def order(self, block: Block) -> tuple[str, str]:
         """How sure the joints of a block are, and why."""
+        if block.how in (BY_NUMBER, BY_PLACE) and self.hints.told is not None:
+            return self.hints.told.sure, f"joints {block.how}, {self.hints.told.why}"
         if block.how in (BY_NUMBER, BY_PLACE) and self.hints.joints is None:
             return LIKELY, f"joints {block.how}, in the robot's order"
         if block.how in (BY_NUMBER, BY_PLACE):
@@ -185,8 +189,12 @@ class View:
         self, group: str, names: list[str], block: Block, units: UnitChoice, why: list[str], sure: str = SURE
     ) -> None:
         order, how = self.order(block)
-        level = UNKNOWN if UNKNOWN in (units.sure, sure) else LIKELY if LIKELY in (units.sure, sure, order) else SURE
-        text = "; ".join(w for w in (*why, how, units.why) if w)
+        self.taken |= {*block.columns}
+        found = (units.sure, sure, order)
+        level = UNKNOWN if UNKNOWN in found else LIKELY if LIKELY in found else SURE
+        # A mapping with an order that is open must not be taken as it stands.
+        which = {"column": "???"} if order == UNKNOWN else {}
+        text = "; ".join(w for w in (block.name * bool(which), *why, how, units.why) if w)
         for name, k in zip(names, range(len(self.joints)), strict=True):
             if not name:
                 continue
@@ -195,7 +203,9 @@ class View:
             empty = empty_cells(block.table, block.columns[k])
             how = "the last value holds" if group == "commands" else "filled by straight lines"
             filled = f"; {empty} of {len(block.table)} cells are empty, {how}" if empty else ""
-            self.out.choices.append(Choice(group, name, self.entry(block, k, more), level, text + still + filled))
+            self.out.choices.append(
+                Choice(group, name, self.entry(block, k, more) | which, level, text + still + filled)
+            )
 
     def sensor_names(self, kind: str) -> list[str]:
         """The sensor of a kind at each driven joint, "" where there is none."""

@@ -1,0 +1,72 @@
+"""Speeds that are not the change of their positions by one number at all joints: the time is off, or they are scaled."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import measurement_files as samples
+import numpy as np
+import pandas as pd
+import pytest
+import small_logs as logs
+
+from ee_dist.measurements.suspicious import pace_suspicion
+
+STEP_S = 0.01
+T = np.arange(3000) * STEP_S
+POSITION = np.stack([0.5 * np.sin(9 * T), 0.3 * np.sin(21 * T + 1), 0.4 * np.cos(37 * T)], axis=1)
+SPEED = np.stack([4.5 * np.cos(9 * T), 6.3 * np.cos(21 * T + 1), -14.8 * np.sin(37 * T)], axis=1)
+
+
+def said(speed: np.ndarray, position: np.ndarray = POSITION) -> str | None:
+    return pace_suspicion(speed, position, STEP_S, 1 / STEP_S)
+
+
+@pytest.mark.parametrize("ratio", [1.14, 1.07, 0.9])
+def test_one_number_at_all_joints_is_told_with_both_explanations(ratio: float) -> None:
+    note = said(ratio * SPEED)
+    assert note is not None
+    assert f"speeds: {ratio:.3g} times the change of the positions at 3 joints" in note
+    assert f"rows would come at {100 * ratio:.4g} Hz, not 100" in note and "the speeds are scaled" in note
+
+
+def test_what_agrees_differs_from_joint_to_joint_or_is_another_unit_is_not_told() -> None:
+    assert said(SPEED) is None
+    assert said(1.03 * SPEED) is None
+    assert said(SPEED * [1.2, 0.85, 1.2]) is None
+    assert said(SPEED * [1.0, 1.2, 1.2]) is None
+    assert said(57.3 * SPEED) is None  # told joint by joint
+    assert said(-1.2 * SPEED) is None
+
+
+def test_rounding_noise_lags_and_slow_joints_are_no_other_pace() -> None:
+    rng = np.random.default_rng(0)
+    assert said(np.round(SPEED / 3) * 3) is None
+    assert said(SPEED, np.round(POSITION / 0.1) * 0.1) is None
+    assert said(SPEED + 5 * rng.standard_normal(SPEED.shape)) is None
+    slow = 0.01 * np.sin(0.3 * T)[:, None]
+    assert said(0.003 * np.cos(0.3 * T)[:, None], np.round(slow / 0.002) * 0.002) is None
+    # A filter of first order takes from the size as it delays.
+    filtered = np.zeros_like(SPEED)
+    for k in range(1, len(T)):
+        filtered[k] = filtered[k - 1] + STEP_S / (0.03 + STEP_S) * (SPEED[k] - filtered[k - 1])
+    assert said(filtered) is None
+    assert said(SPEED[:2], POSITION[:2]) is None
+
+
+def test_an_import_tells_it_once_and_does_not_say_that_speeds_agree(tmp_path: Path) -> None:
+    m = samples.motion()
+    frame = {"t": m["t"]} | {f"{k}{j}": m[k][:, j] * (1.2 if k == "w" else 1.0) for k in "qwg" for j in (0, 1)}
+    file = logs.written(tmp_path, pd.DataFrame(frame))
+    _, report = logs.imported(tmp_path, file)
+    (line,) = (s for s in report.suspicious if s.startswith("speeds: "))
+    assert "1.2 times" in line and "120 Hz, not 100" in line
+    _, proposal = logs.proposed(tmp_path, file)
+    assert not any("speeds agree" in c.why for c in proposal.choices)
+
+
+def test_speeds_that_are_estimated_are_of_that_pace(tmp_path: Path) -> None:
+    m = samples.motion()
+    frame = pd.DataFrame({"t": m["t"]} | {f"{k}{j}": m[k][:, j] for k in "qg" for j in (0, 1)})
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, frame))
+    assert not any("speeds" in s for s in report.suspicious)

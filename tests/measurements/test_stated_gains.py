@@ -1,0 +1,106 @@
+"""A gain that a log states takes the place of one that the description only assumed, and is told; nobody's word is overruled."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import measurement_files as samples
+import numpy as np
+import pandas as pd
+import pytest
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.mapping import Mapping
+from ee_dist.measurements.mapping_file import mapping_of, read_mapping
+from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.model import Hints, Proposal
+from ee_dist.measurements.proposal.write import as_yaml
+from ee_dist.measurements.stated_gains import with_gains
+from ee_dist.robots.describe import load_robot
+from ee_dist.robots.model import Robot
+
+
+def robot_of(folder: Path, shoulder: str, elbow: str) -> Robot:
+    described = samples.robot_file(folder)
+    drives = f"drives:\n  shoulder: {{{shoulder}}}\n  elbow: {{{elbow}}}\n"
+    described.write_text(described.read_text().split("drives:")[0] + drives)
+    return load_robot(described)[0]
+
+
+def proposed(folder: Path, robot: Robot, **constant: object) -> Proposal:
+    m = samples.motion()
+    rows = {"t": m["t"]} | {f"{k}{j}": m[k][:, j] for k in "qwg" for j in (0, 1)}
+    pd.DataFrame(rows | constant).to_csv(folder / "log.csv", index=False)
+    return proposal_for([folder / "log.csv"], robot, Hints())
+
+
+def mapped(folder: Path, proposal: Proposal) -> Mapping:
+    (folder / "mapping.yaml").write_text(as_yaml(proposal, None, "log"))
+    return read_mapping(folder / "mapping.yaml")
+
+
+ASSUMED = "kp: 240, kd: 8, assumed: [kp, kd, rotor_inertia]"
+
+
+def test_assumed_gains_give_way_to_those_of_the_log(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, ASSUMED, ASSUMED.replace("240", "450"))
+    found = proposed(tmp_path, robot, kp=20, kd=0.5)
+    (note,) = (n for n in found.notes if "kp" in n and "not used" not in n)
+    assert "the log states kp 20 and kd 0.5, where the description only assumes kp 240, 450 and kd 8" in note
+    assert "write {kp: 20, kd: 0.5} at every drive of the description and take kp and kd off 'assumed'" in note
+    assert not any(n.startswith("columns not used") for n in found.notes)
+    made, remarks = with_gains(robot, mapped(tmp_path, found))
+    assert [(d.kp, d.kd) for d in made.drives] == [(20.0, 0.5)] * 2
+    assert made.assumed == (("shoulder", "rotor_inertia"), ("elbow", "rotor_inertia"))
+    assert not remarks
+
+
+def test_of_drives_only_those_that_were_assumed(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, ASSUMED, "kp: 30, kd: 1")
+    found = proposed(tmp_path, robot, kp=20)
+    assert any("write {kp: 20} at the drives of shoulder" in n for n in found.notes)
+    assert any("kp is 20 in all trials: the description's gain is taken for it" in n for n in found.notes)
+    made, _ = with_gains(robot, mapped(tmp_path, found))
+    assert [(d.kp, d.kd) for d in made.drives] == [(20.0, 8.0), (30.0, 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("drive", "kp", "said"),
+    [
+        ("kp: 30, kd: 1", 20, "kp is 20 in all trials: the description's gain is taken for it"),
+        ("kp: 5, assumed: [kp]", 800, "too far off to be taken for the same unit; if it is, write 'kp: 800'"),
+        (ASSUMED, np.linspace(10, 20, samples.ROWS), ""),
+    ],
+)
+def test_what_somebody_vouches_for_and_what_cannot_be_a_gain_stay(
+    tmp_path: Path, drive: str, kp: object, said: str
+) -> None:
+    robot = robot_of(tmp_path, drive, drive)
+    found = proposed(tmp_path, robot, kp=kp)
+    assert any(said in n for n in found.notes)
+    assert "gains" not in found.head
+    assert with_gains(robot, mapped(tmp_path, found))[0] is robot
+
+
+@pytest.mark.parametrize(
+    ("gains", "said"),
+    [
+        ({"elbo": {"kp": 2}}, "gains: chain has no driven joint 'elbo'; did you mean elbow"),
+        ({"elbow": {"pk": 2}}, "gains: elbow: unknown key 'pk'; did you mean kp"),
+        ({"elbow": {"kp": -2}}, "gains: elbow: kp: expected 0 or more, not -2"),
+        ({"elbow": 2}, "gains: elbow: expected 'name: number', not 2"),
+        ([2], "gains: expected 'name: {kp: number, kd: number}', not [2]"),
+    ],
+)
+def test_gains_of_a_mapping_that_cannot_be(tmp_path: Path, gains: object, said: str) -> None:
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    with pytest.raises(MeasurementError) as error:
+        with_gains(robot, mapping_of({"sensors": {}, "gains": gains}, tmp_path / "m.yaml"))
+    assert said in str(error.value)
+
+
+def test_gains_that_the_time_step_does_not_resolve_are_remarked(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, "kp: 0.1, speed_limit: 1000", "kp: 0.1, speed_limit: 1000")
+    mapping = mapping_of({"sensors": {}, "gains": {"all_joints": {"kp": 200}}}, tmp_path / "m.yaml")
+    (remark,) = with_gains(robot, mapping)[1]
+    assert "too coarse for its controllers" in remark
