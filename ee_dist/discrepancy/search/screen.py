@@ -73,8 +73,8 @@ def screen(
     first = len(small) / (len(small) + (every - len(small)) / (3 if len(pool) > FURTHER else 1))
     ask(alone, small, 0.0, first)
     further = _further(pool, rows)
-    both = [c.guess or alone.far for c in pool]
-    ask(alone, [(i, u) for i in further for u in _larger(pool[i], shares, rows[i], both[i])], first, 0.9)
+    far = alone.far
+    ask(alone, [(i, u) for i in further for u in _larger(pool[i], shares, rows[i], far or pool[i].guess)], first, 0.9)
     if whole is not alone:
         hidden = [i for i, found in enumerate(rows) if not any(p.shows for p in found)]
         ask(whole, [(i, u) for i in hidden for u in pool[i].probes((max(shares),))], 0.9, 1.0)
