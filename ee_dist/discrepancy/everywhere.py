@@ -82,10 +82,11 @@ def everywhere(
     # Of what was added last the most is not yet decided.
     alike = [t for t in reversed(twins) if again and stands_out(robot, current.parts[t[0]])][:TWINS]
     for keep in begun:
+        bare = not keep[own:]
         for base in _with_twins(current, places, keep, alike):
-            other = look.kept(base, more=not keep[own:], beside_all=not keep[own:] and not again)
+            other = look.kept(base, more=bare, beside_all=bare and not again)
             if other is not None and (
-                found is None or other.held < found.held + (0.0 if keep[own:] else look.luck(other.held))
+                found is None or other.held < found.held + (look.luck(other.held) if bare else 0.0)
             ):
                 found = other
     return look.steps(found) if found is not None else None

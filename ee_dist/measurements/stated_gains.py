@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ee_dist.effects.groups import ALL_JOINTS
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Mapping
 from ee_dist.robots.model import Robot
 from ee_dist.robots.time_step import too_coarse
-
-ALL = "all_joints"
 
 
 def with_gains(robot: Robot, mapping: Mapping) -> tuple[Robot, Sequence[str]]:
@@ -18,12 +17,12 @@ def with_gains(robot: Robot, mapping: Mapping) -> tuple[Robot, Sequence[str]]:
     if not mapping.gains:
         return robot, ()
     for joint in mapping.gains:
-        if joint not in (ALL, *robot.motor_names):
+        if joint not in (ALL_JOINTS, *robot.motor_names):
             raise MeasurementError(
                 f"{mapping.source}: gains: {robot.name} has no driven joint {joint!r}; "
-                f"{nearest(joint, (*robot.motor_names, ALL))}"
+                f"{nearest(joint, (*robot.motor_names, ALL_JOINTS))}"
             )
-    given = {m: {**mapping.gains.get(ALL, {}), **mapping.gains.get(m, {})} for m in robot.motor_names}
+    given = {m: {**mapping.gains.get(ALL_JOINTS, {}), **mapping.gains.get(m, {})} for m in robot.motor_names}
     drives = tuple(replace(d, **given[d.joint]) for d in robot.drives)  # type: ignore[arg-type]
     assumed = tuple((j, name) for j, name in robot.assumed if name not in given.get(j, {}))
     found = replace(robot, drives=drives, assumed=assumed)

@@ -158,7 +158,7 @@ def _at_bounds(best: Judged, robot: Robot) -> str:
             if said and called not in by_words.setdefault(said, []):
                 by_words[said].append(called)
         at += c.size
-    return "".join(f" Its {' and '.join(names)} ended {said}." for said, names in by_words.items() if names)
+    return "".join(f" Its {' and '.join(names)} ended {said}." for said, names in by_words.items())
 
 
 def _counted_right(confidence: float | None) -> str:

@@ -58,6 +58,11 @@ class Block:
         return f"{self.table.name}: {short}" if self.table.name else short
 
     @property
+    def numbered(self) -> bool:
+        """Whether only numbers or places tell its joints apart."""
+        return self.how in (BY_NUMBER, BY_PLACE)
+
+    @property
     def unit(self) -> str | None:
         return self.units[0] if len(set(self.units)) == 1 else None
 

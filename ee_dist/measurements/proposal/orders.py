@@ -15,7 +15,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.measurements import signals
 from ee_dist.measurements.need import beside_need, torques_needed
-from ee_dist.measurements.proposal.blocks import BY_NUMBER, BY_PLACE, Block
+from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SHARE, UNKNOWN, Hints, Told
 from ee_dist.measurements.proposal.torques import CLEARLY, WELL
 from ee_dist.measurements.proposal.units import ANGLES, LENGTHS
@@ -88,11 +88,11 @@ def told_by_data(v: View) -> Hints | None:
     block = v.position.block
     if v.hints.joints is not None or len(orders) < 2:
         return None
-    if _numbered(block):
+    if block.numbered:
         ways = _within_limits(v, orders)
         left = [w.order for w in ways if w.beyond <= OUT] or orders
     else:
-        followers = [b for b in v.blocks if _numbered(b) and (b.reading.kind == SPEED or b.reading.command)]
+        followers = [b for b in v.blocks if b.numbered and (b.reading.kind == SPEED or b.reading.command)]
         if not followers:
             return None
         block, ways = followers[0], []
@@ -128,10 +128,6 @@ def told_by_data(v: View) -> Hints | None:
     )  # fmt: skip
 
 
-def _numbered(block: Block) -> bool:
-    return block.how in (BY_NUMBER, BY_PLACE)
-
-
 def _places(v: View, order: Order) -> list[int]:
     """The column that each joint has, of those in the robot's order."""
     return [order.names.index(m) for m in v.robot.motor_names]
@@ -139,7 +135,7 @@ def _places(v: View, order: Order) -> list[int]:
 
 def _placed(v: View, block: Block, order: Order) -> Block:
     """A block as it would be in an order; what is named stays."""
-    if not _numbered(block):
+    if not block.numbered:
         return block
     places = _places(v, order)
     return replace(
@@ -201,7 +197,7 @@ def _with_positions(v: View, followers: Sequence[Block], orders: Sequence[Order]
 def _by_need(v: View, orders: list[Order]) -> list[Order]:
     """The one order in which measured torques are what the motion needs by the model, if there is one; else all."""
     torques = [
-        b for b in v.blocks if _numbered(b) and b.reading.kind == TORQUE and not b.reading.command and not b.reading.weak
+        b for b in v.blocks if b.numbered and b.reading.kind == TORQUE and not b.reading.command and not b.reading.weak
     ]  # fmt: skip
     if len(torques) != 1 or not any(signals.moves(c) for c in torques[0].values.T):
         return orders

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from ee_dist.basics.names import listed
+from ee_dist.effects.groups import ALL_JOINTS
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.model import LIKELY, Choice, Proposal
 from ee_dist.measurements.proposal.words import tokens
 from ee_dist.measurements.readers import read
-from ee_dist.measurements.stated_gains import ALL
 from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.robots.model import Robot
 
@@ -85,7 +85,7 @@ def _known(
     key = KEYS[effect]
     guessed = {
         d.joint: getattr(d, key) for d in robot.drives
-        if target in (ALL, d.joint) and (d.joint, key) in robot.assumed
+        if target in (ALL_JOINTS, d.joint) and (d.joint, key) in robot.assumed
     }  # fmt: skip
     if not guessed:
         return False
@@ -96,10 +96,10 @@ def _known(
             f"take {key} off 'assumed'"
         )
         return True
-    for joint in [ALL] if len(guessed) == len(robot.drives) else guessed:
+    for joint in [ALL_JOINTS] if len(guessed) == len(robot.drives) else guessed:
         known.setdefault(joint, {})[key] = value
     proposal.unused[:] = [column for column in proposal.unused if column != name]
-    return len(guessed) == len(robot.drives) or target != ALL
+    return len(guessed) == len(robot.drives) or target != ALL_JOINTS
 
 
 def _offered(known: dict[str, dict[str, float]], robot: Robot) -> str:
@@ -110,7 +110,7 @@ def _offered(known: dict[str, dict[str, float]], robot: Robot) -> str:
         f"{k} {_listed([getattr(d, k) for d in robot.drives if (d.joint, k) in robot.assumed])}" for k in keys
     )
     entries = dict.fromkeys(", ".join(f"{k}: {v:g}" for k, v in gains.items()) for gains in known.values())
-    where = "every drive" if [*known] == [ALL] else f"the drives of {listed(known)}"
+    where = "every drive" if [*known] == [ALL_JOINTS] else f"the drives of {listed(known)}"
     off = " and ".join(keys)
     return (
         f"the log states {stated}, where the description only assumes {guessed}: the recorded robot gets those of the log "
@@ -178,7 +178,7 @@ def _gain(name: str, robot: Robot) -> tuple[str, str] | None:
     if not rest:
         if len(robot.drives) == 1:
             return (effect, able[0]) if able else None
-        return (effect, ALL) if len(able) == len(robot.drives) else None
+        return (effect, ALL_JOINTS) if len(able) == len(robot.drives) else None
     of_joint = [j for j in able if [w for w in tokens(j) if w not in FILLING] == rest]
     return (effect, of_joint[0]) if len(of_joint) == 1 else None
 

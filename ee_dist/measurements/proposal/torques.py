@@ -9,7 +9,7 @@ import numpy as np
 
 from ee_dist.measurements import signals
 from ee_dist.measurements.need import beside_need, torques_needed
-from ee_dist.measurements.proposal.blocks import BY_NUMBER, BY_PLACE, Block
+from ee_dist.measurements.proposal.blocks import BY_PLACE, Block
 from ee_dist.measurements.proposal.model import FIT, LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.view import Scored, View
@@ -50,7 +50,7 @@ def _beside_need(v: View, block: Block, places: list[int] | None = None) -> list
 def _check_order(v: View, block: Block) -> None:
     """Asks for the order of the joints where torques go with the motion in another order than the robot's."""
     count = len(v.joints)
-    if block.how not in (BY_NUMBER, BY_PLACE) or v.hints.joints is not None or count < 2:
+    if not block.numbered or v.hints.joints is not None or count < 2:
         return
     own = list(range(count))
     orders = [list(p) for p in permutations(own)] if count <= 3 else [own, own[::-1]]

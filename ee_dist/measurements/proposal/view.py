@@ -12,8 +12,6 @@ from ee_dist.measurements import signals
 from ee_dist.measurements.alignment import match, one_clock
 from ee_dist.measurements.proposal.blocks import (
     BY_NAME,
-    BY_NUMBER,
-    BY_PLACE,
     BY_SENSOR,
     Block,
     blocks_of,
@@ -172,13 +170,15 @@ class View:
 
     def order(self, block: Block) -> tuple[str, str]:
         """How sure the joints of a block are, and why."""
-        if block.how in (BY_NUMBER, BY_PLACE) and self.hints.told is not None:
+        if not block.numbered:
+            return SURE, {BY_NAME: "joint by its name", BY_SENSOR: "called as the robot's sensors are"}.get(
+                block.how, ""
+            )
+        if self.hints.told is not None:
             return self.hints.told.sure, f"joints {block.how}, {self.hints.told.why}"
-        if block.how in (BY_NUMBER, BY_PLACE) and self.hints.joints is None:
+        if self.hints.joints is None:
             return LIKELY, f"joints {block.how}, in the robot's order"
-        if block.how in (BY_NUMBER, BY_PLACE):
-            return SURE, "joints in the order you said"
-        return SURE, {BY_NAME: "joint by its name", BY_SENSOR: "called as the robot's sensors are"}.get(block.how, "")
+        return SURE, "joints in the order you said"
 
     def entry(self, block: Block, k: int, more: dict[str, Any]) -> dict[str, Any]:
         place = {"table": block.table.name} if len(self.recorded.tables) > 1 else {}
