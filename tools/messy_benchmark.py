@@ -1,21 +1,24 @@
 """Is the verdict right about robots that are a little wrong everywhere, as all real ones are?
 
-    python tools/messy_benchmark.py --size middle --cases 60 --robot servo_pendulum --seed 0 --json messy.json
+    python tools/messy_benchmark.py --size middle --cases 60 --robot servo_pendulum --seed 0 --out messy.jsonl
+    python tools/messy_benchmark.py --report messy.jsonl
 
 Every part's mass, every joint's friction, offset, gain and delay are off by draws of the ``--size``; on top of that a hidden
 effect of the catalogue, larger than all that is wrong at its joint together, except in every fourth robot. ``improve
 effect=auto`` sees three motions; two others are held out from all of it. Scored are the name of the hidden effect, wrong
-names, the error on the motions held out, and whether 95 % intervals hold what is true.
+names, the error on the motions held out, and whether 95 % intervals hold what is true. ``--out`` takes each case once it is done
+and leaves out those that it has, so that a benchmark of many hours goes on where it was stopped.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -24,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 from benchmarks.arm6 import desk_arm_6
-from benchmarks.cases import tried, write_cases
+from benchmarks.cases import tried
 
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.importance import added, shares
@@ -52,6 +55,8 @@ SIZES = {"small": 0.25, "middle": 0.5, "large": 1.0}
 gains off by up to 10 %, delays of up to 10 ms."""
 ATTEMPTS = 40
 """Draws of a hidden effect until one stands out."""
+SETTINGS = ("robot", "size", "by", "seed", "noise", "seconds", "beyond")
+"""What makes a case another one."""
 
 
 @dataclass(frozen=True)
@@ -202,15 +207,29 @@ class Bench:
         return hidden.name in named or any(f"{hidden.name.split('@')[0]}@each" in n for n in named)
 
 
-def run(bench: Bench) -> Iterator[Case]:
+def run(bench: Bench, done: set[int]) -> Iterator[Case]:
     for k in range(bench.args.cases):
-        try:
-            yield bench.case(k)
-        except EngineError as problem:
-            print(f"{k + 1:4d}  skipped: {problem}", flush=True)
+        if k not in done:
+            try:
+                yield bench.case(k)
+            except EngineError as problem:
+                print(f"{k + 1:4d}  skipped: {problem}", flush=True)
 
 
-def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, object]:
+def settings_of(args: argparse.Namespace) -> dict[str, object]:
+    return {name: getattr(args, name) for name in SETTINGS}
+
+
+def kept(path: Path) -> list[tuple[dict[str, object], Case]]:
+    """The cases of a file with what was asked for them."""
+    found = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        row = json.loads(line)
+        found.append((row["settings"], Case(**row["case"])))
+    return found
+
+
+def report(title: str, cases: Sequence[Case]) -> Mapping[str, float]:
     hidden = [c for c in cases if c.truth]
     ratios = sorted(c.ratio for c in cases)
     held = [h for c in cases for h in c.held]
@@ -218,20 +237,22 @@ def report(cases: Sequence[Case], args: argparse.Namespace) -> dict[str, object]
     def share(values: Sequence[bool | int]) -> float:
         return float(np.mean(values)) if values else float("nan")
 
-    found: dict[str, object] = {
+    found: dict[str, float] = {
         "cases": len(cases),
-        "hidden_within_names": share([c.within for c in hidden]),
-        "cases_with_a_wrong_name": share([bool(c.wrong) for c in cases]),
-        "cases_with_a_doubted_one": share([bool(c.doubted) for c in cases]),
-        "error_over_floor_before": float(np.median([c.before for c in cases])),
-        "error_over_floor_median": float(np.median(ratios)),
-        "error_over_floor_90": float(np.quantile(ratios, 0.9)),
-        "intervals_hold": share(held),
+        "with a hidden effect": len(hidden),
+        "hidden within names": share([c.within for c in hidden]),
+        "cases with a wrong name": share([bool(c.wrong) for c in cases]),
+        "cases with a doubted one": share([bool(c.doubted) for c in cases]),
+        "error over floor, before": float(np.median([c.before for c in cases])),
+        "error over floor, median": float(np.median(ratios)),
+        "error over floor, 90 %": float(np.quantile(ratios, 0.9)),
+        "intervals hold": share(held),
         "intervals": len(held),
+        "seconds, median": float(np.median([c.seconds for c in cases])),
     }
-    print(f"\n{args.robot}, {args.size}: {len(cases)} robots, {len(hidden)} with a hidden effect")
+    print(f"\n{title}")
     for key, value in found.items():
-        print(f"  {key.replace('_', ' '):<28}{value:.3g}")
+        print(f"  {key:<28}{value:.3g}")
     return found
 
 
@@ -247,18 +268,33 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", type=float, default=0.001, help="share of each channel's range")
     parser.add_argument("--seconds", type=float, default=4.0, help="length of a trial")
-    parser.add_argument("--json", type=Path)
+    parser.add_argument(
+        "--out", type=Path, help="a line of JSON for each case; those that are there are not made again"
+    )
+    parser.add_argument("--report", type=Path, nargs="+", help="only count what these files hold, by robot and size")
     args = parser.parse_args()
-    bench, cases = Bench(args), []
-    for case in run(bench):
+    if args.report:
+        groups: dict[str, list[Case]] = {}
+        for path in args.report:
+            for settings, case in kept(path):
+                title = f"{settings['robot']}, {settings['size']}, {settings['by']}, noise {settings['noise']}"
+                groups.setdefault(title, []).append(case)
+        for title, cases in sorted(groups.items()):
+            report(title, cases)
+        return 0
+    there = kept(args.out) if args.out and args.out.exists() else []
+    cases = [case for settings, case in there if settings == settings_of(args)]
+    for case in run(Bench(args), {c.index for c in cases}):
         cases.append(case)
+        if args.out:
+            with args.out.open("a", encoding="utf-8") as out:
+                out.write(json.dumps({"settings": settings_of(args), "case": asdict(case)}) + "\n")
         mark = "found" if case.truth and case.within else "missed" if case.truth else "-"
         print(f"{case.index + 1:4d}/{args.cases}  {case.truth or 'nothing more':<64.64} {mark:<7}"
               f"{case.before:6.2f} -> {case.ratio:5.2f} x floor {case.seconds:5.0f} s  "
               f"{'wrong: ' + ', '.join(case.wrong) if case.wrong else ''}"
               f"{'  doubted: ' + ', '.join(case.doubted) if case.doubted else ''}", flush=True)  # fmt: skip
-    found = report(cases, args)
-    write_cases(args, found, cases)
+    report(f"{args.robot}, {args.size}", cases)
     return 0
 
 
