@@ -6,7 +6,7 @@ them where twenty small ones would be right, and is caught there. This goes the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from ee_dist.discrepancy.examine import FAR, Current, calm_trials, telling
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment
 from ee_dist.discrepancy.pruning import pruned
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, possible
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.refit import Refit
@@ -27,11 +27,10 @@ from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.discrepancy.sharing import apart, distinct, shared, singles, taken_apart
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
-TWIN = 0.99
-"""Correlation of two effects' marks from which the data cannot hold them apart, and the one later in the catalogue stays out."""
 FEWEST = 3
 """Effects that must be there to be fitted at once."""
 WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
@@ -49,10 +48,12 @@ MOST_OF_IT = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Everywhere:
-    """The model with all that earned its place, and the steps that lead there, one a kind of effect."""
+    """The model with all that earned its place, the steps that lead there, one a kind of effect, and its energy on held-out
+    data."""
 
     current: Current
     rungs: list[Rung]
+    held: float
 
 
 def everywhere(
@@ -153,25 +154,40 @@ class _Look:
         """The base with all that is worth keeping, and (``more``), if need be, one effect beside; None where that is not worth
         more than the current model. ``beside_all``: the one effect is looked for also where much is left at one joint: small
         values that had to stand in for it are worth something too."""
-        robot = self.search.problem.robot
-        base = _apart(robot, base, self.own)
-        few = [c for c in self._others(Model(base.parts)) if c.effect.everywhere and not c.members(robot)]
-        few = _distinct(self.calm, base, beside(robot, base.parts, base.hypothesis, few))
-        if not few or len(base.parts) + len(few) < FEWEST:
+        problem = self.search.problem
+        single = apart(problem.robot, base, self.own)
+        fit = self._fit(single, singles(problem.robot, self._everywhere(single)))
+        if fit is None:
             return None
-        model, u = Model((*base.parts, *few)), np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
-        everything = self.calm.everything
-        widths = WIDTHS if len(u) >= MANY else MORE_WIDTHS
-        (fit,) = follow_valley(self.calm, [(model, u)], everything, PRIOR, widths=widths)
-        fit = over_ridges(self.calm, fit, PRIOR)
         alone = self._worth(fit, {})
+        if alone is None or alone.held > FAR**2 * float(problem.floor.sum()):
+            # Of a hundred values each may be worth no more than luck, where one number for all joints is worth much.
+            other = self._fit(base, shared(problem.robot, self._everywhere(base)))
+            together = self._worth(other, {}) if other is not None else None
+            if other is not None and together is not None and (alone is None or together.held < alone.held):
+                alone, fit, single = together, other, base
         if not more or (alone is not None and not (beside_all and self._one_sided(fit))):
             return alone
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
-        other = self._beside(model, u, fit)
-        if alone is None or other is None:
-            return other or alone
-        return other if other.held + self.luck(other.held) < alone.held else alone
+        beside_it = self._beside(fit, np.concatenate([single.u, np.zeros(len(fit.u) - len(single.u))]))
+        if alone is None or beside_it is None:
+            return beside_it or alone
+        return beside_it if beside_it.held + self.luck(beside_it.held) < alone.held else alone
+
+    def _everywhere(self, base: Current) -> list[Candidate]:
+        return [c for c in self._others(Model(base.parts)) if c.effect.everywhere]
+
+    def _fit(self, base: Current, few: Sequence[Candidate]) -> Fit | None:
+        """The base with all ``few`` that leave marks of their own, from neutral; None where these are too few to be fitted at
+        once."""
+        robot = self.search.problem.robot
+        few = distinct(self.calm, base, beside(robot, base.parts, base.hypothesis, few))
+        if not few or len(base.parts) + len(few) < FEWEST:
+            return None
+        model, u = Model((*base.parts, *few)), np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
+        widths = WIDTHS if len(u) >= MANY else MORE_WIDTHS
+        (fit,) = follow_valley(self.calm, [(model, u)], self.calm.everything, PRIOR, widths=widths)
+        return over_ridges(self.calm, fit, PRIOR)
 
     def _one_sided(self, fit: Fit) -> bool:
         """Whether much more than noise is left, and most of it at one joint."""
@@ -207,9 +223,9 @@ class _Look:
                 worst, energy = cut, float(judged.held.sum())
         return _Kept(kept, energy, worst, ties)
 
-    def _beside(self, model: Model, start: Array, alone: Fit) -> _Kept | None:
-        """The model with one more effect, of those that promise most on top of its fit ``alone``."""
-        search = self.calm
+    def _beside(self, alone: Fit, start: Array) -> _Kept | None:
+        """The model of a fit with one more effect, of those that promise most on top of it; all values from ``start`` (P,)."""
+        search, model = self.calm, alone.model
         refit = Refit(slopes_at(search, alone.model, alone.u))
         now = search.on(alone.hypothesis)
         screened = screen(now, possible(search.problem.robot, now.fixed, self._others(model)), refit=refit)
@@ -272,7 +288,7 @@ class _Look:
                 )
             )
             shown, energy = set(chosen), now
-        return Everywhere(kept, rungs)
+        return Everywhere(kept, rungs, found.held)
 
     def _order(self, kept: Current) -> list[str]:
         """Kinds of effect that are new, by what the model would lose without them."""
@@ -295,51 +311,6 @@ def _label(parts: Sequence[Candidate]) -> str:
         where = "parts" if mine[0].effect.family == "body" else "joints"
         names.append(mine[0].name if len(mine) == 1 else f"{kind}@each of {len(mine)} {where}")
     return " + ".join(names)
-
-
-def _apart(robot: Robot, current: Current, own: int) -> Current:
-    """The model with each shared effect of this kind taken apart into its members, with the values that they shared. One that
-    puts assumed drives right stays: members differ from it by a little, and not from what was assumed."""
-
-    parts: list[Candidate] = []
-    values: list[Array] = []
-    for k, (c, place) in enumerate(zip(current.parts, Model(current.parts).places, strict=True)):
-        u = current.u[place]
-        if k < own or not c.effect.everywhere or not c.members(robot) or puts_right(robot, c):
-            parts.append(c)
-            values.append(u)
-            continue
-        for target in c.members(robot):
-            member = candidate(robot, c.effect, target)
-            if member.name not in {p.name for p in (*parts, *current.parts)}:
-                parts.append(member)
-                values.append(np.clip(member.shares(c.values(u)), member.lower, member.upper))
-    return Current(tuple(parts), np.concatenate([*values, np.zeros(0)]))
-
-
-def taken_apart(robot: Robot, c: Candidate) -> list[str]:
-    """Names of a shared effect's members."""
-    return [f"{c.effect.name}@{m}" for m in c.members(robot)]
-
-
-def _distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[Candidate]:
-    """Those whose mark shows, and is not that of another."""
-    few = list(few)
-    model = Model((*base.parts, *few))
-    start = np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
-    marks = slopes_at(search, model, start, 0.02)
-    size = np.linalg.norm(marks, axis=0)
-    shows = size > 1e-3 * max(float(size.max(initial=0.0)), 1e-12)
-    marks = marks / np.maximum(size, 1e-12)
-    places, kept = Model(model.parts).places, list(range(len(base.u)))
-    found = []
-    for c, place in zip(few, places[len(base.parts) :], strict=True):
-        mine = range(place.start, place.stop)
-        alike = np.abs(marks[:, kept].T @ marks[:, place]) if kept else np.zeros((1, c.size))
-        if shows[place].all() and float(alike.max(initial=0.0)) < TWIN:
-            found.append(c)
-            kept += mine
-    return found
 
 
 def _values(u: Array, places: Sequence[slice], chosen: Sequence[int]) -> Array:

@@ -108,7 +108,8 @@ def improve(
                 twins = [(k, p.parts[0], u) for k, p, u in _twins(current, ladder, own)]
                 found = everywhere(search, current, own, pool, travelling(problem), spread > 0, twins)
                 looked, anew, beside = len(current.parts), anew + (spread > 0), special
-                if found is not None:
+                # Where a single one does more than all of them, it goes first.
+                if found is not None and (best is None or found.held < float(best.held.sum())):
                     current, looked, spread = found.current, len(found.current.parts), spread + 1
                     for rung in found.rungs:
                         climb(rung)

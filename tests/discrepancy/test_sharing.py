@@ -1,0 +1,64 @@
+"""One number for all joints where a number for each is no more than luck."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.everywhere import everywhere
+from ee_dist.discrepancy.evidence.holdout import travelling
+from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.search.candidates import Candidate, candidates
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.sharing import shared, singles
+from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.effects.groups import members_of
+from tests.discrepancy.linear_problem import ROBOT, Linear
+
+KINDS = ("coulomb_friction", "viscous_friction", "command_gain")
+JOINTS = tuple(d.joint for d in ROBOT.drives)
+
+
+class Legs(Linear):
+    """What a shared effect does is the sum of what it does at its joints."""
+
+    def shift(self, hypothesis: Hypothesis):
+        apart = []
+        for t in hypothesis:
+            at = members_of(ROBOT, t.target, JOINTS) or (t.target,)
+            apart += [term(t.effect, joint, **dict(t.values)) for joint in at]
+        return super().shift(tuple(apart))
+
+
+def pool_of() -> list[Candidate]:
+    return candidates(ROBOT, only=KINDS)
+
+
+def found_in(problem: Linear):
+    return everywhere(Search(problem), Current(), 0, pool_of(), travelling(problem))
+
+
+def test_what_all_joints_have_in_common_is_found_though_no_joint_tells_it():
+    """What is left beside is so much that the friction of one joint could be luck."""
+    hidden = tuple(term("viscous_friction", j, damping_nm_s_rad=0.25 + 0.02 * (k % 3)) for k, j in enumerate(JOINTS))
+    found = found_in(Legs(hidden, extra=7.0, motions=4))
+    assert found is not None
+    (only,) = found.current.parts
+    assert only.name == "viscous_friction@all_joints"
+    assert only.values(found.current.u)["damping_nm_s_rad"] == pytest.approx(0.27, abs=0.05)
+
+
+def test_joints_that_differ_keep_a_number_of_their_own():
+    hidden = tuple(term("viscous_friction", j, damping_nm_s_rad=0.1 * (k % 3)) for k, j in enumerate(JOINTS))
+    found = found_in(Legs(hidden, motions=4))
+    assert found is not None
+    assert {c.name for c in found.current.parts} == {f"viscous_friction@{t.target}" for t in hidden if t.values[0][1]}
+
+
+def test_each_kind_is_shared_as_widely_as_it_may_be():
+    wide = shared(ROBOT, pool_of())
+    assert {c.name for c in wide} == {f"{kind}@all_joints" for kind in KINDS}
+    alone = singles(ROBOT, pool_of())
+    assert {c.target for c in alone} == set(JOINTS)
+    assert shared(ROBOT, alone) == alone, "what nobody shares stays as it is"
+    assert np.isin([c.effect.name for c in alone], KINDS).all()
