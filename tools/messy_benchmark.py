@@ -190,7 +190,7 @@ class Bench:
         doubted = {t.name for s in shares(result, self.robot) if s.doubted for t in s.terms}
         doubted |= {t.name for rung in steps if rung.tied_with for t in rung.added}
         for t in added(result):
-            if not any((t.effect, p) in at for p in self.places(t)):
+            if not any((t.effect, p) in at for p in (t.target, *self.places(t))):
                 (found.doubted if t.name in doubted else found.wrong).append(t.name)
         found.shared = any(len(self.places(t)) > 1 for t in result.terms)
         for p in result.parameters:
