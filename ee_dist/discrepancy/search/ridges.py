@@ -12,6 +12,7 @@ import numpy as np
 
 from ee_dist.discrepancy.search.fitted import Fit
 from ee_dist.discrepancy.search.race import race
+from ee_dist.discrepancy.search.rows import over_rows
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.trials.log import Array
@@ -35,10 +36,12 @@ def over_ridges(search: Search, fit: Fit, prior: float = 0.0) -> Fit:
     floor = float(search.problem.floor[fit.mask].sum())
     for _ in range(ROUNDS):
         wanted = fit.energy - PROMISE * max(fit.energy - floor, 0.0)
-        starts = _beyond(search, fit, wanted, prior) if fit.energy > NOISE * floor else []
-        if not starts:
+        if fit.energy <= NOISE * floor:
             break
-        best = race(search, [(fit.model, u) for u in starts], fit.mask, HEATS, prior, WIDTH)[0]
+        starts = _beyond(search, fit, wanted, prior)
+        best = race(search, [(fit.model, u) for u in starts], fit.mask, HEATS, prior, WIDTH)[0] if starts else fit
+        if not best.energy < wanted:
+            best = over_rows(search, fit, wanted, prior)
         if not best.energy < wanted:
             break
         fit = best
