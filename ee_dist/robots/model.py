@@ -87,6 +87,8 @@ class Joint:
     where it starts if zero is out of its range."""
     top_speed: float = float("inf")
     """Highest speed that a data sheet states, rad/s (m/s for a slide): a scale for what is measured; it limits nothing."""
+    lag_s: float = 0.0
+    """By how much readings were seen to follow commands: a scale for delays that are worth trying; it delays nothing."""
     start: float = 0.0
     """Where the joint stands when a rollout begins that does not say otherwise, rad (m)."""
 

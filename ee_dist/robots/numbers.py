@@ -95,6 +95,7 @@ def checked(robot: Robot, where: str) -> Robot:
             raise RobotError(f"{here}: limits {j.lower:g} to {j.upper:g} and axis {j.axis}: nothing can move there")
         _within(j.freedom, (0.0, 1.0), f"{here}: freedom")
         _within(j.top_speed, (1e-12, math.inf), f"{here}: top_speed")
+        _within(j.lag_s, (0.0, 1e3), f"{here}: lag_s")
         _within(j.start, ANY, f"{here}: start")
     for d in robot.drives:
         here = f"{where}: drives: {d.joint}"

@@ -12,6 +12,7 @@ import numpy as np
 from ee_dist.basics.files import real
 from ee_dist.basics.names import nearest
 from ee_dist.basics.quoted import quoted
+from ee_dist.discrepancy.lags import with_lags
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
 from ee_dist.discrepancy.ways.open_loop.scale import channel_scale
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, from_entries
@@ -93,7 +94,8 @@ def load(config: Config) -> Measurements:
         # By name only where the name says all: a log may bring sensors of its own, or a body with other numbers.
         named = robot.name in BUILT_IN and not differences(BUILT_IN[robot.name](), robot)
         source = robot.name if named else robot
-        return Measurements(robot, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks))
+        lagged = with_lags(robot, trials)
+        return Measurements(lagged, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks))
     believed = read_model(config.model)
     robot, different = agreed(believed.robot, robot, f"model={config.model}")
     robot = _with_room(robot, trials, remarks)
@@ -102,7 +104,7 @@ def load(config: Config) -> Measurements:
     apply(robot, believed.terms)
     left, gained, by = _calibration(Path(config.model), robot)
     return Measurements(
-        robot,
+        with_lags(robot, trials),
         tuple(trials),
         tuple(files),
         believed.terms,

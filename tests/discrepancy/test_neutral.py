@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from linear_problem import ROBOT
+import pytest
+from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy.accounts.of_improve import has
+from ee_dist.discrepancy.evidence.intervals import BOUND, NEUTRAL, NOT_DETERMINED, parameters
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.pruning import without_neutral
 from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.fitted import Fit, Model
 
 
 def test_terms_at_neutral_leave_the_model_and_the_others_stay() -> None:
@@ -33,3 +36,24 @@ def test_a_rival_that_came_into_the_model_later_is_no_rival() -> None:
     assert not has(names, "viscous_friction@base")
     assert not has(names, "viscous_friction@each of 3 joints")
     assert not has(names, "load_friction@elbow + quadratic_friction@elbow")
+
+
+@pytest.mark.parametrize(
+    ("u", "slope", "flag"),
+    [
+        (1.0, 0.0, f"{BOUND}; {NOT_DETERMINED}"),
+        (1.0, 30.0, BOUND),
+        (0.5, 0.0, NOT_DETERMINED),
+        (0.5, 30.0, ""),
+        (0.001, 30.0, NEUTRAL),
+    ],
+)
+def test_a_value_at_its_bound_is_told_so_whatever_its_slope_there(u: float, slope: float, flag: str) -> None:
+    """Past a bound the data may say much of what they do not say at it."""
+    problem = Linear((), motions=4)
+    n = len(problem.data)
+    model = Model((candidate(ROBOT, "viscous_friction", ROBOT.motor_names[0]),))
+    slopes = slope * np.random.default_rng(0).standard_normal((n, 1))
+    fit = Fit(model, np.array([u]), float(n), problem.data, slopes, np.ones(n, dtype=bool))
+    (told,) = parameters(problem, fit)
+    assert told.flag == flag

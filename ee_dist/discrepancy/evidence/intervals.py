@@ -61,12 +61,13 @@ def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = ()) -> lis
         for k, (name, value) in enumerate(term.values):
             room = abs(float(rooms[k]))
             half = float(w[k]) * room if np.isfinite(w[k]) else math.inf
-            flag = ""
-            # By the data alone: what earned its place is told, though something else may have gone into its value.
+            # By the data alone: what earned its place is told, though something else may have gone into its value. At a bound the
+            # slope is of one side, and may say next to nothing of a value that the other side would tell.
+            flag = at_bound(c, k, float(u[k]))
             if not np.isfinite(s[k]) or float(s[k]) * room > max(room, 1e-12):
-                flag = NOT_DETERMINED
-            else:
-                flag = at_bound(c, k, float(u[k])) or (NEUTRAL if abs(u[k]) < s[k] else "")
+                flag = f"{flag}; {NOT_DETERMINED}" if flag else NOT_DETERMINED
+            elif not flag and abs(u[k]) < s[k]:
+                flag = NEUTRAL
             doubt = "" if w[k] <= s[k] else ALL_OF_IT if abs(u[k]) < w[k] else WIDER
             low, high = value - half, value + half
             if math.isfinite(half):  # no farther than physics allows

@@ -1,0 +1,64 @@
+"""How long a delay is worth trying: by how much readings were seen to follow commands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.lags import with_lags
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.effects.scales import longest_delay
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.trials.log import SensorLog
+
+ROBOT = servo_pendulum()
+STEP_S = 0.01
+POSITION = next(k for k, s in enumerate(ROBOT.sensors) if s.kind == "position")
+
+
+def trial(name: str, late_s: float, seed: int, sign: float = 1.0) -> MeasuredTrial:
+    """A motion that does not repeat itself, and readings that follow it; nothing else is read."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(1500) * STEP_S
+    swings = [(rng.uniform(0.2, 1.5), rng.uniform(0, 6.0)) for _ in range(6)]
+
+    def at(t: np.ndarray) -> np.ndarray:
+        return sum((np.sin(2 * np.pi * f * t + p) for f, p in swings), np.zeros(len(t)))
+
+    sensors = np.zeros((len(times), len(ROBOT.sensors)))
+    sensors[:, POSITION] = sign * at(times - late_s) + 1e-3 * rng.standard_normal(len(times))
+    units = tuple(s.unit for s in ROBOT.sensors)
+    log = SensorLog(times, sensors, at(times)[:, None], ROBOT.sensor_names, units, ROBOT.motor_names)
+    return MeasuredTrial(name, log)
+
+
+def test_a_lag_that_logs_show_sets_the_range_of_delays():
+    robot = with_lags(ROBOT, [trial("a", 0.24, 1), trial("b", 0.24, 2)])
+    assert robot.joint("servo").lag_s == pytest.approx(0.24, abs=STEP_S)
+    assert longest_delay(robot) == pytest.approx(0.36, abs=2 * STEP_S)
+    assert candidate(robot, "command_delay", "servo").bounds[0][1] == longest_delay(robot)
+
+
+def test_the_usual_trial_decides():
+    robot = with_lags(ROBOT, [trial("a", 0.05, 1), trial("b", 0.06, 2), trial("c", 0.4, 3)])
+    assert robot.joint("servo").lag_s == pytest.approx(0.06, abs=STEP_S)
+    assert longest_delay(robot) == longest_delay(ROBOT), "no less is looked for than without"
+
+
+def test_what_follows_nothing_changes_nothing():
+    still = trial("a", 0.1, 1)
+    resting = replace(still, log=replace(still.log, commands=np.zeros_like(still.log.commands)))
+    unknown = replace(still, log=replace(still.log, commands=np.full_like(still.log.commands, np.nan)))
+    other = replace(still, log=replace(still.log, commands=trial("b", 0.0, 9).log.commands))
+    for one in (resting, unknown, other):
+        assert with_lags(ROBOT, [one]) is ROBOT
+    assert with_lags(ROBOT, [trial("a", -0.1, 1)]) is ROBOT, "a command that comes after the motion is no delay"
+    torque = replace(ROBOT, drives=tuple(replace(d, command="torque") for d in ROBOT.drives))
+    assert with_lags(torque, [trial("a", 0.1, 1)]) is torque
+
+
+def test_a_motor_that_is_mounted_the_other_way_round_lags_too():
+    assert with_lags(ROBOT, [trial("a", 0.2, 1, sign=-1.0)]).joint("servo").lag_s == pytest.approx(0.2, abs=STEP_S)
