@@ -184,6 +184,32 @@ def test_screening_looks_further_on_where_a_small_step_promises_something(monkey
     assert best == "joint_jam@hip_rear_left" and found[best] == every[best]
 
 
+class Sticks(Asked):
+    """A sensor that sticks from some time on leaves another pattern than one that does from the start."""
+
+    def shift(self, hypothesis: Hypothesis) -> Array:
+        total = np.zeros(len(self.trial_of))
+        for t in hypothesis:
+            values = dict(t.values)
+            late = values.get("from_s", 0.0) > 0.1
+            pattern = np.random.default_rng(len(t.target) + 100 * late).standard_normal(len(total))
+            total += 20.0 * values.get("share", values.get("bias", 0.0)) * pattern
+        return total
+
+
+def test_what_begins_at_a_moment_of_its_own_is_looked_at_further_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A little of it from the start promises nothing, however many others promise more."""
+    monkeypatch.setattr(screening, "FURTHER", 3)
+    pool = candidates(ROBOT, only=("sensor_stuck", "sensor_bias"), sharing=False)
+    where = pool[-1].target
+    problem = Sticks((term("sensor_stuck", where, share=0.8, from_s=1.0),))
+    found = screen(Search(problem), pool)
+    best = max(found, key=lambda s: s.promise)
+    assert best.candidate.name == f"sensor_stuck@{where}"
+    assert max(u[1] for u in best.starts) > 0
+    assert best.promise > 0.9 * float((problem.data**2).sum() - len(problem.data))
+
+
 class Resonant(Asked):
     """A little more of what is too much already is better, and so is much less: the far side of a resonance."""
 

@@ -137,8 +137,13 @@ def _further(pool: Sequence[Candidate], rows: Sequence[Sequence[_Probe]]) -> lis
     free = [i for i, c in enumerate(pool) if c.size]
     seen = [i for i in free if any(p.shows for p in rows[i])]
     best = sorted(seen, key=lambda i: -max(p.unbounded for p in rows[i]))[:FURTHER]
-    needless = {i for i in seen if not pool[i].guess}.difference(best)
+    needless = {i for i in seen if not pool[i].guess and not _later(pool[i])}.difference(best)
     return [i for i in free if i not in needless]
+
+
+def _later(c: Candidate) -> bool:
+    """Whether it begins at a moment of its own: a little of it from the start on says nothing of all of it from then on."""
+    return any(c.effect.parameters[k].unit == "s" for k in c.inert)
 
 
 def _larger(c: Candidate, shares: Sequence[float], found: Sequence[_Probe], both: bool) -> list[Array]:
