@@ -36,16 +36,20 @@ def plans_of(v: View) -> list[Block]:
     return found
 
 
+def called_like_a_plan(v: View, b: Block) -> bool:
+    """Whether a name shares with that of a plan what sets the plan apart from the measured positions."""
+    return any(_besides(b) == _besides(plan) != _besides(v.position.block) for plan in v.plans)
+
+
 def was_asked_for(v: View, b: Block) -> bool:
     """Whether numbers are a plan's, or its rate's rather than that of the measured positions: by what their names share with
     its name (VelocityCmptd with PositionCmptd), or by which of the two changes they are."""
     if b.reading.command is not None or b.reading.second:
         return bool(b.reading.command)
-    said, measured = _besides(b), _besides(v.position.block)
-    apart = [plan for plan in v.plans if _besides(plan) != measured]
-    if b in v.plans or any(said == _besides(plan) for plan in apart):
+    if any(b is plan for plan in v.plans) or called_like_a_plan(v, b):
         return True
-    if apart and said == measured:
+    measured = _besides(v.position.block)
+    if _besides(b) == measured and any(_besides(plan) != measured for plan in v.plans):
         return False
     own = abs(v.derivative(v.position.block, b).correlation)
     rates = [abs(v.derivative(plan, b).correlation) for plan in v.plans]
