@@ -60,3 +60,11 @@ def test_speeds_without_a_name_are_those_of_the_measured_positions(tmp_path: Pat
     found = proposed(tmp_path, frame, header=False, joints=samples.JOINTS)
     assert taken(found, "position") == ["6", "7"]
     assert taken(found, "velocity") == ["8", "9"]
+
+
+def test_joints_that_were_not_recorded_are_named_with_what_to_do(tmp_path: Path) -> None:
+    m = samples.motion()
+    frame = pd.DataFrame({"t": m["t"], "shoulder_position": m["q"][:, 0], "shoulder_effort": np.sin(m["t"])})
+    (asked,) = proposed(tmp_path, frame).questions
+    assert "the columns name shoulder alone; of elbow nothing was recorded" in asked
+    assert 'type="fixed" in a copy of the URDF' in asked
