@@ -27,6 +27,8 @@ class Body:
     sensors: tuple[Sensor, ...] = ()
     root_without_mass: bool = False
     """Its root was given a mass that it does not state, which counts where the base is free."""
+    bolted_only: tuple[str, ...] = ()
+    """Parts, with their moments, whose inertia no rigid body has, which counts where the base is free."""
     free_base: bool | None = None
     has_floor: bool | None = None
     gravity_m_s2: float | None = None

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
-from ee_dist.basics.names import did_you_mean
+from ee_dist.basics.names import did_you_mean, listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.model import COMMANDS, DRIVE_NUMBERS, Drive, Joint, Part, Robot, RobotError, Sensor, Wiring, World
+from ee_dist.robots.moments import refused
 from ee_dist.robots.numbers import checked, number
 from ee_dist.robots.pivots import PIVOT_HINT, about_centre
 from ee_dist.robots.time_step import FINE_S, default_step_s, too_coarse
@@ -73,6 +74,10 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     free = data.get("free_base", bool(body.free_base))
     if not isinstance(free, bool):
         raise RobotError(f"{where}: free_base: expected true or false, not {quoted(free)}")
+    if free and body.bolted_only:
+        raise RobotError(
+            f"{where}: links {listed(body.bolted_only)}: {refused()}; a base that is bolted down (free_base: false) needs none"
+        )
     floor = data.get("has_floor", free if body.has_floor is None else body.has_floor)
     if not isinstance(floor, bool):
         raise RobotError(f"{where}: has_floor: expected true or false, not {quoted(floor)}")

@@ -31,6 +31,7 @@ from ee_dist.robots.model import (
     Shape,
     Vec3,
 )
+from ee_dist.robots.moments import Moments, refused
 from ee_dist.robots.pivots import PIVOT_HINT
 from ee_dist.robots.xacro import PROGRAM, XacroError, expanded, is_xacro
 from ee_dist.robots.xml import XmlError, element_of, read_xml
@@ -80,6 +81,7 @@ class _Reader:
         self.notes: list[str] = []
         self.assumed: list[str] = []
         self.meshes: dict[str, None] = {}
+        self.moments = Moments()
 
     def fail(self, where: str, what: str) -> UrdfError:
         return UrdfError(f"{self.file}: {where}: {what}")
@@ -108,14 +110,20 @@ class _Reader:
             lost = next(name for name in links if name not in order)
             raise self.fail(f"link {quoted(lost)}", f"is not connected to {quoted(roots[0])}: the joints form a loop")
         floats = self.unmoored(carried, order)
-        parts = {name: self.part(name, links[name], carried.get(name)) for name in order}
+        still = {order[0]}
+        for name in order[1:]:
+            if carried[name].kind == "fixed" and carried[name].parent in still:
+                still.add(name)
+        parts = {name: self.part(name, links[name], carried.get(name), name in still) for name in order}
+        if self.moments.unfit:
+            raise self.fail(f"links {listed(self.moments.unfit)}", refused())
         kept_parts, kept_joints, start, given, idle = folded(parts, {n: carried[n] for n in order[1:]}, order[0])
         if floats is not None:
             start = posed((floats.position_m, floats.rotation), start)
         for name in idle:
             if carried[name].kind != "fixed":
                 raise self.fail(f"link {quoted(name)}", self.without_mass(name, links[name], carried[name]))
-        assumed = list(self.assumed)
+        assumed = [*self.assumed, *self.moments.assumed()]
         root_given = kept_parts[0].name in given
         given = [n for n in given if n != kept_parts[0].name]
         if given:
@@ -134,6 +142,7 @@ class _Reader:
             drives={name: self.known(elements[name], f"joint {quoted(name)}") for name in moving},
             unlimited=tuple(name for name in moving if self.unlimited(elements[name], f"joint {quoted(name)}")),
             root_without_mass=root_given,
+            bolted_only=tuple(self.moments.idle),
             free_base=True if floats is not None else None,
             start_position_m=start[0],
             start_rotation=start[1],
@@ -317,7 +326,8 @@ class _Reader:
             raise self.fail(where, f"its limits leave no range: lower {lower:g}, upper {upper:g}")
         return lower, upper
 
-    def part(self, name: str, e: ET.Element, joint: Joint | None) -> Part:
+    def part(self, name: str, e: ET.Element, joint: Joint | None, still: bool) -> Part:
+        """A link as a part; ``still``: it never moves beside the root."""
         where = f"link {quoted(name)}"
         shapes = tuple(s for c in e.findall("collision") if (s := self.shape(name, c)) is not None)
         inertial = e.find("inertial")
@@ -339,15 +349,10 @@ class _Reader:
             self.number(tensor, k, where, 0.0 if k in ("ixy", "ixz", "iyz") else None) for k in keys
         )
         own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        moments = np.linalg.eigvalsh(own)
         if not own.any() and joint is not None and joint.kind == "fixed":
-            moments = np.full(3, mass * POINT_M**2)
-            own = np.diag(moments)
+            own = np.diag(np.full(3, mass * POINT_M**2))
             self.assumed.append(f"{where}: a mass without inertia: taken as a ball of 1 cm")
-        if moments[0] <= 0 or moments[2] > (moments[0] + moments[1]) * 1.001:
-            raise self.fail(
-                where, "no rigid body has this inertia: principal moments " + ", ".join(f"{m:.3g}" for m in moments)
-            )
+        own = self.moments.usable(name, own, still)
         axes = rotation_matrix(turn)
         return Part(name, mass, com, entries(axes @ own @ axes.T), shapes)
 

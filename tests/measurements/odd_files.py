@@ -104,9 +104,9 @@ def cases() -> list[Case]:
         Case("lists in cells", csv({"stamp": t} | {n: [json.dumps(r.tolist()) for r in v] for n, v in  # type: ignore[dict-item]
              (("jpos", q), ("jvel", w), ("jtau", tau), ("jcmd", g))})),
         Case("no header", csv({"a": t} | spread("q{}", q) | spread("w{}", w) | spread("g{}", g) | spread("tau{}", tau),
-             header=False), asks=True),
+             header=False)),
         Case("mute names, joint after joint", csv({"ch0": t} | {f"ch{1 + 4 * j + k}": v[:, j] for j in range(3)
-             for k, v in enumerate((g, q, w, tau))}), asks=True, hints=order),
+             for k, v in enumerate((g, q, w, tau))}), hints=order),
         Case("a servo's registers", csv({"timestamp": t} | spread("present_position_{}", DEG * q)
              | spread("present_velocity_{}", DEG * w) | spread("goal_position_{}", DEG * g) | spread("present_torque_{}", tau)
              | spread("present_temperature_{}", 30 + 0 * q))),

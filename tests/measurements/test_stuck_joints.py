@@ -16,7 +16,7 @@ from ee_dist.measurements import signals
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import mapping_of
-from ee_dist.measurements.proposal.torques import _in_thousandths
+from ee_dist.measurements.proposal.torque_scale import _in_thousandths
 from ee_dist.robots.describe import load_robot
 
 JOINTS = ("shoulder", "elbow", "wrist")

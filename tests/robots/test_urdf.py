@@ -238,12 +238,14 @@ def text_of(inside: str) -> str:
     return f'<robot name="r">{inside}</robot>'
 
 
-def link(name: str, mass: float | None = 1.0, com: str = "0 0 0", inertia: float = 0.01) -> str:
+def link(
+    name: str, mass: float | None = 1.0, com: str = "0 0 0", inertia: float = 0.01,
+    diagonal: tuple[float, float, float] | None = None,
+) -> str:  # fmt: skip
     if mass is None:
         return f'<link name="{name}"/>'
-    moments = " ".join(
-        f'{k}="{inertia if k in ("ixx", "iyy", "izz") else 0}"' for k in ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
-    )
+    own = dict(zip(("ixx", "iyy", "izz"), diagonal or (inertia,) * 3, strict=True))
+    moments = " ".join(f'{k}="{own.get(k, 0)}"' for k in ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"])
     return f'<link name="{name}"><inertial><origin xyz="{com}"/><mass value="{mass}"/><inertia {moments}/></inertial></link>'
 
 
@@ -389,3 +391,39 @@ def test_limits_that_an_export_left_blank_are_none(tmp_path: Path) -> None:
     (elbow,) = [j for j in body.joints if j.name == "elbow"]
     assert elbow.upper > 6 and elbow.lower < -6
     assert any("joint 'elbow': its limits are all zero, as an export leaves them blank" in a for a in body.assumed)
+
+
+def test_moments_that_miss_the_triangle_inequality_by_a_little_are_raised_and_said(tmp_path: Path) -> None:
+    body = read(tmp_path, link("base"), hinge("a", "base", "arm"), link("arm", diagonal=(0.0016, 0.006, 0.0078)))
+    xx, yy, zz, *products = body.parts[1].inertia_kg_m2
+    assert zz == pytest.approx(0.0078) and xx + yy == pytest.approx(zz)
+    assert xx / yy == pytest.approx(0.0016 / 0.006) and products == pytest.approx([0, 0, 0], abs=1e-12)
+    assert len(body.assumed) == 1 and "'arm' (2.6 %)" in body.assumed[0]
+    robot, _ = robot_of_body(body, {"drives": {"a": {"kp": 1}}}, "r.yaml")
+    job = [Rollout(robot, Commands(np.full((1, 1), 0.3)), 50, pose=True)]
+    for engine in (PyBulletEngine(), MuJoCoEngine(threads=1)):
+        assert engine.rollout(job)[0].finite
+
+
+def test_all_links_whose_inertia_no_rigid_body_has_are_named_at_once(tmp_path: Path) -> None:
+    with pytest.raises(UrdfError, match=r"'one' \(0.001, 0.001, 0.01\), 'two' \(-0.001.*take them from CAD") as caught:
+        read(
+            tmp_path, link("base"), hinge("a", "base", "one"), link("one", diagonal=(0.001, 0.001, 0.01)),
+            hinge("b", "one", "two"), link("two", diagonal=(0.001, -0.001, 0.001)), hinge("c", "two", "three"), link("three"),
+        )  # fmt: skip
+    assert "\n" not in str(caught.value) and "three" not in str(caught.value)
+
+
+def test_what_is_fixed_to_a_bolted_base_needs_no_inertia(tmp_path: Path) -> None:
+    body = read(
+        tmp_path, link("base", diagonal=(0.001, 0.001, 0.01)), hinge("f", "base", "mast", "fixed"),
+        link("mast", diagonal=(0.0, 0.0, 0.01)), hinge("a", "base", "arm"), link("arm"),
+    )  # fmt: skip
+    assert "'base' (0.001, 0.001, 0.01), 'mast' (0, 0, 0.01)" in body.assumed[0]
+    drives = {"drives": {"a": {"kp": 1}}}
+    robot, _ = robot_of_body(body, drives, "r.yaml")
+    job = [Rollout(robot, Commands(np.full((1, 1), 0.3)), 50, pose=True)]
+    for engine in (PyBulletEngine(), MuJoCoEngine(threads=1)):
+        assert engine.rollout(job)[0].finite
+    with pytest.raises(RobotError, match=r"'mast'.*no rigid body has this inertia.*free_base: false"):
+        robot_of_body(body, drives | {"free_base": True}, "r.yaml")

@@ -189,6 +189,12 @@ def _stands_in(name: Sequence[str], words: Sequence[str]) -> bool:
     return bool(name) and any(list(words[k : k + len(name)]) == list(name) for k in range(len(words)))
 
 
+def in_full(address: str, joints: Sequence[str]) -> str | None:
+    """The joint whose name stands in a column's as it is, if it is one alone; the longest of several wins."""
+    spelled = {j: tokens(j) for j in joints}
+    return _longest([j for j, name in spelled.items() if _stands_in(name, tokens(address))], spelled)
+
+
 def _longest(hits: list[str], words: Mapping[str, Collection[str]]) -> str | None:
     """The one of most words, if it is one alone."""
     most = max((len(words[j]) for j in hits), default=0)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.measurements.proposal.asked_for import plans_of
 from ee_dist.measurements.proposal.blocks import unreadable
 from ee_dist.measurements.proposal.commands import add_commands
 from ee_dist.measurements.proposal.model import FIT, LIKELY, UNKNOWN, Choice, Hints, Proposal
@@ -51,6 +52,7 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     _time_choice(v, v.position.block.table.name)
     v.units = position_units(v.position.block, v.joints, v.hints)
     add_positions(v)
+    v.plans = plans_of(v)
     add_speeds(v)
     add_torques(v)
     add_commands(v)

@@ -11,7 +11,7 @@ from ee_dist.measurements import signals
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.speeds import speed_units
-from ee_dist.measurements.proposal.torques import torque_units
+from ee_dist.measurements.proposal.torque_scale import torque_units
 from ee_dist.measurements.proposal.units import LOOSE, UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE

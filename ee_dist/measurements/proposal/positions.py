@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, series_of
+from ee_dist.basics.names import listed
+from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, in_full, series_of
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
 from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
-from ee_dist.measurements.proposal.words import POSITION, SPEED, TIME, read_name
+from ee_dist.measurements.proposal.words import POSITION, SPEED, TIME, read_name, tokens
 
 
 def ranked_positions(v: View) -> list[Scored]:
@@ -73,6 +74,14 @@ def ask_for_positions(v: View) -> None:
     names = ", ".join(v.robot.motor_names)
     if len(ranked) > 1 and ranked[0].score >= 2:
         v.out.ask(f"positions: {ranked[0].block.name} or {ranked[1].block.name}? write the right one into the mapping")
+    elif v.hints.joints is None and (some := _recorded(v)):
+        rest = [m for m in v.robot.motor_names if m not in some]
+        v.out.ask(
+            f"positions: the columns name {listed(some)} alone; of {listed(rest)} nothing was recorded. Those that stood "
+            'still are type="fixed" in a copy of the URDF (no <joint> in the body of an MJCF), with their place in <origin>, '
+            "and are taken out of the drives and sensors of the description; one that moved unrecorded leaves the motion of "
+            "the others unknown"
+        )
     elif v.hints.joints is None and n > 1 and (called := _other_joints(v)):
         v.out.ask(
             f"positions: the columns call the joints {', '.join(called)}; which are these of {names}? say task.joints=[...] with "
@@ -91,6 +100,20 @@ def ask_for_positions(v: View) -> None:
         )
     for m in v.robot.sensors:
         v.out.choices.append(Choice("sensors", m.name, {"column": "???"}, UNKNOWN, "not found"))
+
+
+def _recorded(v: View) -> list[str]:
+    """The joints that have a column of positions which bears their name, where others have none; at least half of such
+    columns must name one, as those of another robot may by chance."""
+    found: set[str] = set()
+    other = 0
+    for table in v.timed.tables:
+        for address in series_of(table, filled=True):
+            joint = in_full(address, v.robot.motor_names)
+            if read_name(address, frozenset(tokens(joint)) if joint else frozenset()).kind == POSITION:
+                found |= {joint} if joint else set()
+                other += joint is None
+    return [m for m in v.robot.motor_names if m in found] if other <= len(found) < len(v.joints) else []
 
 
 def _other_joints(v: View) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from ee_dist.measurements import signals
+from ee_dist.measurements.proposal.asked_for import was_asked_for
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.rest import by_its_name
@@ -42,6 +43,7 @@ def add_speeds(v: View) -> None:
         score -= 0.5 * math.log10(1 - abs(r.correlation) + 1e-6)
         score += 3 if abs(r.correlation) > 0.9 else 1 if abs(r.correlation) > 0.6 else -3
         found.append(Scored(b, score, [f"change of the positions (correlation {r.correlation:.3f})"]))
+    found = _measured(v, found)
     chosen = v.pick(sorted(found, key=lambda s: -s.score), 3.0)
     positions = v.sensor_names("position")
     if chosen is None:
@@ -64,6 +66,19 @@ def add_speeds(v: View) -> None:
     _estimate(
         v, [n * (k in odd) for k, n in enumerate(names)], positions, LIKELY, [odd.get(k, "") for k in range(len(names))]
     )
+
+
+def _measured(v: View, found: list[Scored]) -> list[Scored]:
+    """Those that are not the rate of what was asked for, where another is there that is not."""
+    good = [s for s in found if s.score >= 3]
+    asked = [s for s in good if was_asked_for(v, s.block)] if len(good) > 1 else []
+    if not asked or len(asked) == len(good):
+        return found
+    for s in good:
+        if s not in asked:
+            names = " and ".join(a.block.name for a in asked)
+            s.why.append(f"{names} that of what was asked for")
+    return [s for s in found if s not in asked]
 
 
 def _estimate(v: View, names: list[str], positions: list[str], sure: str, why: list[str]) -> None:

@@ -3,48 +3,31 @@
 from __future__ import annotations
 
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.measurements import signals
-from ee_dist.measurements.need import beside_need, torques_needed
+from ee_dist.measurements.proposal.asked_for import called_like_a_plan, goes_with_a_plan
 from ee_dist.measurements.proposal.blocks import BY_PLACE, Block
 from ee_dist.measurements.proposal.model import FIT, LIKELY, SURE, UNKNOWN, Choice
-from ee_dist.measurements.proposal.units import UnitChoice
+from ee_dist.measurements.proposal.torque_scale import beside_need_of, need_of, torque_units
+from ee_dist.measurements.proposal.torque_shares import FAR, led
 from ee_dist.measurements.proposal.view import Scored, View
-from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE
-from ee_dist.measurements.units import UNITS
+from ee_dist.measurements.proposal.words import CURRENT, TORQUE
 from ee_dist.robots.instruments import MOTOR_TORQUE
-from ee_dist.trials.log import Array
 
 ROUGHER = 1.15
 """What was measured is rougher than what was asked for, by this factor or more."""
-LEAST_SEEN = 0.5
-"""Correlation with what the motion needs from which a gain can be estimated."""
 CLEARLY, WELL = 0.3, 0.3
 """Another order of the joints is asked for if it leaves less than this share of what the robot's leaves, and of all."""
 BOTH_WAYS, OFTEN = 0.1, 0.05
 """A motion needs torques of both signs where this share of the largest is passed, either way, in this share of the time."""
-FAR_OFF = 300.0
-"""Times what the motion needs at a joint that friction does not explain: a unit of its own does."""
 
-
-def _needed(v: View, places: list[int] | None = None) -> tuple[Array, Array] | None:
-    """What the motion needs; ``places``: the column that each joint has instead of its own."""
-    if not v.units.entries:
-        return None
-    q = v.metric()
-    return torques_needed(v.robot, q if places is None else q[:, places], v.step(v.position.block))
-
-
-def _beside_need(v: View, block: Block, places: list[int] | None = None) -> list[signals.Relation] | None:
-    """How a block goes with what the motion needs, joint by joint, friction left aside; None where that is not known."""
-    needed = v.needed if places is None else _needed(v, places)
-    values = v.on(v.position.block, block)
-    if needed is None or values is None:
-        return None
-    return beside_need(values if places is None else values[:, places], needed, v.step(v.position.block))
+GOES, HALF = 0.8, 0.5
+"""Correlation with what the motion needs from which numbers without a name go with it, if it leaves less than this share of what
+the positions leave unexplained."""
+SHOWN = 4
 
 
 def _check_order(v: View, block: Block) -> None:
@@ -56,7 +39,7 @@ def _check_order(v: View, block: Block) -> None:
     orders = [list(p) for p in permutations(own)] if count <= 3 else [own, own[::-1]]
     left = []
     for places in orders:
-        relations = _beside_need(v, block, places)
+        relations = beside_need_of(v, block, places)
         left.append(sum(1 - r.correlation**2 for r in relations) / count if relations else 1.0)
     best = int(np.argmin(left))
     if left[best] < min(CLEARLY * left[0], WELL):
@@ -71,7 +54,7 @@ def add_torques(v: View) -> None:
     """The torque sensors and the torques of the drives, where a block is the one or the other."""
     sensed = [net or motor for net, motor in zip(v.sensor_names("torque"), v.sensor_names(MOTOR_TORQUE), strict=True)]
     found = []
-    v.needed = _needed(v)
+    v.needed = need_of(v)
     for b in v.blocks:
         named = b.reading.kind in (TORQUE, CURRENT) and not b.reading.weak
         if named and not b.used and b.reading.command is not True and v.moves(b) and _unsigned(v, b):
@@ -80,14 +63,16 @@ def add_torques(v: View) -> None:
                 f"{b.name} never change sign, though the motion needs torques of both: they are sizes, as some servos report "
                 "their currents, and are left out"
             )
-        if b.used or b.reading.command or not v.moves(b) or not (named or (b.how == BY_PLACE and v.hints.gains)):
+        if b.used or b.reading.command or not v.moves(b) or not (named or b.how == BY_PLACE):
+            continue
+        if called_like_a_plan(v, b) if named else goes_with_a_plan(v, b):
             continue
         score = (
             (3.0 if b.reading.kind == TORQUE else 2.0) + (1 if b.reading.command is False else 0) - 2 * b.reading.second
         )
         why = [f"called a {b.reading.kind}"] if named else []
         if not named:
-            score, why = _as_current(v, b)
+            score, why = _as_current(v, b) if v.hints.gains else _as_torques(v, b)
         found.append(Scored(b, score, why))
     chosen = v.pick(sorted(found, key=lambda s: -s.score))
     if chosen is None:
@@ -99,8 +84,10 @@ def add_torques(v: View) -> None:
             for n in sensed:
                 if n:
                     v.out.choices.append(Choice("sensors", n, {"column": "???"}, UNKNOWN, "not found"))
+        else:
+            _tell_rivals(v, [s for s in found if s.score >= 2])
         return
-    if chosen.block.reading.kind == CURRENT and v.hints.gains is None and not any(sensed) and _led(v):
+    if chosen.block.reading.kind == CURRENT and v.hints.gains is None and not any(sensed) and led(v):
         # A robot that is led by its commands is compared without torques.
         v.out.notes.append(
             f"motor currents ({chosen.block.name}) are left out; with task.gains=[N.m per A, one for each joint], or "
@@ -116,6 +103,25 @@ def add_torques(v: View) -> None:
     v.add("torques", list(v.robot.motor_names), chosen.block, units, chosen.why, level)
 
 
+def _tell_rivals(v: View, found: list[Scored]) -> None:
+    """Torques of which none is clearly the one are not dropped in silence."""
+    if not found:
+        return
+    names = " or ".join(s.block.name + _beside_text(v, s.block) for s in sorted(found, key=lambda s: -s.score)[:SHOWN])
+    how = "write those that were measured into the mapping as torques, for a balance of forces"
+    if led(v) or any(d.command == "torque" for d in v.robot.drives):
+        v.out.notes.append(f"torques: {names}? left out; {how}")
+    else:
+        v.out.ask(f"torques: {names}? {how}")
+
+
+def _beside_text(v: View, block: Block) -> str:
+    if block.reading.kind == CURRENT:
+        return " (currents)"
+    sizes = [abs(r.slope) for r in beside_need_of(v, block) or () if abs(r.correlation) > GOES]
+    return f" ({float(np.median(sizes)):.2g} times what the motion needs)" if sizes else ""
+
+
 def _unsigned(v: View, block: Block) -> bool:
     """Whether no column of a block ever changes its sign, while what the motion needs of some of these joints does."""
     values = v.on(v.position.block, block)
@@ -127,17 +133,36 @@ def _unsigned(v: View, block: Block) -> bool:
     return any(min((strong & (sign * needed > 0))[:, k].mean() for sign in (1, -1)) > OFTEN for k in moved)
 
 
-def _led(v: View) -> bool:
-    """Whether drives obey positions or speeds, and columns are called commands of such."""
-    kinds = {d.command for d in v.robot.drives if d.command != "none"}
-    asked = {b.reading.kind for b in v.blocks if b.reading.command and v.moves(b)}
-    return bool(kinds) and kinds <= asked & {POSITION, SPEED}
+def _as_torques(v: View, block: Block) -> tuple[float, list[str]]:
+    """Whether a block without a name is torques, without gains: at half the joints or more it goes with what the motion needs,
+    better than with the positions, and is as large; if it is not as large, they may be currents, which is noted."""
+    values, relations = v.on(v.position.block, block), beside_need_of(v, block)
+    if values is None or relations is None:
+        return 0.0, []
+    places = signals.each(values, v.position.block.values)
+    with_need = [
+        k for k in signals.lively(v.position.block.values)
+        if abs(relations[k].correlation) > GOES
+        and 1 - relations[k].correlation ** 2 < HALF * (1 - places[k].correlation ** 2)
+    ]  # fmt: skip
+    if len(with_need) < 2 or 2 * len(with_need) < len(v.joints):
+        return 0.0, []
+    sizes = [abs(relations[k].slope) for k in with_need]
+    where = listed(v.joints[k].name for k in with_need)
+    if not FAR[0] < float(np.median(sizes)) < FAR[1]:
+        v.out.notes.append(
+            f"{block.name} go with the torques that the motion needs at {where}, but are {float(np.median(sizes)):.2g} times as "
+            f"large: if they are motor currents, say task.gains=[N.m per A, one for each joint], or task.gains={FIT}"
+        )
+        return 0.0, []
+    fit = float(np.mean([abs(relations[k].correlation) for k in with_need]))
+    return 2.0 + fit, [f"goes with the torques that the motion needs at {where} (correlation {fit:.2f}), and as large"]
 
 
 def _as_current(v: View, block: Block) -> tuple[float, list[str]]:
     """Whether a block without a name is the measured currents: it goes with the torques that the motion needs, and it is
     no exact multiple of another, as what a controller computed would be."""
-    values, relations = v.on(v.position.block, block), _beside_need(v, block)
+    values, relations = v.on(v.position.block, block), beside_need_of(v, block)
     if values is None or relations is None:
         return 0.0, []
     fit = float(np.median([abs(r.correlation) for r in relations]))
@@ -163,103 +188,3 @@ def _as_current(v: View, block: Block) -> tuple[float, list[str]]:
             meant = "measured rather than asked for" if rougher > 1 else "asked for rather than measured"
             why += f"; much like {other.name} but {word} ({max(rougher, 1 / rougher):.2g} times): {meant}"
     return score, [why]
-
-
-def _gains(v: View, relations: list[signals.Relation] | None) -> list[float]:
-    """N.m (N) of each ampere, joint by joint: as said, or the least gains with which the currents are what the motion needs.
-    None, and a question asked, where they cannot be estimated."""
-    if v.hints.gains != FIT:
-        return v.gains()
-    weak = [j.name for j, r in zip(v.joints, relations or (), strict=False) if abs(r.correlation) < LEAST_SEEN]
-    if not relations or weak:
-        v.out.ask(
-            f"torques: the gains of {', '.join(weak) or 'the motors'} cannot be estimated: their currents do not go with what "
-            "the motion needs by the model; say task.gains=[N.m per A, one for each joint]"
-        )
-        return []
-    # Noise in a current flattens none of this: the need is regressed on nothing that was measured but the motion.
-    found = [float(f"{1 / abs(r.slope):.4g}") for r in relations]
-    fits = ",".join(f"current_gain@{m}" for m in v.robot.motor_names)
-    v.out.notes.append(
-        f"gains estimated with the model's masses: {', '.join(f'{g:g}' for g in found)} N.m (N) for each ampere; how sure "
-        f"they are tells task=improve 'effect=[{fits}]'"
-    )
-    return found
-
-
-def _in_thousandths(relations: list[signals.Relation] | None, telling: list[int], block: Block) -> bool:
-    """Whether columns of one family, whose unit nothing says, are mN.m (mN): at most joints hundreds of times the need."""
-    sizes = [abs(relations[k].slope) for k in telling if abs(relations[k].correlation) > 0.7] if relations else []
-    return bool(sizes) and not any(block.units) and float(np.median(sizes)) > 200
-
-
-def torque_units(v: View, block: Block) -> UnitChoice:
-    """N.m or N; a current through the gain that was said. A sign turned against the motion's need is turned back."""
-    kinds = ["N.m" if j.kind == "hinge" else "N" for j in v.joints]
-    current = block.reading.kind == CURRENT or (block.reading.kind is None and v.hints.gains is not None)
-    if current and v.hints.gains is None:
-        v.out.ask(
-            f"torques: {block.name} are motor currents; say task.gains=[N.m per A, one for each joint], or task.gains={FIT} to "
-            "estimate them from the model's masses"
-        )
-        return UnitChoice((), UNKNOWN, "a current, whose gain no file can say")
-    relations = _beside_need(v, block) if not block.reading.command else None
-    gains = _gains(v, relations) if current else []
-    if current and not gains:
-        return UnitChoice((), UNKNOWN, "a current whose gain cannot be estimated")
-    if current:
-        v.gained.append(block.name)
-    entries, turned, unclear, checked = [], [], [], 0
-    sizes: dict[int, float] = {}
-    # What a joint that hardly moves is given is friction alone.
-    telling = signals.lively(v.position.block.values)
-    thousandth = not current and _in_thousandths(relations, telling, block)
-    for k, unit in enumerate(kinds):
-        stated = block.units[k] if block.units else None
-        entry: dict[str, Any] = {"unit": stated if stated in ("N.m", "mN.m", "N", "mN") else unit}
-        if current:
-            # Estimated gains are of the numbers as they stand, whatever their unit.
-            size = 1e-3 if stated == "mA" and v.hints.gains != FIT else 1.0
-            entry = {"unit": unit, "scale": gains[k] * size}
-        elif thousandth and stated is None:
-            entry["unit"] = f"m{unit}"
-        if not current and relations is not None and k in telling and abs(relations[k].correlation) > 0.7:
-            sizes[k] = UNITS[entry["unit"]][1] * abs(relations[k].slope)
-            checked += 0.3 < sizes[k] < 3
-        if relations is not None and k in telling and relations[k].correlation < -0.4:
-            # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
-            r = relations[k]
-            size = abs(r.slope) * UNITS[entry["unit"]][1] * abs(float(entry.get("scale", 1.0)))
-            if r.correlation < -0.9 and 0.5 < size < 2:
-                entry["sign"] = -1
-                turned.append(v.joints[k].name)
-            elif r.correlation < -0.7 and 0.5 < size < 2:
-                v.out.ask(
-                    f"torques: {block.columns[k]} seems to run against what the motion of {v.joints[k].name} needs "
-                    f"(correlation {r.correlation:.2f}); if it does, add 'sign: -1' to it in the mapping"
-                )
-            else:
-                unclear.append(v.joints[k].name)
-        entries.append(entry)
-    # A unit is that of all joints: at one alone friction may be many times what a slow motion needs.
-    middle = float(np.median(list(sizes.values()))) if sizes else 1.0
-    if not 0.05 < middle < 20:
-        return UnitChoice((), UNKNOWN, f"{middle:.3g} times what the motion needs in {entries[0]['unit']}")
-    for k, size in sizes.items():
-        if not 1 / FAR_OFF < size < FAR_OFF:
-            unit = entries[k]["unit"]
-            return UnitChoice((), UNKNOWN, f"{size:.3g} times what the motion needs in {unit} at {v.joints[k].name}")
-    said = (
-        "current times a gain estimated from what the motion needs"
-        if v.hints.gains == FIT
-        else "current times the gain you said"
-    )
-    why = said if current else f"{entries[0]['unit']}" + (
-        ", as large as the motion needs" if checked else ", the usual unit; not checked")  # fmt: skip
-    if turned:
-        why += f"; sign turned at {', '.join(turned)}: it was against what the motion needs"
-    if unclear:
-        why += f"; sign at {', '.join(unclear)} not clear, kept as it is: the model needs the other, but not this much"
-    stated_all = all(u in ("N.m", "mN.m", "N", "mN") for u in block.units) if block.units else False
-    stated_all = stated_all or (current and v.hints.gains != FIT)
-    return UnitChoice(tuple(entries), SURE if stated_all and not turned and not unclear else LIKELY, why)

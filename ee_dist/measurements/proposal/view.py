@@ -45,7 +45,8 @@ class Scored:
 class View:
     """One proposal in the making. ``position`` and ``units`` are the block of the positions and its units, once known;
     ``needed`` the torques (T, J) that the motion needs and its speeds; ``gained`` the blocks that the gains were applied to;
-    ``taken`` the columns of channels, also of those whose joints are open."""
+    ``taken`` the columns of channels, also of those whose joints are open; ``plans`` the blocks of positions that were asked
+    for."""
 
     position: Scored
     units: UnitChoice
@@ -59,6 +60,7 @@ class View:
         self.needed: tuple[Array, Array] | None = None
         self.gained: list[str] = []
         self.taken: set[str] = set()
+        self.plans: list[Block] = []
 
     @property
     def timed(self) -> Recorded:
