@@ -33,7 +33,7 @@ def weightless(models: Sequence[Robot], balances: Sequence[Balance], scale: Arra
         found, without = balance(model), balance(floating)
         if found is None or without is None:
             return ""
-        speed = decimated(balance.motion.speed, balance.keep_every)[: len(found[1])]
+        speed = decimated(balance.motion.of_judged(balance.motion.speed), balance.keep_every)[: len(found[1])]
         parts.append((without[1] / scale, (without[1] - found[1]) / scale, speed))
     left, weight, speed = (np.concatenate(p) for p in zip(*parts, strict=True))
     both = weighed = without_it = with_it = 0.0
