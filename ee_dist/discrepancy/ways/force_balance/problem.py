@@ -203,7 +203,7 @@ class ForceBalance(Problem):
 
     @cached_property
     def doubts(self) -> str:
-        return weightless(self.models, self.balances, self.size)
+        return weightless(self.models, self.balances, self.size, self.channels)
 
     @cached_property
     def left_to_give(self) -> float:
