@@ -53,7 +53,7 @@ from ee_dist.tasks.folder import (
 )
 from ee_dist.tasks.help import answer
 from ee_dist.tasks.sweep import Jobs
-from ee_dist.tasks.unfinished import FOLDER, SO_FAR, can_go_on, finished, unfinished
+from ee_dist.tasks.unfinished import FOLDER, SO_FAR, can_go_on, finished, goes_on, unfinished
 
 MISTAKE, DEFECT = 2, 1
 _jobs = Jobs()
@@ -134,9 +134,13 @@ def _what_is_kept(out: Path) -> str:
 
 
 def _how_to_go_on(out: Path) -> str:
-    so_far = out / FOLDER / SO_FAR
+    if not can_go_on(out):
+        return ""
+    so_far, where = out / FOLDER / SO_FAR, f"resume={shown(_whole(out))}"
     model = f"; the model so far: {shown(so_far)}" if so_far.exists() else ""
-    return f"; go on with the same command and resume={shown(_whole(out))}{model}" if can_go_on(out) else ""
+    if not goes_on(out):
+        return f"; the same command and {where} begins its search anew{model}"
+    return f"; go on with the same command and {where}{model}"
 
 
 def _whole(out: Path) -> Path:

@@ -155,7 +155,7 @@ class _Look:
         more than the current model. ``beside_all``: the one effect is looked for also where much is left at one joint: small
         values that had to stand in for it are worth something too."""
         problem = self.search.problem
-        single = apart(problem.robot, base, self.own)
+        single = apart(problem, base, self.own)
         fit = self._fit(single, singles(problem.robot, self._everywhere(single)))
         if fit is None:
             return None

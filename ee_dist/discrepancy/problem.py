@@ -109,6 +109,8 @@ class Problem(ABC):
     """Whether effects without a parameter (a part that is lost) can be told in this way of comparing."""
     gained: float = 0.0
     """Energy that the most promising effect took off an untouched robot (from calibration)."""
+    unjudged: tuple[str, ...] = ()
+    """Joints that move, but at which nothing is compared: what several joints share is looked for at the others."""
     calibrated: bool = False
     """Whether the model was calibrated on an untouched robot: its own terms are then known, not free."""
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ee_dist.discrepancy.assumed import puts_right
 from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
@@ -36,10 +37,10 @@ def shared(robot: Robot, pool: Iterable[Candidate]) -> list[Candidate]:
     return out
 
 
-def apart(robot: Robot, current: Current, own: int) -> Current:
-    """The model with each shared effect of this kind taken apart into its members, with the values that they shared. One that
-    puts assumed drives right stays: members differ from it by a little, and not from what was assumed."""
-
+def apart(problem: Problem, current: Current, own: int) -> Current:
+    """The model with each shared effect of this kind taken apart into its members that can show, with the values that they
+    shared. One that puts assumed drives right stays: members differ from it by a little, and not from what was assumed."""
+    robot = problem.robot
     parts: list[Candidate] = []
     values: list[Array] = []
     for k, (c, place) in enumerate(zip(current.parts, Model(current.parts).places, strict=True)):
@@ -50,7 +51,8 @@ def apart(robot: Robot, current: Current, own: int) -> Current:
             continue
         for target in c.members(robot):
             member = candidate(robot, c.effect, target)
-            if member.name not in {p.name for p in (*parts, *current.parts)}:
+            there = {p.name for p in (*parts, *current.parts)}
+            if member.name not in there and problem.shows(c.effect.name, target):
                 parts.append(member)
                 values.append(np.clip(member.shares(c.values(u)), member.lower, member.upper))
     return Current(tuple(parts), np.concatenate([*values, np.zeros(0)]))

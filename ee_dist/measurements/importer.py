@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
@@ -39,6 +40,8 @@ from ee_dist.robots.model import Robot
 from ee_dist.robots.reached import told
 from ee_dist.trials.log import Array, SensorLog
 
+TORQUE = "torque of"
+"""How the report names what a drive gave, before its joint."""
 SAME_RATE = 1e-3
 """A record whose even step is within this share of the wanted one is taken sample by sample."""
 
@@ -78,7 +81,7 @@ class _Import:
     def run(self) -> tuple[TrialRecord, Report]:
         self._time()
         positions = self._sensors()
-        torques = self._motor_columns(self.mapping.torques, torque_units(self.robot), "torque")
+        torques = self._torques()
         commands = self._commands(torques)
         self._on_one_turn(commands)
         supply = None
@@ -184,7 +187,8 @@ class _Import:
         size = factor(column.unit, unit, f"{self.where}: {name}")
         good = np.flatnonzero(np.isfinite(raw))
         if len(good) < min(len(raw), 2):
-            raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty")
+            spared = f": leave out the {name}, which may stay unknown" if name.startswith(TORQUE) else ""
+            raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty{spared}")
         if not quiet and not column.signed_bits:
             self.report.suspicious += suspicions(f"{name} ({column.column})", raw[good], _turn(column))
         if len(good) < len(raw):
@@ -255,13 +259,13 @@ class _Import:
         """What the drives were told, (T, M). Without any: the torques where the drives obey torques, else NaN; of joints that
         all swing freely, nothing."""
         units = command_units(self.robot)
-        found = self._motor_columns(self.mapping.commands, units, "command")
-        if found is not None:
-            return found
+        if self.mapping.commands:
+            nothing = np.zeros(len(self.at_s))  # what a passive joint is told
+            return self._by_motor(self.mapping.commands, units, "command of", True, nothing)
         if not units:
             return np.zeros((len(self.at_s), len(self.robot.drives)))
         assert torques is not None
-        if command_kinds(self.robot) == {"torque"}:
+        if command_kinds(self.robot) == {"torque"} and np.isfinite(torques).all():
             self.report.done.append(
                 "no commands: the drives obey torques, so the measured ones are taken as what was asked"
             )
@@ -287,13 +291,25 @@ class _Import:
                 self.report.ranges[f"command of {drive.joint}"] = (low, high, "rad")
                 self.report.done.append(f"command of {drive.joint}: brought {-turns:+d} turns nearer to the positions")
 
-    def _motor_columns(self, columns: Any, units: dict[str, str], what: str) -> Array | None:
+    def _torques(self) -> Array | None:
+        """Torques of the drives, (T, M), NaN at those without a column; none where the mapping names no column."""
+        columns, motors = self.mapping.torques, self.robot.motor_names
         if not columns:
             return None
-        nothing = np.zeros(len(self.at_s))  # what a passive joint is told
+        without = [m for m in motors if m not in columns]
+        if without:
+            self.report.done.append(
+                f"torques at {len(motors) - len(without)} of {len(motors)} joints: a balance of forces compares them there; "
+                f"those of {listed(without)} are not known"
+            )
+        unknown = np.full(len(self.at_s), math.nan)
+        return self._by_motor(columns, torque_units(self.robot), TORQUE, True, unknown)
+
+    def _by_motor(self, columns: Any, units: dict[str, str], what: str, step_like: bool, without: Array) -> Array:
+        """(T, M): the columns of the drives that have one, ``without`` (T,) at the others."""
         return np.stack(
             [
-                self._column(columns[m], units[m], f"{what} of {m}", True) if m in units else nothing
+                self._column(columns[m], units[m], f"{what} {m}", step_like) if m in columns and m in units else without
                 for m in self.robot.motor_names
             ],
             axis=1,
@@ -304,14 +320,8 @@ class _Import:
         columns = self.mapping.external
         if not columns:
             return None
-        units, rest = torque_units(self.robot), np.zeros(len(self.at_s))
-        return np.stack(
-            [
-                self._column(columns[m], units[m], f"external torque on {m}", False) if m in columns else rest
-                for m in self.robot.motor_names
-            ],
-            axis=1,
-        )
+        rest = np.zeros(len(self.at_s))
+        return self._by_motor(columns, torque_units(self.robot), "external torque on", False, rest)
 
     def _released(self, commands: Array) -> None:
         """A drive that is switched off obeys no command: its command is NaN."""
@@ -365,9 +375,11 @@ class _Import:
         needed = None if torques is None else torques_needed(self.robot, joints, self.step_s)
         if torques is None or needed is None:
             return
-        units = torque_units(self.robot)
-        for m, beside in zip(self.robot.motor_names, beside_need(torques, needed, self.step_s), strict=True):
-            self._judge(torque_suspicion(f"torque of {m}", beside, units[m]), self.mapping.torques[m])
+        units, known = torque_units(self.robot), [m in self.mapping.torques for m in self.robot.motor_names]
+        need, speed = (of_all[:, known] for of_all in needed)
+        judged = beside_need(torques[:, known], (need, speed), self.step_s)
+        for m, beside in zip(np.array(self.robot.motor_names)[known], judged, strict=True):
+            self._judge(torque_suspicion(f"{TORQUE} {m}", beside, units[m]), self.mapping.torques[m])
 
     def _judge(self, found: tuple[str, bool] | None, column: Column | Estimated | None) -> None:
         if found is None:

@@ -50,12 +50,10 @@ def check_names(mapping: Mapping, robot: Robot) -> None:
                 raise MeasurementError(
                     f"{where}: {group}: {robot.name} has no {quoted(name)}; {nearest(name, allowed)}"
                 )
-    for group, names in (("commands", mapping.commands), ("torques", mapping.torques)):
-        driven = command_units(robot) if group == "commands" else motors
-        missing = [m for m in driven if m not in names]
-        # A log without any command is of use to a balance of forces, which needs the torques.
-        if missing and (names or (group == "commands" and not mapping.torques)):
-            raise MeasurementError(f"{where}: {group}: no column for joint {quoted(missing[0])} of {robot.name}")
+    missing = [m for m in command_units(robot) if m not in mapping.commands]
+    # A log without any command is of use to a balance of forces, which needs torques, of whichever joints.
+    if missing and (mapping.commands or not mapping.torques):
+        raise MeasurementError(f"{where}: commands: no column for joint {quoted(missing[0])} of {robot.name}")
     absent = [s for s in robot.sensor_names if s not in mapping.sensors]
     if absent:
         raise MeasurementError(

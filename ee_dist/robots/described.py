@@ -86,9 +86,7 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
         raise RobotError(f"{where}: start_position_m: expected three numbers, not {quoted(start)}")
     gravity = GRAVITY_M_S2 if body.gravity_m_s2 is None else body.gravity_m_s2
     step = FINE_S if body.time_step_s is None else body.time_step_s
-    # A hint that was taken need not be given again.
-    taken = data.get("inertia_about") == "joint"
-    notes = [n for n in body.notes if not (taken and n.startswith(PIVOT_HINT))]
+    notes = _with_hints(body, data.get("inertia_about", "centre"))
     passive = [j.name for j in body.moving if j.name not in {d.joint for d in drives}]
     if passive:
         notes.append(f"joints without a drive swing freely: {', '.join(passive)}")
@@ -116,14 +114,37 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     return robot, tuple(notes)
 
 
+def _hinged(body: Body) -> tuple[str, ...]:
+    """Names of the parts that a hinge carries."""
+    carried = {j.child for j in body.joints if j.kind == "hinge"}
+    return tuple(p.name for p in body.parts if p.name in carried)
+
+
+def _with_hints(body: Body, about: Any) -> list[str]:
+    """The notes of the file. A hint that was taken need not be given again; one that names a link or two says how to put right
+    these alone, for others may be right as they are."""
+    taken, many = about == "joint" or isinstance(about, list), len(_hinged(body))
+    all_of_them = f", which means all {many} links that hinges carry; 'inertia_about: [LINK, ...]' means those it names"
+    hints = [n for n in body.notes if n.startswith(PIVOT_HINT)]
+    more = all_of_them if many > 1 else ""
+    return [n + more if n in hints else n for n in body.notes if not (taken and n in hints)]
+
+
 def _parts(body: Body, about: Any, where: str) -> tuple[Part, ...]:
-    """The parts; with inertias about the joints, those that a hinge carries are brought to their centres."""
-    if about not in ("centre", "joint"):
+    """The parts; inertias about the joints, of all or some by name that a hinge carries, are brought to their centres."""
+    hinged = _hinged(body)
+    some = about if isinstance(about, list) else {"centre": [], "joint": hinged}.get(str(about))
+    if some is None:
         raise RobotError(
-            f"{where}: inertia_about: expected 'centre' (of mass, as URDF means it) or 'joint', not {about!r}"
+            f"{where}: inertia_about: expected 'centre' (of mass, as URDF means it), 'joint' or a list of links, "
+            f"not {quoted(about)}"
         )
-    hinged = {j.child for j in body.joints if j.kind == "hinge"}
-    return tuple(about_centre(p, where) if about == "joint" and p.name in hinged else p for p in body.parts)
+    for name in some:
+        if name not in hinged:
+            raise RobotError(
+                f"{where}: inertia_about: no link named {quoted(name)} that a hinge carries; {near(str(name), hinged)}"
+            )
+    return tuple(about_centre(p, where) if p.name in some else p for p in body.parts)
 
 
 def _drives(data: Any, body: Body, where: str) -> tuple[Drive, ...]:

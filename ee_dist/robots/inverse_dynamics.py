@@ -8,6 +8,7 @@ model with other masses then costs one product.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,10 +51,15 @@ def joint_torques(robot: Robot, position: Array, speed: Array, acceleration: Arr
     return regressor(robot, position, speed, acceleration) @ parameters(robot) + rotors(robot) * acceleration
 
 
-def parameters(robot: Robot) -> Array:
-    """(10 P,) of the carried parts: mass, mass * centre (3), inertia about the part's frame (xx, yy, zz, xy, xz, yz)."""
+def parameters(robot: Robot, of: Collection[str] | None = None) -> Array:
+    """(10 P,) of the carried parts: mass, mass * centre (3), inertia about the part's frame (xx, yy, zz, xy, xz, yz);
+    ``of``: only of what one of these joints carries."""
     found: list[float] = []
+    carried: set[str] = set()
     for joint in _parents_first(robot):
+        if of is not None and joint.name not in of and joint.parent not in carried:
+            continue
+        carried.add(joint.child)
         part = robot.part(joint.child)
         m, (x, y, z) = part.mass_kg, part.com_m
         shift = (y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z)

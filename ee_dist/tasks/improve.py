@@ -38,7 +38,7 @@ from ee_dist.tasks.results.summaries import of_improvement
 from ee_dist.tasks.results.tables import show_account, show_candidates, show_ladder
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
-from ee_dist.tasks.unfinished import FOLDER, SO_FAR
+from ee_dist.tasks.unfinished import keep_so_far
 from ee_dist.tasks.ways import known_way, open_loop, way_of
 from ee_dist.viewing.report import write_page
 
@@ -84,7 +84,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         if options.calibrate:
             found, calibration = calibrated(measured, config, pool, wanted, options.most, progress)
         else:
-            climbed = telling(problem, progress, measured, out / FOLDER / SO_FAR)
+            climbed = telling(problem, progress, measured)
             found = improve(
                 problem, pool, measured.model, wanted, most=options.most, progress=progress, climbed=climbed
             )
@@ -114,16 +114,16 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     return problem, found, account
 
 
-def telling(problem: Problem, progress: SearchProgress, measured: Measurements, so_far: Path) -> Callable[[Rung], None]:
+def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:
     """Says every step of the ladder when it is taken, as the table at the end will, and keeps its model where a run keeps what
     it would go on from."""
 
     def climbed(rung: Rung) -> None:
         told = f"{step_phrase(rung, problem)}: {problem.told(rung.error_heldout)} on data held out"
+        notes = ("Not the end of the search: more may come, and what came first may go again. Its last step:", told)
+        # First kept, then told: who stops a search because of what it says finds that.
+        keep_so_far(lambda path: write_model(path, measured.source, measured.folder, rung.terms, notes))
         progress.note(told)
-        if so_far.parent.is_dir():
-            notes = ("Not the end of the search: more may come, and what came first may go again. Its last step:", told)
-            write_model(so_far, measured.source, measured.folder, rung.terms, notes)
 
     return climbed
 

@@ -7,7 +7,7 @@ resumed run goes through all its steps again, finds there what is known, and so 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -229,6 +229,14 @@ def note_in(evaluator: Evaluator) -> None:
         inner = getattr(inner, "inner", None)
 
 
+def keep_so_far(write: Callable[[Path], None]) -> None:
+    """Have ``write`` put the model that the search under way has reached where its run would go on from. A search that simulates
+    nothing keeps nothing else; what has no end to reach keeps nothing at all."""
+    if _current is not None:
+        _current.begin()
+        write(_current.folder / SO_FAR)
+
+
 def finished(out: Path, config: Config, options: Any) -> bool:
     """Whether a run of these very settings has reached its end in that folder."""
     try:
@@ -241,6 +249,11 @@ def finished(out: Path, config: Config, options: Any) -> bool:
 def can_go_on(out: Path) -> bool:
     """Whether ``resume=`` of that folder would find anything."""
     return (out / FOLDER / _RUN).exists()
+
+
+def goes_on(out: Path) -> bool:
+    """Whether such a run would find there what was simulated or tried, rather than begin anew."""
+    return (out / FOLDER / _SIMULATED).exists() or any((out / FOLDER).glob("*.mcap"))
 
 
 def _changed(old: Any, new: Any, prefix: str = "") -> list[str]:

@@ -10,12 +10,13 @@ import numpy as np
 
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED
-from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
+from ee_dist.discrepancy.ways.force_balance.motion import motor_torques, torques_known
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun, led
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.engines.one_joint import fits
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError, one_of
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.wiring import ONE_JOINT, evaluator_of
@@ -133,9 +134,7 @@ def way_of(measured: Measurements, by: str) -> Way:
     if by == AUTO and measured.calibrated_by:
         return _possible(WAYS[measured.calibrated_by], measured)
     if by == AUTO:
-        torques = all(
-            t.log.joints is not None and motor_torques(t.log, measured.robot) is not None for t in measured.trials
-        )
+        torques = all(_forces_known(t.log, measured.robot, all_of_them=driven) for t in measured.trials)
         held = led(measured.robot) or measured.robot.free_base
         by = "open_loop" if (driven and held) or not torques else "force_balance"
         if driven and not held and _seen(measured):
@@ -147,6 +146,13 @@ def way_of(measured: Measurements, by: str) -> Way:
         if by == "open_loop" and _only_motion(measured):
             return _possible(replace(WAYS["free_run"], why=ONLY_MOTION), measured)
     return _possible(WAYS[by], measured)
+
+
+def _forces_known(log: SensorLog, robot: Robot, all_of_them: bool) -> bool:
+    """Whether a balance of forces has what it needs: torques of some drives, or ``all_of_them``, for where commands say how the
+    robot was driven, a simulation judges every joint."""
+    torques = None if log.joints is None else motor_torques(log, robot)
+    return torques is not None and (not all_of_them or len(torques_known(torques)) == len(robot.drives))
 
 
 ONLY_MOTION = (

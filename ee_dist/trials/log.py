@@ -23,7 +23,8 @@ class SensorLog:
     """One run. Row t holds what was sensed at ``times_s[t]`` and what was commanded upon it.
 
     Shapes: times_s (T,), sensors (T, S), commands (T, M) in radians (metres for a slide). Where known: base_pose (T, 7)
-    as x, y, z, qx, qy, qz, qw in the frame of the floor; joints (T, M) joint positions; torques (T, M) of the drives;
+    as x, y, z, qx, qy, qz, qw in the frame of the floor; joints (T, M) joint positions; torques (T, M) of the drives,
+    NaN at those of which none are known;
     supply_v (T,); external (T, M) torques on the joints that are known and not the drives'; filled (T,) whether the sensors
     were not read in a row, so that what it holds of them lies between two readings. Arrays are read-only.
     """

@@ -24,15 +24,17 @@ from ee_dist.tasks.measurements import load
 from ee_dist.trials.log import LogError
 
 
-def trials_without_weight(robot: Robot, trials: tuple[MeasuredTrial, ...]) -> tuple[MeasuredTrial, ...]:
-    """The same motions with torques as a controller reports them that compensates gravity."""
+def trials_without_weight(
+    robot: Robot, trials: tuple[MeasuredTrial, ...], at: tuple[float, ...] = (1.0, 1.0)
+) -> tuple[MeasuredTrial, ...]:
+    """The same motions with torques as a controller reports them that compensates gravity, ``at`` each joint so much of it."""
     floating = replace(robot, world=replace(robot.world, gravity_m_s2=0.0))
     out = []
     for t in trials:
         assert t.log.joints is not None and t.log.torques is not None
         weight = torques_needed(robot, t.log.joints, robot.time_step_s)[0]
         weight = weight - torques_needed(floating, t.log.joints, robot.time_step_s)[0]
-        out.append(replace(t, log=replace(t.log, torques=t.log.torques - weight)))
+        out.append(replace(t, log=replace(t.log, torques=t.log.torques - weight * at)))
     return tuple(out)
 
 
@@ -46,6 +48,16 @@ def test_torques_that_carry_no_weight_are_told_before_anything_is_believed() -> 
     assert any(line.startswith("Before this is believed: the measured torques do not carry") for line in told.first)
     floating = replace(robot, world=replace(robot.world, gravity_m_s2=0.0))
     assert not ForceBalance(light, floating).doubts
+
+
+@pytest.mark.parametrize(("at", "name"), [((1.0, 0.0), "shoulder"), ((0.0, 1.0), "elbow")])
+def test_one_joint_without_its_weight_is_named_and_gravity_is_not_put_off(at: tuple[float, ...], name: str) -> None:
+    robot, trials = samples()["arm"].robot, measured("arm")
+    said = ForceBalance(trials_without_weight(robot, trials, at), robot).doubts
+    assert said.startswith(f"the torques measured at {name} do not carry the weight that the model has there (")
+    assert "gravity" not in said
+    # A weight that is a third off is a heavy part, and no other quantity.
+    assert not ForceBalance(trials_without_weight(robot, trials, (0.3, 0.3)), robot).doubts
 
 
 def held(trial: MeasuredTrial, every: int) -> MeasuredTrial:

@@ -192,7 +192,14 @@ def test_broken_xml_names_the_line(tmp_path: Path) -> None:
         ("urdf: ARM\ndrives: {elbow: {kp: 1}}\nsensors: [{name: a, kind: smell}]", "no sensor kind 'smell'"),
         ("urdf: ARM\nfree_bas: true", "unknown key 'free_bas'; did you mean free_base"),
         ("urdf: ARM\nvelocity_limits: yes", "velocity_limits: expected 'scale' .*'obeyed' .*, not True"),
-        ("urdf: ARM\ninertia_about: hinge", "inertia_about: expected 'centre' .*'joint', not 'hinge'"),
+        (
+            "urdf: ARM\ninertia_about: hinge",
+            "inertia_about: expected 'centre' .*'joint' or a list of links, not 'hinge'",
+        ),
+        (
+            "urdf: ARM\ninertia_about: [uper]",
+            "inertia_about: no link named 'uper' that a hinge carries; did you mean upper",
+        ),
         ("urdf: ARM\ninertia_about: joint", "has more inertia about the joint than the .* they are about its centre"),
         ("urdf: ARM\ntime_step_s: 2", "seconds, not milliseconds"),
         ("urdf: ARM\ndrives: {elbow: {kp: .nan}}", "drives: elbow: kp: nan; expected 0 to 1e"),
@@ -357,6 +364,25 @@ def test_an_inertia_about_the_joint_is_hinted_at(tmp_path: Path) -> None:
     assert sorted(robot.part("arm").inertia_kg_m2[:3]) == pytest.approx([thin / 4, thin / 4, thin / 2])
     MuJoCoEngine(threads=1).rollout([Rollout(robot, Commands(np.zeros((1, 0))), 2)])
     assert not read(tmp_path, link("base"), hinge("a", "base", "arm"), about_centre).notes
+
+
+def test_inertias_of_some_links_alone_are_about_their_joints(tmp_path: Path) -> None:
+    thin = 4 / 3 * 1.0 * 0.25**2
+    body = read(
+        tmp_path, link("base"), hinge("a", "base", "arm"), link("arm", com="0 0 0.25", inertia=thin),
+        hinge("b", "arm", "hand"), link("hand", com="0 0 0.25", inertia=thin / 4),
+    )  # fmt: skip
+    told, named, every = (
+        robot_of_body(body, {} if about is None else {"inertia_about": about}, "arm.yaml")
+        for about in (None, ["arm"], [])
+    )
+    (hint,) = [n for n in told[1] if n.startswith("hint")]
+    assert "inertia of arm looks" in hint and "means all 2 links that hinges carry" in hint
+    assert "'inertia_about: [LINK, ...]' means those it names" in hint
+    assert not [n for n in named[1] if n.startswith("hint")]
+    assert sorted(named[0].part("arm").inertia_kg_m2[:3]) == pytest.approx([thin / 4, thin / 4, thin / 2])
+    assert named[0].part("hand") == told[0].part("hand")
+    assert every[0].parts == told[0].parts
 
 
 def test_a_drive_without_a_speed_limit_has_the_speed_of_its_joint_as_scale() -> None:

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ee_dist.__main__ import _what_is_kept
+from ee_dist.discrepancy import improve as improving
 from ee_dist.effects import catalogue, laws
 from ee_dist.evaluation.jobs import Counts
 from ee_dist.evaluation.journal import MAGIC, Journal, JournaledEvaluator
@@ -176,6 +178,39 @@ def test_the_model_that_a_stopped_search_had_reached_can_be_used(cli, tmp_path, 
     assert text.startswith("# Not the end of the search") and "effect: coulomb_friction" in text
     stopping()
     assert cli("task=compare", *same, f"model={so_far}", f"hydra.run.dir={tmp_path}/compare").status == 0
+    assert cli(*ask, f"resume={run}").status == 0
+    assert not so_far.parent.exists() and (run / "model.yaml").exists()
+
+
+def test_a_search_that_simulates_nothing_keeps_its_model_too(cli, tmp_path, monkeypatch):
+    log, run = tmp_path / "log", tmp_path / "run"
+    assert cli(
+        "task=trial", "robot=servo_pendulum", "+hidden=coulomb_friction@servo", "engine=mujoco", "seed=1",
+        "task.motor_torque=true", "task.noise=0.0001",
+        "task.excitations=['multisine:seconds=1,seed=1','slow_sines:seconds=1,seed=2']", f"hydra.run.dir={log}",
+    ).status == 0  # fmt: skip
+    same = (f"measured={log}", "engine=mujoco", "evaluator=serial", "task.by=force_balance", "task.rerun=false")
+    ask = ("task=improve", "effect=auto", "task.only=[coulomb_friction,viscous_friction]", *same)
+    so_far, real, told = run / "unfinished" / "model.yaml", improving.examine, []
+
+    def examine(*args):
+        if so_far.exists() or not due:
+            told.append(_what_is_kept(run))
+            raise RuntimeError("the power went")
+        return real(*args)
+
+    monkeypatch.setattr(improving, "examine", examine)
+    due = False
+    assert cli(*ask, f"hydra.run.dir={run}").status == 1
+    assert told.pop() == "nothing was recorded yet, so nothing is kept" and not so_far.parent.exists()
+    due = True
+    assert cli(*ask, f"hydra.run.dir={run}", "overwrite=true").status == 1
+    assert told.pop().endswith(
+        f"; the same command and resume={run} begins its search anew; the model so far: {so_far}"
+    )
+    assert "effect: coulomb_friction" in so_far.read_text()
+    assert cli("task=compare", *same, f"model={so_far}", f"hydra.run.dir={tmp_path}/compare").status == 0
+    monkeypatch.setattr(improving, "examine", real)
     assert cli(*ask, f"resume={run}").status == 0
     assert not so_far.parent.exists() and (run / "model.yaml").exists()
 

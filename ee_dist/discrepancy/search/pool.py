@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.search.candidates import Candidate, candidates
+from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates
+from ee_dist.effects.groups import JOIN
 
 
 def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] = ()) -> list[Candidate]:
     """Candidates at all places and groups, less those left out. Raises EffectError for names that do not exist."""
     found = candidates(problem.robot, without, only or None, problem.families)
-    return [c for c in found if (c.size or problem.switches) and problem.shows(c.effect.name, c.target)]
+    able = (c for c in found if (c.size or problem.switches) and problem.shows(c.effect.name, c.target))
+    # Several groups may be one where joints that nothing is known of are left out.
+    return list({c.name: c for c in (_judged(problem, c) for c in able) if c is not None}.values())
+
+
+def _judged(problem: Problem, c: Candidate) -> Candidate | None:
+    """The candidate at those joints of its group at which something is compared; None where fewer than two are left: unlike
+    motors elsewhere would bound its values, and its verdict would be of joints that nobody measured."""
+    members = c.members(problem.robot)
+    judged = tuple(m for m in members if m not in problem.unjudged)
+    if judged == members:
+        return c
+    if len(judged) < 2:
+        return None
+    return replace(candidate(problem.robot, c.effect, JOIN.join(judged)), guess=c.guess)

@@ -49,46 +49,49 @@ class Balance:
 
     def __init__(self, motion: Motion, keep_every: int, motions: int = 1) -> None:
         self.motion, self.keep_every = motion, keep_every
-        self.rest = decimated(motion.rest.astype(float), keep_every) > 0.5
-        """(rows, M): where a joint did not move."""
+        self.rest = decimated(motion.of_judged(motion.rest).astype(float), keep_every) > 0.5
+        """(rows, J): where a joint did not move."""
         self._kept: dict[tuple[object, ...], tuple[Array, Array] | None] = {}
         self._most = max(MOST_VALUES * keep_every // (motions * max(len(motion.torque), 1)), 64)
 
     def __call__(self, robot: Robot) -> tuple[Array, Array] | None:
-        """(rows, M) of ``left_over``, decimated: with friction that holds what rests, and without it; None where a model
-        leaves the finite numbers."""
+        """(rows, J) of ``left_over`` at the judged drives, decimated: with friction that holds what rests, and without it; None
+        where a model leaves the finite numbers."""
         asked, needed = self.motion.needed(robot)
         inertia = felt_inertia(robot)
         laws = {d.joint: tuple(law for law in robot.laws if law.joint == d.joint) for d in robot.drives}
         keys = [
             (k, asked, tuple(getattr(d, n) for n in SEEN), laws[d.joint], inertia[k] if _rubs(d) else 0.0)
-            for k, d in enumerate(robot.drives)
+            for k, d in ((k, robot.drives[k]) for k in self.motion.judged)
         ]
-        missing = [k for k, key in enumerate(keys) if key not in self._kept]
+        missing = [i for i, key in enumerate(keys) if key not in self._kept]
         if missing:
             if len(self._kept) + len(missing) > self._most:
                 self._kept.clear()
                 missing = list(range(len(keys)))
-            held, free = left_over(robot, self.motion, needed, missing)
+            held, free = left_over(robot, self.motion, needed, [self.motion.judged[i] for i in missing])
             whole = np.asarray(np.isfinite(held).all(axis=0))
             kept = decimated(np.where(whole, held, 0.0), self.keep_every)
             loose = kept if free is held else decimated(np.where(whole, free, 0.0), self.keep_every)
-            for i, k in enumerate(missing):
+            for column, i in enumerate(missing):
                 # Not as a view: that would keep all rows of all joints, of which every tenth of one is wanted.
-                own = kept[:, i].copy()
-                other = own if loose is kept else loose[:, i].copy()
-                self._kept[keys[k]] = (own, other) if whole[i] else None
+                own = kept[:, column].copy()
+                other = own if loose is kept else loose[:, column].copy()
+                self._kept[keys[i]] = (own, other) if whole[column] else None
         columns = [c for key in keys if (c := self._kept[key]) is not None]
         if len(columns) < len(keys):
             return None
         return np.stack([c[0] for c in columns], axis=1), np.stack([c[1] for c in columns], axis=1)
 
 
-def told_by(robot: Robot) -> tuple[object, ...]:
-    """What of a robot a balance of forces depends on: of two with the same it leaves the same."""
-    drives = tuple(tuple(getattr(d, n) for n in SEEN if n != BEYOND) for d in robot.drives)
-    laws = tuple(law for law in robot.laws if law.name not in SPEED_LAWS)
-    return geometry(robot), gravity(robot).tobytes(), parameters(robot).tobytes(), drives, laws
+def told_by(robot: Robot, judged: Sequence[int]) -> tuple[object, ...]:
+    """What of a robot a balance of forces at the ``judged`` drives depends on: of two with the same it leaves the same."""
+    own = [robot.drives[k] for k in judged]
+    names = {d.joint for d in own}
+    drives = tuple(tuple(getattr(d, n) for n in SEEN if n != BEYOND) for d in own)
+    laws = tuple(law for law in robot.laws if law.name not in SPEED_LAWS and law.joint in names)
+    # Another joint needs no force of these for what it carries, but where they carry it too.
+    return geometry(robot), gravity(robot).tobytes(), parameters(robot, names).tobytes(), drives, laws
 
 
 def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]) -> tuple[Array, Array]:

@@ -17,12 +17,12 @@ CANCELLED = 1 / 3
 
 
 def left_to_give(models: Sequence[Robot], motions: Sequence[Motion], size: Array) -> float:
-    """What the motions needed in all (root mean square, drives by their measured torque ``size`` (M,)) as a share of what gravity
-    and inertia needed, each for itself: 1 where they do not cancel, or there is nothing to cancel."""
+    """What the motions needed in all (root mean square, judged drives by their measured torque ``size`` (J,)) as a share of what
+    gravity and inertia needed, each for itself: 1 where they do not cancel, or there is nothing to cancel."""
     both = weight = inertia = 0.0
     for model, motion in zip(models, motions, strict=True):
         floating = without_weight(model)
-        needed, without = (motion.needed(m)[1] / size for m in (model, floating))
+        needed, without = (motion.of_judged(motion.needed(m)[1]) / size for m in (model, floating))
         both = both + np.sum(needed**2, axis=0)
         weight, inertia = weight + np.sum((needed - without) ** 2, axis=0), inertia + np.sum(without**2, axis=0)
     whole = float(np.sum((np.sqrt(weight) + np.sqrt(inertia)) ** 2))

@@ -32,8 +32,8 @@ by straight lines show two thirds of theirs."""
 
 @dataclass(frozen=True, eq=False)
 class Floor:
-    """(M,) variances, as shares of the mean square of the measured force: noise is no more than ``most``, and no less than
-    ``sure``; the same where the two are alike."""
+    """(J,) variances at the judged drives, as shares of the mean square of the measured force: noise is no more than ``most``,
+    and no less than ``sure``; the same where the two are alike."""
 
     most: Array
     sure: Array
@@ -49,7 +49,7 @@ def floor_of(
     low_pass = ready.processing.filter_for(step_s)
     passed = low_pass.cutoff_hz * step_s
     added = ready.noise.first / size**2
-    candidates = [([decimated(m.torque, every) / size for m in ready.motions], np.zeros_like(size))]
+    candidates = [([decimated(m.of_judged(m.torque), every) / size for m in ready.motions], np.zeros_like(size))]
     both = [balance(model) for model, balance in zip(models, balances, strict=True)]
     left = [b[1] / size for b in both if b is not None]
     if len(left) == len(both):
@@ -61,21 +61,22 @@ def floor_of(
     sure = added + _white(trials, models, ready, passed)
     for k in np.flatnonzero(most > ALIKE**2 * sure):
         series = candidates[chosen[k]][0]
-        ways = [Way(m.position[:, k], m.speed[:, k], s[:, k]) for m, s in zip(ready.motions, series, strict=True)]
+        of = [(m.judged[k], m) for m in ready.motions]
+        ways = [Way(m.position[:, j], m.speed[:, j], s[:, k]) for (j, m), s in zip(of, series, strict=True)]
         most[k] = (most[k] - added[k]) * share_of_no_place(ways, every, step_s, low_pass) + added[k]
     return Floor(most, np.where(most > ALIKE**2 * sure, sure, most))
 
 
 def _white(trials: Sequence[MeasuredTrial], models: Sequence[Robot], ready: Prepared, passed: float) -> Array:
-    """(M,) what thinning leaves of the noise from one reading to the next, and of the steps in which readings come."""
+    """(J,) what thinning leaves of the noise from one reading to the next, and of the steps in which readings come."""
     cut = ready.processing.settled
     read = [motor_torques(t.log, model) for t, model in zip(trials, models, strict=True)]
-    rows = [cut(r) for r in read if r is not None]
+    rows = [cut(m.of_judged(r)) for m, r in zip(ready.motions, read, strict=True) if r is not None]
     steps = np.mean([[reading_step(column) ** 2 / 12 for column in r.T] for r in rows], axis=0)
     noise = np.maximum(_variance(rows), steps)
     return np.asarray(noise * share_of_noise(ready.processing.keep_every, passed) / ready.size**2)
 
 
 def _variance(series: Sequence[Array]) -> Array:
-    """(M,) of white noise on something smooth, over trials of (T, M)."""
+    """(J,) of white noise on something smooth, over trials of (T, J)."""
     return np.mean([np.median(roughness(s), axis=0) for s in series], axis=0) / MEDIAN_OF_SQUARES

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -96,16 +97,22 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A measured motion (T, M): positions, speeds, accelerations; ``torque`` that the drives gave; ``rest``: where a joint
-    did not move, as far as its readings tell; ``external``: known torques that are not the drives', if there are any."""
+    """A measured motion (T, M): positions, speeds, accelerations; ``torque`` that the drives gave, NaN but at the ``judged``
+    (J,) drives; ``rest``: where a joint did not move, as far as its readings tell; ``external``: known torques that are not the
+    drives', if there are any."""
 
     position: Array
     speed: Array
     acceleration: Array
     torque: Array
     rest: Mask
+    judged: tuple[int, ...]
     external: Array | None = None
     known: dict[tuple[object, ...], Moved] = field(default_factory=dict)
+
+    def of_judged(self, series: Array) -> Array:
+        """(T, J, ...) what a series (T, M, ...) holds of the judged drives."""
+        return np.take(series, self.judged, axis=1)
 
     def needed(self, robot: Robot) -> tuple[object, Array]:
         """(T, M) torque that the motion of the parts needs, without that of the rotors; equal keys have equal torques. What
@@ -130,8 +137,11 @@ class Motion:
         return (shape, asked), known.last[1]
 
 
-def motion_of(trial: MeasuredTrial, robot: Robot, processing: Processing) -> Motion:
-    """Raises MeasurementError where the log lacks positions or torques, or is too short."""
+def motion_of(
+    trial: MeasuredTrial, robot: Robot, processing: Processing, judged: Sequence[int] | None = None
+) -> Motion:
+    """``judged``: drives whose torques count; without, all that the log knows. Raises MeasurementError where it lacks positions
+    or torques, or is too short."""
     log = trial.log
     joints = positions_of(log, robot)
     torques = motor_torques(log, robot)
@@ -149,11 +159,16 @@ def motion_of(trial: MeasuredTrial, robot: Robot, processing: Processing) -> Mot
     if log.torques is None and trial.commands_held is False:
         torques = of_the_step_after(torques)
     dt = float(np.median(np.diff(log.times_s)))
+    judged = torques_known(torques) if judged is None else judged
+    rest = processing.settled(at_rest(joints, dt, processing, give(robot)))
+    given = np.full(rest.shape, math.nan)
     # Forces go the way of the positions: what a filter takes from the motion, and not from them, would look like a missing force.
+    given[:, judged] = processing.smooth(np.take(torques, judged, axis=1), dt)
     return Motion(
         *processing.differentiated(joints, dt),
-        processing.smooth(torques, dt),
-        processing.settled(at_rest(joints, dt, processing, give(robot))),
+        given,
+        rest,
+        tuple(judged),
         None if log.external is None else processing.smooth(log.external, dt),
     )
 
@@ -196,20 +211,36 @@ def noise_of(readings: Array) -> Array:
 
 
 def motor_torques(log: SensorLog, robot: Robot) -> Array | None:
-    """(T, M) what the motors gave, before friction, row by row: the log's torques, else what sensors of motor torque read; None
-    without."""
-    return _channels(log, robot, MOTOR_TORQUE) if log.torques is None else log.torques
+    """(T, M) what the motors gave, before friction, row by row: the log's torques, else what sensors of motor torque read; NaN at
+    drives of which neither tells, and None where they tell of none."""
+    found = _channels(log, robot, MOTOR_TORQUE) if log.torques is None else log.torques
+    return found if torques_known(found) else None
+
+
+def torques_known(torques: Array) -> tuple[int, ...]:
+    """The drives whose torques, of (T, M), are known in all rows."""
+    return tuple(int(k) for k in np.flatnonzero(np.isfinite(torques).all(axis=0)))
+
+
+def judged_in(trials: Sequence[MeasuredTrial], robot: Robot) -> tuple[int, ...]:
+    """The drives whose torques are known in every trial. Raises MeasurementError where each trial knows those of others."""
+    read = [t for trial in trials if (t := motor_torques(trial.log, robot)) is not None]
+    found = tuple(k for k in range(len(robot.drives)) if all(k in torques_known(t) for t in read))
+    if not found:
+        raise MeasurementError(
+            f"no joint of {robot.name} has its torque known in every trial: compare trials that know the same torques"
+        )
+    return found
 
 
 def positions_of(log: SensorLog, robot: Robot) -> Array | None:
     """(T, M) as the sensors read them, noise and all; else as the log knows them; None without."""
     read = _channels(log, robot, "position")
-    return log.joints if read is None else read
+    return read if np.isfinite(read).all() else log.joints
 
 
-def _channels(log: SensorLog, robot: Robot, kind: str) -> Array | None:
-    """(T, M) what the sensors of one kind read, if every drive has one."""
+def _channels(log: SensorLog, robot: Robot, kind: str) -> Array:
+    """(T, M) what the sensors of one kind read; NaN at a drive that has none."""
     of = {s.target: k for k, s in enumerate(robot.sensors) if s.kind == kind}
-    if not set(robot.motor_names) <= set(of):
-        return None
-    return np.array(log.sensors[:, [of[m] for m in robot.motor_names]])
+    none = np.full(len(log), math.nan)
+    return np.stack([log.sensors[:, of[m]] if m in of else none for m in robot.motor_names], axis=1)

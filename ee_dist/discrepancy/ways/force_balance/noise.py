@@ -15,7 +15,14 @@ import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Mask
-from ee_dist.discrepancy.ways.force_balance.motion import Motion, Processing, motion_of, noise_of, positions_of
+from ee_dist.discrepancy.ways.force_balance.motion import (
+    Motion,
+    Processing,
+    judged_in,
+    motion_of,
+    noise_of,
+    positions_of,
+)
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import LowPass, decimated
 from ee_dist.robots.inverse_dynamics import parameters, regressor
@@ -37,7 +44,7 @@ MOVING = 2
 
 
 def resting(held: Array, free: Array, rest: Mask) -> Array:
-    """(rows, M) what is left, in standard deviations, where friction that holds what rests has (``held``) and has not
+    """(rows, J) what is left, in standard deviations, where friction that holds what rests has (``held``) and has not
     (``free``) its say. It takes noise along with all else, and would look right for that alone: of what it takes, what may be
     noise stays, and one standard deviation of what cannot be."""
     size = np.abs(free)
@@ -46,7 +53,7 @@ def resting(held: Array, free: Array, rest: Mask) -> Array:
 
 
 def with_energy(left: Array, more: Array) -> Array:
-    """(rows, M) with ``more`` (M,) added to each square, which stays positive."""
+    """(rows, J) with ``more`` (J,) added to each square, which stays positive."""
     return np.copysign(np.sqrt(np.maximum(left**2 + more, 0.0)), left)
 
 
@@ -77,8 +84,8 @@ def share_of_noise(every: int, passed: float) -> float:
 
 
 class MotionNoise:
-    """By drive: mean products (M, P, P) of the columns of a noise regressor, so that a model's noise is a quadratic form; and
-    those of their second differences, for how rough it is.
+    """By judged drive: mean products (J, P, P) of the columns of a noise regressor, so that a model's noise is a quadratic form;
+    and those of their second differences, for how rough it is.
 
     The columns are the inertial parameters, rotor inertia and viscous friction.
     """
@@ -90,6 +97,7 @@ class MotionNoise:
         motions: Sequence[Motion],
         processing: Processing,
     ) -> None:
+        self.judged = motions[0].judged
         sums, rough, rows = np.zeros(()), np.zeros(()), 0
         for k, (trial, model, motion) in enumerate(zip(trials, models, motions, strict=True)):
             noise = decimated(_added(trial, model, motion, processing, k), processing.keep_every)
@@ -101,14 +109,14 @@ class MotionNoise:
         self.first_roughness = np.mean([self._of(self._rough, m) for m in models], axis=0)
 
     def variance(self, robot: Robot) -> Array:
-        """(M,) of the force that noise makes at each drive, in terms of its measured force. A robot that has lost parts is told
-        by its first model's noise."""
+        """(J,) of the force that noise makes at each judged drive, in terms of its measured force. A robot that has lost parts is
+        told by its first model's noise."""
         same = len(parameters(robot)) + MOVING == self.products.shape[1]
         return self._of(self.products, robot) if same else self.first
 
     def _of(self, products: Array, robot: Robot) -> Array:
-        masses, found = parameters(robot), np.empty(len(robot.drives))
-        for k, d in enumerate(robot.drives):
+        masses, found = parameters(robot), np.empty(len(self.judged))
+        for k, d in enumerate(robot.drives[j] for j in self.judged):
             column = np.array([*masses, d.rotor_inertia, d.viscous])
             through = max(d.strength * d.current_gain, 1e-3)
             found[k] = column @ products[k] @ column / through**2
@@ -120,7 +128,7 @@ def _products(columns: Array) -> Array:
 
 
 def _added(trial: MeasuredTrial, model: Robot, motion: Motion, processing: Processing, number: int) -> Array:
-    """(T, M, P): the regressor of the measured motion with noise of the same size once more, less without it."""
+    """(T, J, P): the regressor of the measured motion with noise of the same size once more, less without it."""
     joints = positions_of(trial.log, model)
     assert joints is not None
     dt = float(np.median(np.diff(trial.log.times_s)))
@@ -128,17 +136,22 @@ def _added(trial: MeasuredTrial, model: Robot, motion: Motion, processing: Proce
     position, speed, acceleration = processing.differentiated(drawn, dt)
     moved = (motion.position + position, motion.speed + speed, motion.acceleration + acceleration)
     more = regressor(model, *moved) - regressor(model, motion.position, motion.speed, motion.acceleration)
-    return np.concatenate([more, acceleration[:, :, None], speed[:, :, None]], axis=2)
+    return motion.of_judged(np.concatenate([more, acceleration[:, :, None], speed[:, :, None]], axis=2))
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Measured motions, how they were processed, and what noise does to them; ``size`` (M,): root mean square of the force."""
+    """Measured motions, how they were processed, and what noise does to them; ``size`` (J,): root mean square of the force
+    of each of the ``judged`` drives."""
 
     processing: Processing
     motions: list[Motion]
     noise: MotionNoise
     size: Array
+
+    @property
+    def judged(self) -> tuple[int, ...]:
+        return self.noise.judged
 
 
 def prepared(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
@@ -156,24 +169,36 @@ def prepared(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processin
         found = _tried(trials, models, more)
     share = _share(found, models)
     if share > HOPELESS:
+        worst = models[0].motor_names[found.judged[int(np.argmax(_shares(found, models)))]]
         raise MeasurementError(
-            f"the noise of the measured positions, differentiated twice, makes forces of {100 * share:.0f} % of those measured: "
-            "too much for a balance of forces; compare by task.by=free_run or task.by=open_loop, or record finer positions"
+            f"the noise of the measured positions, differentiated twice, makes forces of {100 * share:.0f} % of those "
+            f"measured at {worst}: too much for a balance of forces; compare by task.by=free_run or task.by=open_loop, or record "
+            "finer positions"
         )
     return found
 
 
 def _tried(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
-    motions = [motion_of(t, model, processing) for t, model in zip(trials, models, strict=True)]
-    forces = np.concatenate([decimated(m.torque, processing.keep_every) for m in motions])
+    judged = judged_in(trials, models[0])
+    motions = [motion_of(t, model, processing, judged) for t, model in zip(trials, models, strict=True)]
+    forces = np.concatenate([decimated(m.of_judged(m.torque), processing.keep_every) for m in motions])
     size = np.sqrt(np.mean(forces**2, axis=0))
     if not size.all():
-        raise MeasurementError(f"{models[0].motor_names[int(np.argmin(size))]}: its measured torque is zero throughout")
+        silent = models[0].motor_names[judged[int(np.argmin(size))]]
+        raise MeasurementError(
+            f"{silent}: its measured torque is zero throughout: leave it out of the torques of the mapping, and the balance is "
+            "judged at the other joints"
+        )
     return Prepared(processing, motions, MotionNoise(trials, models, motions, processing), size)
 
 
 def _share(found: Prepared, models: Sequence[Robot]) -> float:
-    return float(np.max(np.sqrt(found.noise.variance(models[0])) / found.size))
+    return float(np.max(_shares(found, models)))
+
+
+def _shares(found: Prepared, models: Sequence[Robot]) -> Array:
+    """(J,) of each judged drive's measured force that noise makes."""
+    return np.asarray(np.sqrt(found.noise.variance(models[0])) / found.size)
 
 
 def _smoother(trials: Sequence[MeasuredTrial], models: Sequence[Robot], found: Prepared) -> Processing | None:

@@ -37,7 +37,7 @@ LEAST_NOISE = 0.002
 
 
 class ForceBalance(Problem):
-    """A balance of forces. Channels are the drives.
+    """A balance of forces. Channels are the drives whose torques are known, the ``judged``; all joints move.
 
     A residual value is a force left over, in units of the noise of the measured force; ``natural`` makes a relative force
     error of it. Segments are blocks of time.
@@ -64,19 +64,22 @@ class ForceBalance(Problem):
             ready.size,
             ready.noise,
         )
+        self.judged = ready.judged
+        """(J,): the drives whose torques are known in every trial."""
+        self.unjudged = tuple(name for k, name in enumerate(robot.motor_names) if k not in self.judged)
         self.balances = [Balance(m, self.processing.keep_every, len(self.motions)) for m in self.motions]
-        forces = [decimated(m.torque, self.processing.keep_every) for m in self.motions]
+        forces = [decimated(m.of_judged(m.torque), self.processing.keep_every) for m in self.motions]
         self.let_through = ready.noise.first
-        """(M,): variance of the force that noise of the positions makes, with the base model."""
+        """(J,): variance of the force that noise of the positions makes, with the base model."""
         told = floor_of(trials, self.models, ready, self.balances)
         shares = np.maximum(told.most, LEAST_NOISE**2)
         # One share for all drives, so that the sum of squares is the relative error of all of them; a drive's own floor tells
         # how much less or more than that its noise is.
         self.noise_share = float(np.sqrt(np.mean(shares)))
         self.own_noise = np.sqrt(shares) / self.noise_share
-        """(M,): standard deviation of a drive's noise in units of that share."""
+        """(J,): standard deviation of a drive's noise in units of that share."""
         self.sure_noise = np.sqrt(np.maximum(told.sure, LEAST_NOISE**2)) / self.noise_share
-        """(M,): the same of what is noise beyond doubt; the rest may be a force that changes quickly."""
+        """(J,): the same of what is noise beyond doubt; the rest may be a force that changes quickly."""
         self.scale = self.size * self.noise_share
         self._lay_out(forces)
         p, smooth = self.processing, self.processing.filter_for(float(np.median(np.diff(trials[0].log.times_s))))
@@ -101,7 +104,8 @@ class ForceBalance(Problem):
         seg, time, of_trial = [], [], []
         self.slices: list[slice] = []
         self.times_s: list[Array] = []
-        at, motors = 0, len(self.robot.motor_names)
+        names_of_motors = tuple(self.robot.motor_names[j] for j in self.judged)
+        at, motors = 0, len(self.judged)
         for k, (trial, force) in enumerate(zip(self.measured, forces, strict=True)):
             rows = len(force)
             blocks = min(self.processing.blocks, max(1, rows // 20))
@@ -126,9 +130,9 @@ class ForceBalance(Problem):
             reading=np.ones(at, dtype=bool),
             floor=np.tile(self.own_noise**2, at // motors),
             known=np.zeros(at),
-            channels=self.robot.motor_names,
-            units=tuple("N" if kinds[m] == "slide" else "N.m" for m in self.robot.motor_names),
-            joint_of_channel=tuple(range(motors)),
+            channels=names_of_motors,
+            units=tuple("N" if kinds[m] == "slide" else "N.m" for m in names_of_motors),
+            joint_of_channel=self.judged,
         )
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
@@ -153,24 +157,25 @@ class ForceBalance(Problem):
         left = self.raw(self.residuals([hypothesis])[0])
         out = []
         for k, motion in enumerate(self.motions):
-            force = decimated(motion.torque, self.processing.keep_every)
+            force = decimated(motion.of_judged(motion.torque), self.processing.keep_every)
             rest = left[self.slices[k]].reshape(force.shape)
             for c, unit in enumerate(self.layout.units):
                 out.append(Series(k, c, unit, self.times_s[k], force[:, c], (force - rest)[:, c]))
         return out
 
-    def remains(self, hypothesis: Hypothesis, motor: int = 0) -> Remains:
+    def remains(self, hypothesis: Hypothesis, channel: int = 0) -> Remains:
         """When, in which direction and over which position the hypothesis leaves something at one drive, over all trials."""
-        return self._remains(self.raw(self.residuals([hypothesis])[0]), motor)
+        return self._remains(self.raw(self.residuals([hypothesis])[0]), channel)
 
-    def _remains(self, forces: Array, motor: int) -> Remains:
+    def _remains(self, forces: Array, channel: int) -> Remains:
         """The same of the forces (n,) that are left."""
+        joint = self.judged[channel]
         x, v, a = (
-            np.concatenate([decimated(series[:, motor], self.processing.keep_every) for series in of_all])
+            np.concatenate([decimated(series[:, joint], self.processing.keep_every) for series in of_all])
             for of_all in zip(*((m.position, m.speed, m.acceleration) for m in self.motions), strict=True)
         )
         trial = np.repeat(np.arange(len(self.times_s)), [len(t) for t in self.times_s])
-        return remains(self.channels[motor], forces[self.channel_of == motor], x, v, a, trial)
+        return remains(self.channels[channel], forces[self.channel_of == channel], x, v, a, trial)
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         lines: list[str] = []
@@ -183,20 +188,22 @@ class ForceBalance(Problem):
 
     @cached_property
     def stuck(self) -> tuple[str, ...]:
-        """Drives whose joint does not slide in any trial."""
-        never = np.all([m.rest.all(axis=0) for m in self.motions], axis=0)
+        """Judged drives whose joint does not slide in any trial."""
+        never = np.all([m.of_judged(m.rest).all(axis=0) for m in self.motions], axis=0)
         return tuple(name for name, still in zip(self.channels, never, strict=True) if still)
 
     def shows(self, effect: str, target: str) -> bool:
-        """A controller's gain, a delay or play in a gear would be proposed for nothing, and named beside what is found."""
+        """A controller's gain, a delay or play in a gear would be proposed for nothing, and named beside what is found; so would
+        whatever changes nothing but at joints whose torques are not known."""
         limits = find(effect).bounds(self.robot, target)
         corners = [{name: float(ends[end]) for name, ends in limits.items()} for end in (0, 1)]
         changed = [apply(self.robot, (term(effect, target, **values),)) for values in corners]
-        return any(told_by(robot) != told_by(self.robot) for robot in changed)
+        as_it_is = told_by(self.robot, self.judged)
+        return any(told_by(robot, self.judged) != as_it_is for robot in changed)
 
     @cached_property
     def doubts(self) -> str:
-        return weightless(self.models, self.balances, self.size)
+        return weightless(self.models, self.balances, self.size, self.channels)
 
     @cached_property
     def left_to_give(self) -> float:
@@ -206,6 +213,13 @@ class ForceBalance(Problem):
     @property
     def notes(self) -> list[str]:
         lines = []
+        if self.unjudged:
+            they_move = "it moves" if len(self.unjudged) == 1 else "they move"
+            lines.append(
+                f"Torques are compared at {len(self.judged)} of {len(self.robot.drives)} joints: {listed(self.channels)}. At "
+                f"{listed(self.unjudged)} they are not known: how {they_move} counts at the others, and what drives or rubs "
+                "there is not judged."
+            )
         if self.stuck:
             lines.append(
                 f"{listed(self.stuck)} hardly {'moves' if len(self.stuck) == 1 else 'move'} in any trial: what friction takes "

@@ -42,7 +42,7 @@ def closed_loop(
     are its own. Raises MeasurementError where the log lacks what is compared.
     """
     log, smooth = trial.log, low_pass or LowPass(cutoff_hz=100.0)
-    if log.joints is None or log.torques is None:
+    if log.joints is None or log.torques is None or not np.isfinite(log.torques).all():
         raise MeasurementError(
             f"trial {trial.name!r}: joint positions and torques are needed for a closed-loop comparison"
         )
