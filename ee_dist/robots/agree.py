@@ -17,7 +17,9 @@ from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.texts import read_text
 
 OF_THE_MEASUREMENT = ("noise",)
-"""Fields of a sensor that belong to the readings rather than to the robot."""
+"""Fields of a sensor that belong to the readings rather than to the robot;"""
+SEEN_IN_LOGS = ("lag_s",)
+"""those of a joint."""
 
 
 def differences(model: Robot, recorded: Robot) -> tuple[str, ...]:
@@ -47,7 +49,8 @@ def differences(model: Robot, recorded: Robot) -> tuple[str, ...]:
 
 def _lines(what: str, mine: Any, theirs: Any) -> Iterator[str]:
     for f in fields(mine):
-        if not (what.startswith("sensor ") and f.name in OF_THE_MEASUREMENT):
+        own = OF_THE_MEASUREMENT if what.startswith("sensor ") else SEEN_IN_LOGS if what.startswith("joint ") else ()
+        if f.name not in own:
             yield from _line(what, f.name, getattr(mine, f.name), getattr(theirs, f.name))
 
 

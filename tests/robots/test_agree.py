@@ -77,3 +77,7 @@ def test_an_edited_urdf_or_description_is_noticed(tmp_path: Path) -> None:
     assert changed_sources(metadata) == ()
     assert changed_sources({}) == ()
     assert changed_sources({SOURCES: "{"}) == ()
+
+
+def test_by_how_much_a_log_lags_is_no_other_robot():
+    assert differences(servo_pendulum().with_joint("servo", lag_s=0.2), servo_pendulum()) == ()
