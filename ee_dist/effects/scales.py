@@ -30,8 +30,9 @@ STEPS = 2.8
 """Time steps in a radian of a joint's own oscillation from which its controller is simulated as it is."""
 DELAYED_STEPS, DELAYED_S = 20.0, 0.1
 """Longest delay worth trying: of a controller that works in the robot's steps, and of one that does not;"""
-OF_THE_LAG = 1.5
-"""and as a share of the lag with which readings were seen to follow commands, of which the delay is a part."""
+OF_THE_LAG = 1.25
+"""and as a share of the lag with which readings were seen to follow commands, of which the delay is a part. Of several joints the
+least lag counts: what one lags more is as a rule its own sluggishness, and too long a range makes slopes of delays coarse."""
 Range = tuple[float, float]
 Ranges = Callable[[Robot, str], Mapping[str, Range]]
 
@@ -53,7 +54,7 @@ def always(**ranges: Range) -> Ranges:
 
 def longest_delay(robot: Robot) -> float:
     """s; of buses and firmware, which do not know how finely somebody simulates."""
-    seen = max((j.lag_s for j in robot.joints), default=0.0)
+    seen = min((j.lag_s for j in robot.joints if j.lag_s > 0), default=0.0)
     return max(DELAYED_STEPS * robot.time_step_s, DELAYED_S, OF_THE_LAG * seen)
 
 
