@@ -12,7 +12,7 @@ import numpy as np
 
 from ee_dist.discrepancy.search.fitted import Fit
 from ee_dist.discrepancy.search.race import race
-from ee_dist.discrepancy.search.rows import over_rows
+from ee_dist.discrepancy.search.rows import NOISE, over_rows
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.trials.log import Array
@@ -25,8 +25,6 @@ TRIED, ROUNDS = 3, 3
 """Descents at once, each from another value's best move, and how often from where one of them ended."""
 HEATS = ((6, 1),)
 """Which of them goes to its end, and after how many steps."""
-NOISE = 1.05
-"""Energy over the floor's up to which nothing is looked for any more."""
 WIDTH, PROBED = 0.03, 0.02
 """Finite differences of a descent, and of the slopes at its start."""
 

@@ -23,7 +23,7 @@ DELAY = "command_delay"
 BEYOND = 0.25
 """Rows beyond the nearest whole number of them, to begin from."""
 NOISE = 1.05
-"""Energy over the floor's, in a joint's channels, up to which its delay is not looked at."""
+"""Energy over the floor's up to which nothing is looked for any more: of all that is fitted, and of a joint's own channels."""
 
 
 def over_rows(search: Search, fit: Fit, wanted: float, prior: float = 0.0) -> Fit:

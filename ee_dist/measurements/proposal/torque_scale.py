@@ -10,7 +10,7 @@ from ee_dist.measurements import signals
 from ee_dist.measurements.need import beside_need, torques_needed
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import FIT, LIKELY, SURE, UNKNOWN
-from ee_dist.measurements.proposal.torque_shares import Share, tell_shares
+from ee_dist.measurements.proposal.torque_shares import FAR, Share, tell_shares
 from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.view import View
 from ee_dist.measurements.proposal.words import CURRENT, TORQUE
@@ -112,7 +112,7 @@ def torque_units(v: View, block: Block) -> UnitChoice:
         fit, size = (0.0, 0.0) if seen is None else (seen.correlation * np.sign(factor), abs(seen.slope * factor))
         if not (current and v.hints.gains == FIT) and abs(fit) > 0.7:
             shares[k] = Share(float(np.sign(fit) * size), abs(fit))
-            checked += 0.3 < size < 3
+            checked += FAR[0] < size < FAR[1]
         if fit < -0.4:
             # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
             if fit < -0.9 and 0.5 < size < 2:

@@ -9,6 +9,7 @@ from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import FIT
 from ee_dist.measurements.proposal.view import View
 from ee_dist.measurements.proposal.words import POSITION, SPEED
+from ee_dist.robots.instruments import MOTOR_TORQUE
 
 FAR = (0.3, 3.0)
 """Times what the motion needs that torques in N.m (N) are, be the model's masses wrong as they may."""
@@ -49,7 +50,7 @@ def tell_shares(v: View, block: Block, shares: Mapping[int, Share], gained: bool
             f": if they are currents, or torques before the gears, say task.gains=[N.m for each of their units, one for each "
             f"joint], or task.gains={FIT}"
         )
-        needless = led(v) and not any(v.sensor_names("torque")) and not any(v.sensor_names("motor_torque"))
+        needless = led(v) and not any(v.sensor_names("torque")) and not any(v.sensor_names(MOTOR_TORQUE))
         if needless:
             v.out.notes.append(f"torques: {text}")
         else:
