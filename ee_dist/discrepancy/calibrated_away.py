@@ -15,11 +15,11 @@ import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import PRIOR
 from ee_dist.discrepancy.evidence.intervals import half_widths
-from ee_dist.discrepancy.examine import calm_trials
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, known
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
+from ee_dist.discrepancy.search.trials import calm_trials
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.effects.groups import like_joints, members_of

@@ -14,7 +14,7 @@ import numpy as np
 from ee_dist.discrepancy.assumed import beside, puts_right
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
-from ee_dist.discrepancy.examine import FAR, Current, calm_trials, telling
+from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment
 from ee_dist.discrepancy.pruning import pruned
@@ -26,6 +26,7 @@ from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
+from ee_dist.discrepancy.search.trials import calm_trials, telling_values
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.discrepancy.sharing import apart, distinct, shared, singles, taken_apart
 from ee_dist.robots.model import Robot
@@ -237,8 +238,7 @@ class _Look:
         if not starts:
             return None
         problem, own = search.problem, search.everything
-        trial = telling(problem, alone.residual, np.unique(problem.trial_of[own]).tolist())
-        heats = own if trial is None else problem.trial_of == trial
+        heats = telling_values(problem, alone.residual, own)
         best, *others = race(search, starts, own, HEATS, PRIOR, heats_on=heats)
         best = over_ridges(search, best, PRIOR)
         noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))

@@ -18,7 +18,7 @@ from ee_dist.discrepancy.assumed import assumed_drives
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, no_more_than_noise, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
-from ee_dist.discrepancy.problem import Mask, Problem
+from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.refit import Refit
@@ -26,22 +26,18 @@ from ee_dist.discrepancy.search.scan import Scanned, scan
 from ee_dist.discrepancy.search.screen import Screened, screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, follow_slopes, slopes_at
+from ee_dist.discrepancy.search.trials import busiest, calm_trials, telling
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.groups import WHOLE
 from ee_dist.trials.log import Array
 
-CALM = 0.8
-"""Share of the most predictable trial's trust from which a trial counts as calm."""
 FAR = 2.0
 """Error over the noise floor of the best quick fit from which windows of the same motions need not even be looked at."""
 WORTH_JUDGING = 0.4
 """Share of what the best quick fit takes off that another must take off to be judged beside it, unless it is among the first
 AT_LEAST."""
 AT_LEAST = 4
-TELLING = 1000.0
-"""Energy above the noise (in variances) in one trial from which candidates are screened by it alone: some thirty times what luck
-promises the best of a few hundred, so that a right one, whose small probe may say a third of it, is not lost among them."""
 Looked = TypeVar("Looked", Screened, Scanned)
 FAMILIES_TRIED = 4
 """Effects whose members at all joints, each with a value of its own, are tried together."""
@@ -109,14 +105,18 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     if len(current.u):
         leading = slopes_at(search, Model(current.parts), current.u)
     refit, busy = Refit(leading), busiest(problem, base, calm)
-    screened = screen(now.among(busy), pool, effort.shares, refit, telling(problem, base, busy))
+    alone = telling(problem, base, busy)
+    screened = screen(now.among(busy), pool, effort.shares, refit, alone)
     least = least_energy(len(pool))
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)
     promising = _first(promising, effort.first)
-    scanned = sorted(scan(now.among(busy), promising, refit), key=lambda s: s.energy)
+    # Scans and quick fits only choose who is judged: where one trial tells that, on it alone.
+    one = alone is not None and not problem.looped and not any(s.elsewhere for s in promising)
+    few = [alone] if alone is not None and one else calm
+    scanned = sorted(scan(now.among(few if one else busy), promising, refit), key=lambda s: s.energy)
     scanned = _first(scanned, effort.second)
-    quick = sorted(_quick(search.among(calm), current, scanned, effort.starts, leading), key=lambda f: f.energy)
-    energy = float((base[np.isin(problem.trial_of, calm)] ** 2).sum())
+    quick = sorted(_quick(search.among(few), current, scanned, effort.starts, leading), key=lambda f: f.energy)
+    energy = float((base[np.isin(problem.trial_of, few)] ** 2).sum())
     quick = [
         f
         for k, f in enumerate(quick)
@@ -129,7 +129,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     starts += _families(screened, starts, least, has)
     guessed = assumed_drives(now.among(busy), pool, [t.name for t in (*search.fixed, *current.hypothesis)])
     starts += [guessed] if guessed is not None else []
-    nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, calm), 1e-12)
+    nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, few), 1e-12)
     far = nearest > FAR**2
     judged = _judged(search, current, starts, base, len(pool), leading, far)
     if judged and not judged[0].earned and not far and leftovers(problem, base):
@@ -211,53 +211,6 @@ def strictest(first: Sequence[Judged], second: Sequence[Judged]) -> list[Judged]
         k = other[j.name]
         out.append(k if (not k.earned and j.earned) or (k.earned == j.earned and k.explained < j.explained) else j)
     return ranked(out)
-
-
-def calm_trials(problem: Problem, base: Array) -> list[int]:
-    """Trials to search on: those that can be predicted, where the residual follows a parameter smoothly. One trial in
-    which a controller was in the loop is always among them: only there does wiring show. All, where the calm ones have
-    nothing to explain."""
-    count, trust = len(problem.trials), problem.trust
-    chosen = [k for k in range(count) if trust[k] >= CALM * max(trust)]
-    if problem.looped and not set(problem.looped) & set(chosen):
-        chosen.append(problem.looped[0])
-    own = np.isin(problem.trial_of, chosen)
-    if _excess(problem, base, own) < 6.0 * float(np.sqrt(2.0 * problem.floor[own].sum())):
-        return list(range(count))
-    return sorted(chosen)
-
-
-def busiest(problem: Problem, base: Array, among: Sequence[int], share: float = 0.5) -> list[int]:
-    """Of some trials those with most to explain for their length, up to a share of all their values; a trial with a
-    controller in the loop is always among them."""
-    size = np.bincount(problem.trial_of, minlength=len(problem.trials))
-    chosen: list[int] = []
-    for k in by_excess(problem, base, among):
-        if not chosen or size[chosen].sum() < share * size[list(among)].sum():
-            chosen.append(k)
-    looped = [k for k in problem.looped if k in among]
-    if looped and not set(looped) & set(chosen):
-        chosen.append(looped[0])
-    return sorted(chosen)
-
-
-def by_excess(problem: Problem, base: Array, among: Sequence[int]) -> list[int]:
-    """Some trials by how much they have to explain for their length, most first."""
-    count = len(problem.trials)
-    size = np.bincount(problem.trial_of, minlength=count)
-    excess = np.bincount(problem.trial_of, weights=base**2 - problem.floor, minlength=count)
-    return sorted(among, key=lambda k: -float(excess[k]) / max(int(size[k]), 1))
-
-
-def telling(problem: Problem, base: Array, among: Sequence[int]) -> int | None:
-    """The trial among some that has most to explain for its length, if that is enough to tell explanations apart by it alone."""
-    k = by_excess(problem, base, among)[0]
-    return k if _excess(problem, base, problem.trial_of == k) >= TELLING else None
-
-
-def _excess(problem: Problem, base: Array, own: Mask) -> float:
-    """Energy above the noise of some residual values (n,)."""
-    return float((base[own] ** 2 - problem.floor[own]).sum())
 
 
 def _quick(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, cross_fit
@@ -168,23 +170,46 @@ def told_only(
     models: list[Current] = []
     while True:
         (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 2, (AGAIN,))
-        models.append(Current(fit.model.parts, fit.u))
-        half, places = half_widths(search.problem, fit), fit.model.places
-        told = [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in places]
-        units = _units(fit.model, own, len(told))
-        if open_only:
-            units = [unit for unit in units if any(np.max(half[places[k]], initial=0.0) > 1.0 for k in unit)]
-        least = min(units, key=lambda unit: max(told[k] for k in unit), default=[])
-        if not least or max(told[k] for k in least) >= 1.0:
+        models, found = [*models[:-1], Current(fit.model.parts, fit.u)], len(gone)
+        # As far as slopes tell what goes is made up for by the rest; then all that stays is fitted anew.
+        while least := _least_told(search.problem, fit, own, open_only):
+            gone.append(tuple(fit.model.parts[k].name for k in least))
+            fit = _without(fit, least)
+            models.append(Current(fit.model.parts, fit.u))
+        if len(gone) == found:
             break
-        gone.append(tuple(current.parts[k].name for k in least))
-        keep = [k for k in range(len(told)) if k not in least]
-        values = np.concatenate([fit.u[places[k]] for k in keep] or [np.zeros(0)])
-        current = Current(tuple(current.parts[k] for k in keep), values)
+        current = models[-1]
     # Slopes may mislead where a joint sticks.
     while gone and not _as_good(search, models[0], models[len(gone)], cut, tried):
         gone = gone[: len(gone) // 2]
     return models[len(gone)], tuple(name for names in gone for name in names)
+
+
+def _least_told(problem: Problem, fit: Fit, own: int, open_only: bool) -> list[int]:
+    """Numbers of the parts, from ``own`` on, that are told least, if their intervals hold neutral."""
+    half, places = half_widths(problem, fit), fit.model.places
+    told = [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in places]
+    units = _units(fit.model, own, len(told))
+    if open_only:
+        units = [unit for unit in units if any(np.max(half[places[k]], initial=0.0) > 1.0 for k in unit)]
+    least = min(units, key=lambda unit: max(told[k] for k in unit), default=[])
+    return least if least and max(told[k] for k in least) < 1.0 else []
+
+
+def _without(fit: Fit, gone: Sequence[int]) -> Fit:
+    """The fit without some parts, as slopes foretell it."""
+    places, kept = fit.model.places, [k for k in range(len(fit.model.parts)) if k not in gone]
+    at, stay = (
+        np.concatenate([*(np.arange(places[k].start, places[k].stop) for k in some), np.zeros(0, dtype=int)])
+        for some in (gone, kept)
+    )
+    inverse = np.linalg.inv(fit.slopes.T @ fit.slopes + PRIOR * np.eye(len(fit.u)))
+    change = -inverse[:, at] @ np.linalg.solve(inverse[np.ix_(at, at)], fit.u[at])
+    model, residual = Model(tuple(fit.model.parts[k] for k in kept)), fit.residual.copy()
+    u = np.clip((fit.u + change)[stay], model.lower, model.upper)
+    residual[fit.mask] += fit.slopes @ change
+    own = residual[fit.mask]
+    return Fit(model, u, float(own @ own), residual, fit.slopes[:, stay], fit.mask)
 
 
 def without_neutral(current: Current, own: int) -> tuple[Current, tuple[str, ...]]:

@@ -15,7 +15,7 @@ from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, SETTINGS, bootstrap, travelling, windows
 from ee_dist.discrepancy.evidence.left import leftovers
-from ee_dist.discrepancy.examine import Effort, telling
+from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.search import screen as screening
@@ -24,6 +24,7 @@ from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import follow_slopes
+from ee_dist.discrepancy.search.trials import telling
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, term
 from ee_dist.trials.log import Array
 

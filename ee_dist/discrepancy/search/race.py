@@ -39,5 +39,5 @@ def race(
             )
             best = np.argsort([f.energy for f in fits], kind="stable")[:left]
             starts = [(fits[k].model, fits[k].u) for k in best]
-    fits = follow_valley(search, starts, mask, prior, ITERATIONS, widths=(width,))
+    fits = follow_valley(search, starts, mask, prior, ITERATIONS, widths=(width,), rivals=True)
     return sorted(fits, key=lambda f: f.energy)

@@ -15,6 +15,7 @@ from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.rows import NOISE, over_rows
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
+from ee_dist.discrepancy.search.trials import telling_values
 from ee_dist.trials.log import Array
 
 MOVES = (0.0125, 0.03, 0.1, 0.3)
@@ -23,8 +24,8 @@ PROMISE = 0.05
 """Share of what is above the noise that a move must promise to take off, and the descent from there must."""
 TRIED, ROUNDS = 3, 3
 """Descents at once, each from another value's best move, and how often from where one of them ended."""
-HEATS = ((6, 1),)
-"""Which of them goes to its end, and after how many steps."""
+HEATS = ((3, 1),)
+"""Which of them goes to its end, and after how many steps, on the trial that tells most."""
 WIDTH, PROBED = 0.03, 0.02
 """Finite differences of a descent, and of the slopes at its start."""
 
@@ -37,7 +38,10 @@ def over_ridges(search: Search, fit: Fit, prior: float = 0.0) -> Fit:
         if fit.energy <= NOISE * floor:
             break
         starts = _beyond(search, fit, wanted, prior)
-        best = race(search, [(fit.model, u) for u in starts], fit.mask, HEATS, prior, WIDTH)[0] if starts else fit
+        best = fit
+        if starts:
+            few = telling_values(search.problem, fit.residual, fit.mask)
+            best = race(search, [(fit.model, u) for u in starts], fit.mask, HEATS, prior, WIDTH, few)[0]
         if not best.energy < wanted:
             best = over_rows(search, fit, wanted, prior)
         if not best.energy < wanted:

@@ -30,12 +30,14 @@ six robots the hidden one was among the first twenty as often as with all."""
 @dataclass(frozen=True, eq=False)
 class Screened:
     """``promise``: energy that the candidate could take off the residual. ``starts``: values (u) to fit from, best
-    first. ``reach``: largest change of the prediction that any probe made, as energy."""
+    first. ``reach``: largest change of the prediction that any probe made, as energy. ``elsewhere``: it shows in other
+    trials than the one by which most are screened."""
 
     candidate: Candidate
     promise: float
     starts: tuple[Array, ...]
     reach: float
+    elsewhere: bool = False
 
 
 def screen(
@@ -75,11 +77,12 @@ def screen(
     further = _further(pool, rows)
     far = alone.far
     ask(alone, [(i, u) for i in further for u in _larger(pool[i], shares, rows[i], far or pool[i].guess)], first, 0.9)
+    hidden: list[int] = []
     if whole is not alone:
         hidden = [i for i, found in enumerate(rows) if not any(p.shows for p in found)]
         ask(whole, [(i, u) for i in hidden for u in pool[i].probes((max(shares),))], 0.9, 1.0)
     search.progress("screening", 1.0)
-    return [_screened(c, found) for c, found in zip(pool, rows, strict=True)]
+    return [_screened(c, found, i in hidden) for i, (c, found) in enumerate(zip(pool, rows, strict=True))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +201,7 @@ def _promise(ground: _Ground, residual: Array, energy: float, candidate: Candida
     )
 
 
-def _screened(candidate: Candidate, found: Sequence[_Probe]) -> Screened:
+def _screened(candidate: Candidate, found: Sequence[_Probe], elsewhere: bool) -> Screened:
     if not found:
         return Screened(candidate, 0.0, (), 0.0)
     ordered = sorted(found, key=lambda p: -p.promise)
@@ -213,4 +216,4 @@ def _screened(candidate: Candidate, found: Sequence[_Probe]) -> Screened:
         starts.append(np.clip(joint, candidate.lower, candidate.upper))
     for p in ordered[:3]:
         starts.append(np.clip(p.share * p.u, candidate.lower, candidate.upper) if len(p.u) else p.u)
-    return Screened(candidate, ordered[0].promise, tuple(starts), max(p.reach for p in found))
+    return Screened(candidate, ordered[0].promise, tuple(starts), max(p.reach for p in found), elsewhere)

@@ -4,6 +4,10 @@ Where everything is a little wrong, values stand in for one another, and a searc
 between them. All together they have one valley, which slopes lead down. Slopes are taken of the residual before it is
 softened (``Problem.smooth``) and weighed as the energy weighs it, which is how robust losses are minimised (Huber 1981,
 "Robust Statistics", section 7.8).
+
+Slopes of fifty values are fifty simulations, and a step is eight. So between slopes that are taken anew those of the last step
+are corrected by what it showed (Broyden 1965, "A class of methods for solving nonlinear simultaneous equations"), as long as
+steps by them pay.
 """
 
 from __future__ import annotations
@@ -30,6 +34,10 @@ PLAIN = (0.1, 1.0, 10.0)
 """those of plain least squares, where more is left than slopes as they are weighed can be trusted with (``slopes.NEAR``)."""
 GAIN = 0.005
 """Share of the energy that an iteration must take off, or else slopes are taken narrower; at the narrowest it ends."""
+BEHIND = 0.5
+"""Share of its energy that a better descent has left when one that stands still is given up."""
+FOLLOWED, PAYS = 3, 0.02
+"""Steps in turn by corrected slopes, at most, and the share of the energy that a step must take off for another to follow it."""
 
 
 @dataclass(eq=False)
@@ -42,11 +50,26 @@ class _Run:
     damping: float = 1e-3
     plain_damping: float = 1e-3
     slopes: Array | None = None
-    weighed: Array | None = None
-    """The smooth residual where it is fitted, weighed,"""
+    """(n, P) derivatives of the smooth residual where it is fitted,"""
+    smooth: Array | None = None
+    """(n,) that residual,"""
     weights: Array | None = None
-    """and by what."""
+    """(n,) and by what it is weighed."""
+    before: tuple[float, Array] | None = None
+    """Energy and values before the last step,"""
+    rounds: int = 0
+    """how often slopes were taken,"""
+    followed: int = 0
+    """and which step by the slopes corrected since then comes next (0: they are taken anew)."""
+    still: bool = False
+    """Whether the last slopes led next to nowhere."""
     done: bool = False
+
+    def weighed_slopes(self, rows: int) -> Array:
+        """(n, P), zeros where none were taken."""
+        if self.slopes is None or self.weights is None:
+            return np.zeros((rows, len(self.u)))
+        return np.asarray(self.slopes * self.weights[:, None])
 
 
 def follow_valley(
@@ -57,10 +80,12 @@ def follow_valley(
     iterations: int = ITERATIONS,
     widths: Sequence[float] = (WIDEST,),
     settled: bool = False,
+    rivals: bool = False,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given, all in step: the best
     of a descent from each of ``widths``, of which the last steps follow ever narrower slopes, unless the start is ``settled``
-    in a valley already. ``prior`` as in slopes.py; ``slopes`` of the results are those of the smooth residual, weighed."""
+    in a valley already. ``rivals``: only the best of all starts is wanted, and what comes near it. ``prior`` as in slopes.py;
+    ``slopes`` of the results are those of the smooth residual, weighed."""
     whole, search = search, search.within(mask)
     points = [np.clip(np.asarray(u, float), m.lower, m.upper) for m, u in starts]
     rows = search.residuals([m.hypothesis(u) for (m, _), u in zip(starts, points, strict=True)])
@@ -69,29 +94,28 @@ def follow_valley(
         for (m, _), u, r in zip(starts, points, rows, strict=True)
         for width in widths
     ]
-    for step in range(iterations):
-        moving = [run for run in runs if not run.done]
-        if not moving:
-            break
+    while moving := [run for run in runs if not run.done and (run.followed or run.rounds < iterations)]:
         _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
-        moving = [run for run in moving if np.isfinite(run.energy)]
-        _slopes(moving, search, mask)
-        _steps(moving, search, mask, prior, step, NARROWEST if not settled else np.inf)
-        search.progress("fitting all together", (step + 1) / iterations)
+        anew = [run for run in moving if not run.followed]
+        _slopes([run for run in anew if np.isfinite(run.energy)], search, mask)
+        for run in anew:
+            run.rounds += 1
+        going = [run for run in moving if np.isfinite(run.energy)]
+        _steps(going, search, mask, prior)
+        for run in going:
+            _next(run, NARROWEST if not settled else np.inf, run.rounds < iterations)
+            if run.followed:
+                _correct(run, search, mask)
+        together = len(runs) if rivals else len(widths)
+        for k in range(0, len(runs), together):
+            _give_up(runs[k : k + together])
+        search.progress("fitting all together", min(run.rounds for run in moving) / iterations)
     best = [min(runs[k : k + len(widths)], key=lambda r: r.energy) for k in range(0, len(runs), len(widths))]
     rows = np.array([run.residual for run in best])
     if search is not whole:
         rows = whole.residuals([run.model.hypothesis(run.u) for run in best])
-    empty = int(mask.sum())
     return [
-        Fit(
-            run.model,
-            run.u,
-            run.energy - prior * float(run.u @ run.u),
-            row,
-            np.zeros((empty, len(run.u))) if run.slopes is None else run.slopes,
-            mask,
-        )
+        Fit(run.model, run.u, run.energy - prior * float(run.u @ run.u), row, run.weighed_slopes(int(mask.sum())), mask)
         for run, row in zip(best, rows, strict=True)
     ]
 
@@ -105,7 +129,7 @@ def _from_nowhere(runs: Sequence[_Run], search: Search, mask: Mask, prior: float
 
 
 def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
-    """Weighed derivatives (n, P) of the smooth residual where the mask is."""
+    """Derivatives (n, P) of the smooth residual where the mask is, taken anew."""
     points = []
     for run in runs:
         for k in range(len(run.u)):
@@ -116,28 +140,34 @@ def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
     rows = iter(search.residuals([run.model.hypothesis(v) for run, v in points]))
     smooth_of, at = search.problem.smooth, 0
     for run in runs:
-        smooth, weight = (values[mask] for values in weighed(search.problem, run.residual))
-        columns = []
+        smooth, columns = _here(run, search, mask), []
         for k in range(len(run.u)):
             row, gap = next(rows), points[at][1][k] - run.u[k]
             at += 1
             usable = np.isfinite(row).all()
-            columns.append(weight * (smooth_of(row)[mask] - smooth) / gap if usable else np.zeros(len(smooth)))
-        run.slopes, run.weighed, run.weights = np.stack(columns, axis=1), weight * smooth, np.maximum(weight, 1e-12)
+            columns.append((smooth_of(row)[mask] - smooth) / gap if usable else np.zeros(len(smooth)))
+        run.slopes = np.stack(columns, axis=1)
 
 
-def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step: int, last: float) -> None:
-    """``last``: width from which a step that takes next to nothing ends the descent."""
+def _here(run: _Run, search: Search, mask: Mask) -> Array:
+    """The smooth residual where the run is, and its weights."""
+    smooth, weights = weighed(search.problem, run.residual)
+    run.smooth, run.weights = smooth[mask], np.maximum(weights[mask], 1e-12)
+    return run.smooth
+
+
+def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> None:
+    """The best of steps of all dampings, if it is better than where the runs are."""
     far = NEAR * float(search.problem.floor[mask].sum())
     tries = [[(plain, d) for plain, d in _tries(run) if not plain or run.energy > far] for run in runs]
-    points = [[_step(run, prior, d, plain) for plain, d in mine] for run, mine in zip(runs, tries, strict=True)]
+    points = [_points(run, mine, prior) for run, mine in zip(runs, tries, strict=True)]
     rows = iter(
         search.residuals([run.model.hypothesis(v) for run, some in zip(runs, points, strict=True) for v in some])
     )
     for run, mine, some in zip(runs, tries, points, strict=True):
         found = [next(rows) for _ in mine]
         costs = [_cost(r, v, mask, prior) for r, v in zip(found, some, strict=True)]
-        best, before = int(np.argmin(costs)), run.energy
+        best, run.before = int(np.argmin(costs)), (run.energy, run.u)
         if costs[best] < run.energy:
             plain, damping = mine[best]
             run.energy, run.u, run.residual = costs[best], some[best], found[best]
@@ -145,14 +175,44 @@ def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, step:
                 run.plain_damping = max(damping, 1e-7)
             else:
                 run.damping = max(damping, 1e-7)
-        else:
+        elif not run.followed:
             run.damping = min(100.0 * run.damping, 1e6)
             run.plain_damping = min(100.0 * run.plain_damping, 1e6)
-        if before - run.energy < GAIN * before:
+
+
+def _next(run: _Run, last: float, more: bool) -> None:
+    """What a run does next, after a step: another by corrected slopes, if that may pay, or slopes anew, narrower where the last
+    took next to nothing. ``last``: width from which such a step ends the descent; ``more``: whether slopes may be taken again,
+    for corrected ones are no evidence."""
+    assert run.before is not None
+    before, gained = run.before[0], run.before[0] - run.energy
+    if not run.followed:
+        if gained < GAIN * before:
             run.done = run.width <= last
             run.width = max(0.5 * run.width, NARROWEST)
-        elif step % 2:
+        elif not run.rounds % 2:
             run.width = max(0.7 * run.width, NARROWEST)
+    pays = more and gained > PAYS * before and run.followed < FOLLOWED
+    run.still = not run.followed and gained < GAIN * before
+    run.followed = run.followed + 1 if pays else 0
+
+
+def _give_up(runs: Sequence[_Run]) -> None:
+    """Of descents of which the best is wanted, those end that stand still far above it."""
+    best = min(run.energy for run in runs)
+    for run in runs:
+        run.done = run.done or (run.still and best < BEHIND * run.energy)
+
+
+def _correct(run: _Run, search: Search, mask: Mask) -> None:
+    """The slopes, by what the last step showed: changed along it alone, each value counted by what it moves."""
+    assert run.slopes is not None and run.smooth is not None and run.before is not None
+    was, step = run.smooth, run.u - run.before[1]
+    _here(run, search, mask)
+    along = np.square(run.slopes).sum(axis=0) * step
+    size = float(along @ step)
+    if size > 0:
+        run.slopes = run.slopes + np.outer(run.smooth - was - run.slopes @ step, along / size)
 
 
 def _tries(run: _Run) -> list[tuple[bool, float]]:
@@ -164,18 +224,23 @@ def _cost(r: Array, u: Array, mask: Mask, prior: float) -> float:
     return float(r[mask] @ r[mask]) + prior * float(u @ u) if np.isfinite(r).all() else float("inf")
 
 
-def _step(run: _Run, prior: float, damping: float, plain: bool) -> Array:
-    """Where a damped Gauss-Newton step leads, values that it would push out of their bounds held there. ``plain``: by least
-    squares of the smooth residual as it is."""
-    assert run.slopes is not None and run.weighed is not None and run.weights is not None
+def _points(run: _Run, tries: Sequence[tuple[bool, float]], prior: float) -> list[Array]:
+    """Where steps lead, by least squares weighed or plain, and damped."""
+    assert run.slopes is not None and run.smooth is not None and run.weights is not None
+    systems = {}
+    for plain in {plain for plain, _ in tries}:
+        slopes = run.slopes if plain else run.slopes * run.weights[:, None]
+        values = run.smooth if plain else run.smooth * run.weights
+        systems[plain] = slopes.T @ slopes, -(slopes.T @ values)
+    return [_step(run, *systems[plain], prior, damping) for plain, damping in tries]
+
+
+def _step(run: _Run, normal: Array, down: Array, prior: float, damping: float) -> Array:
+    """Where a damped Gauss-Newton step leads, values that it would push out of their bounds held there."""
     u, model = run.u, run.model
-    slopes, values = run.slopes, run.weighed
-    if plain:
-        slopes, values = slopes / run.weights[:, None], values / run.weights
-    normal, down = slopes.T @ slopes, -(slopes.T @ values) - prior * u
     scale = np.diag(normal)
     scale = np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-12))
-    system = normal + prior * np.eye(len(u)) + damping * np.diag(scale)
+    system, down = normal + prior * np.eye(len(u)) + damping * np.diag(scale), down - prior * u
     free = np.ones(len(u), dtype=bool)
     point = u
     for _ in range(4):
