@@ -94,6 +94,7 @@ def follow_valley(
         for (m, _), u, r in zip(starts, points, rows, strict=True)
         for width in widths
     ]
+    far = NEAR * float(search.problem.floor[mask].sum())
     while moving := [run for run in runs if not run.done and (run.followed or run.rounds < iterations)]:
         _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
         anew = [run for run in moving if not run.followed]
@@ -101,9 +102,9 @@ def follow_valley(
         for run in anew:
             run.rounds += 1
         going = [run for run in moving if np.isfinite(run.energy)]
-        _steps(going, search, mask, prior)
+        _steps(going, search, mask, prior, far)
         for run in going:
-            _next(run, NARROWEST if not settled else np.inf, run.rounds < iterations)
+            _next(run, far, NARROWEST if not settled else np.inf, run.rounds < iterations)
             if run.followed:
                 _correct(run, search, mask)
         together = len(runs) if rivals else len(widths)
@@ -156,9 +157,9 @@ def _here(run: _Run, search: Search, mask: Mask) -> Array:
     return run.smooth
 
 
-def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> None:
-    """The best of steps of all dampings, if it is better than where the runs are."""
-    far = NEAR * float(search.problem.floor[mask].sum())
+def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, far: float) -> None:
+    """The best of steps of all dampings, if it is better than where the runs are; those of plain least squares too from an energy
+    of ``far`` on."""
     tries = [[(plain, d) for plain, d in _tries(run) if not plain or run.energy > far] for run in runs]
     points = [_points(run, mine, prior) for run, mine in zip(runs, tries, strict=True)]
     rows = iter(
@@ -180,16 +181,17 @@ def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float) -> No
             run.plain_damping = min(100.0 * run.plain_damping, 1e6)
 
 
-def _next(run: _Run, last: float, more: bool) -> None:
+def _next(run: _Run, far: float, last: float, more: bool) -> None:
     """What a run does next, after a step: another by corrected slopes, if that may pay, or slopes anew, narrower where the last
-    took next to nothing. ``last``: width from which such a step ends the descent; ``more``: whether slopes may be taken again,
-    for corrected ones are no evidence."""
+    took next to nothing: at once as narrow as they get where more than ``far`` is left, for what is missing there is not to be
+    had of the values. ``last``: width from which such a step ends the descent; ``more``: whether slopes may be taken again, for
+    corrected ones are no evidence."""
     assert run.before is not None
     before, gained = run.before[0], run.before[0] - run.energy
     if not run.followed:
         if gained < GAIN * before:
             run.done = run.width <= last
-            run.width = max(0.5 * run.width, NARROWEST)
+            run.width = max(0.5 * run.width, NARROWEST) if run.energy <= far else NARROWEST
         elif not run.rounds % 2:
             run.width = max(0.7 * run.width, NARROWEST)
     pays = more and gained > PAYS * before and run.followed < FOLLOWED
