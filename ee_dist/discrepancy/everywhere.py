@@ -163,7 +163,8 @@ class _Look:
         alone = self._worth(fit, {})
         if alone is None or alone.held > FAR**2 * float(problem.floor.sum()):
             # Of a hundred values each may be worth no more than luck, where one number for all joints is worth much.
-            other = self._fit(base, shared(problem.robot, self._everywhere(base)))
+            few = shared(problem.robot, self._everywhere(base))
+            other = self._fit(base, few, None if alone is None else (fit, alone.held))
             together = self._worth(other, {}) if other is not None else None
             if other is not None and together is not None and (alone is None or together.held < alone.held):
                 alone, fit, single = together, other, base
@@ -178,15 +179,23 @@ class _Look:
     def _everywhere(self, base: Current) -> list[Candidate]:
         return [c for c in self._others(Model(base.parts)) if c.effect.everywhere]
 
-    def _fit(self, base: Current, few: Sequence[Candidate]) -> Fit | None:
+    def _fit(self, base: Current, few: Sequence[Candidate], beside_it: tuple[Fit, float] | None = None) -> Fit | None:
         """The base with all ``few`` that leave marks of their own, from neutral; None where these are too few to be fitted at
-        once."""
+        once, or, by the trial that tells most alone, leave more of it than another fit did of what was held out
+        (``beside_it``: that fit, and its energy on all held-out data)."""
         robot = self.search.problem.robot
         few = distinct(self.calm, base, beside(robot, base.parts, base.hypothesis, few))
         if not few or len(base.parts) + len(few) < FEWEST:
             return None
         model, u = Model((*base.parts, *few)), np.concatenate([base.u, *(np.zeros(c.size) for c in few)])
         widths = WIDTHS if len(u) >= MANY else MORE_WIDTHS
+        if beside_it is not None:
+            best, held = beside_it
+            one = telling_values(self.search.problem, best.residual, best.mask)
+            share = float((best.residual[one] ** 2).sum()) / best.energy
+            (first,) = follow_valley(self.calm, [(model, u)], one, PRIOR, widths=widths)
+            if first.energy > share * held:
+                return None
         (fit,) = follow_valley(self.calm, [(model, u)], self.calm.everything, PRIOR, widths=widths)
         return over_ridges(self.calm, fit, PRIOR)
 
