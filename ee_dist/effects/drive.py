@@ -13,6 +13,7 @@ from ee_dist.effects.described import with_more
 from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import (
     Assumed,
+    gains_are_known,
     motors,
     motors_with_speed_limit,
     motors_with_torque_limit,
@@ -33,6 +34,7 @@ MOTORS = "Hughes and Drury 2013, Electric Motors and Drives, chapter 3"
     physics="A motor gives only part of its torque, as when its magnets have aged or a winding is shorted.",
     signature="The joint lags in proportion to the torque asked of it, most under load; at rest without load nothing shows.",
     reference=PAPER,
+    worth_proposing=gains_are_known,
 )
 def motor_weak(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def weaker(drive: Drive) -> Drive:

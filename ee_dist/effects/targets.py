@@ -136,6 +136,11 @@ def is_arm(robot: Robot) -> bool:
     return not robot.free_base and len(robot.drives) > 1
 
 
+def gains_are_known(robot: Robot) -> bool:
+    """Whether somebody said what the robot's controllers do: a torque is too weak only beside one that is known."""
+    return not robot.assumed_joints("kp")
+
+
 def is_adjustable(robot: Robot) -> bool:
     """An arm, whose maker or user set its controllers; or any robot whose description guesses at their gains."""
     return is_arm(robot) or bool(robot.assumed_joints("kp"))

@@ -62,6 +62,18 @@ def test_gains_that_were_assumed_are_found_together_with_friction() -> None:
     assert better < 0.2 * as_it_is
 
 
+def test_no_motor_is_called_weak_beside_a_guess() -> None:
+    """A torque is too small only beside one that somebody knew: with guessed gains it is these that are wrong."""
+    robot = samples()["arm"].robot
+    joint = robot.motor_names[0]
+    assert f"motor_weak@{joint}" in {c.name for c in candidates(robot)}
+    unknown = guessed(robot)
+    assert "motor_weak" not in {c.effect.name for c in candidates(unknown)}
+    assert {f"position_gain@{joint}", f"speed_gain@{joint}"} <= {c.name for c in candidates(unknown)}
+    assert f"motor_weak@{joint}" in {c.name for c in candidates(unknown, only=["motor_weak"])}, "who asks is answered"
+    assert [c.name for c in candidates(unknown, only=[f"motor_weak@{joint}"])] == [f"motor_weak@{joint}"]
+
+
 def test_a_limit_that_was_stated_for_want_of_a_better_one_is_found_with_them() -> None:
     problem = the_problem(limit=0.75)
     proposal, u = assumed_drives(Search(problem), candidates(problem.robot)) or pytest.fail("nothing was proposed")
