@@ -111,10 +111,12 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)
     promising = _first(promising, effort.first)
     # Scans and quick fits only choose who is judged: where one trial tells that, on it alone.
-    one = alone is not None and not problem.looped and not any(s.elsewhere for s in promising)
-    few = [alone] if alone is not None and one else calm
-    scanned = sorted(scan(now.among(few if one else busy), promising, refit), key=lambda s: s.energy)
+    one = None
+    if alone is not None and not problem.looped and not any(s.elsewhere for s in promising):
+        one = [alone]
+    scanned = sorted(scan(now.among(one or busy), promising, refit), key=lambda s: s.energy)
     scanned = _first(scanned, effort.second)
+    few = one or calm
     quick = sorted(_quick(search.among(few), current, scanned, effort.starts, leading), key=lambda f: f.energy)
     energy = float((base[np.isin(problem.trial_of, few)] ** 2).sum())
     quick = [

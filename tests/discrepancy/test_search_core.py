@@ -13,14 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from linear_problem import ROBOT, Linear
 
+from ee_dist.discrepancy import examine as examining
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, SETTINGS, bootstrap, travelling, windows
 from ee_dist.discrepancy.evidence.left import leftovers
-from ee_dist.discrepancy.examine import Effort
+from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.search import screen as screening
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates, known, parse
 from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import follow_slopes
@@ -262,6 +264,25 @@ def test_screening_on_one_trial_looks_into_the_others_for_what_does_not_show_in_
     found = screen(Search(OneBlind((hidden,), motions=2)), pool, trial=0)
     best = max(found, key=lambda s: s.promise).candidate
     assert (best.effect.name, best.target) == (hidden.effect, hidden.target)
+
+
+@pytest.mark.parametrize(("motors", "trials"), [("weak", (0, 1)), ("sound", (0,))])
+def test_scans_are_on_one_trial_unless_something_shows_in_others_alone(
+    motors: str, trials: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hidden: Hypothesis = (term("joint_jam", "knee_rear_left", loss=1.0),)
+    if motors == "weak":
+        hidden += (term("motor_weak", "hip_rear_left", loss=0.9),)
+    problem = OneBlind(hidden, motions=2)
+    # A joint that is stuck tells more than a thousand in the first trial alone.
+    problem.data = problem.data + 2.0 * problem.shift(hidden[:1]) * (problem.trial_of == 0)
+    assert telling(problem, problem.data, [0, 1]) == 0
+    seen: list[tuple[int, ...] | None] = []
+    monkeypatch.setattr(examining, "scan", lambda s, *a: seen.append(s.trials) or scan(s, *a))
+    monkeypatch.setattr(examining, "busiest", lambda *_: [0, 1])
+    found = examine(Search(problem), Current(), POOL, QUICK)
+    assert seen == [trials]
+    assert found.best is not None and found.best.name == "joint_jam@knee_rear_left"
 
 
 def test_screening_on_one_trial_promises_what_all_hold() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ee_dist.discrepancy import everywhere as module
 from ee_dist.discrepancy.everywhere import everywhere
 from ee_dist.discrepancy.evidence.holdout import travelling
 from ee_dist.discrepancy.examine import Current
@@ -53,6 +54,22 @@ def test_joints_that_differ_keep_a_number_of_their_own():
     found = found_in(Legs(hidden, motions=4))
     assert found is not None
     assert {c.name for c in found.current.parts} == {f"viscous_friction@{t.target}" for t in hidden if t.values[0][1]}
+
+
+def test_one_number_is_fitted_to_all_trials_only_if_it_does_better_on_one(monkeypatch: pytest.MonkeyPatch):
+    """Joints differ so much that one number for all leaves more of one trial than one for each leaves of data held out."""
+    fitted: list[tuple[int, int]] = []
+    descend = module.follow_valley
+
+    def counted(search: Search, starts: list, mask: np.ndarray, *args: object, **named: object):
+        fitted.append((len(starts[0][1]), len(np.unique(search.problem.trial_of[mask]))))
+        return descend(search, starts, mask, *args, **named)
+
+    monkeypatch.setattr(module, "follow_valley", counted)
+    hidden = tuple(term("viscous_friction", j, damping_nm_s_rad=0.9 * (k % 3)) for k, j in enumerate(JOINTS))
+    found = found_in(Legs(hidden, extra=3.0, motions=4))
+    assert found is not None and len(found.current.parts) >= 5
+    assert fitted == [(len(KINDS) * len(JOINTS), 4), (len(KINDS), 1)]
 
 
 def test_each_kind_is_shared_as_widely_as_it_may_be():

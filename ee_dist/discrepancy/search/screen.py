@@ -77,10 +77,10 @@ def screen(
     further = _further(pool, rows)
     far = alone.far
     ask(alone, [(i, u) for i in further for u in _larger(pool[i], shares, rows[i], far or pool[i].guess)], first, 0.9)
-    hidden: list[int] = []
+    hidden: set[int] = set()
     if whole is not alone:
-        hidden = [i for i, found in enumerate(rows) if not any(p.shows for p in found)]
-        ask(whole, [(i, u) for i in hidden for u in pool[i].probes((max(shares),))], 0.9, 1.0)
+        hidden = {i for i, found in enumerate(rows) if not any(p.shows for p in found)}
+        ask(whole, [(i, u) for i in sorted(hidden) for u in pool[i].probes((max(shares),))], 0.9, 1.0)
     search.progress("screening", 1.0)
     return [_screened(c, found, i in hidden) for i, (c, found) in enumerate(zip(pool, rows, strict=True))]
 
