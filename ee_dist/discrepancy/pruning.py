@@ -66,10 +66,16 @@ def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> tup
             break
         # What the others make up for goes into them, as far as slopes tell.
         mine = where[cheapest]
-        values[at] = u - inverse[:, mine] @ np.linalg.solve(inverse[np.ix_(mine, mine)], u[mine])
+        values[at] = u - _made_up_for(inverse, mine, u)
         gone = units.pop(cheapest)
         kept = [k for k in kept if k not in gone]
     return kept, values
+
+
+def _made_up_for(inverse: Array, gone: Array, u: Array) -> Array:
+    """(P,) by how much less each value is where those ``gone`` (numbers) go to neutral: these by all of themselves, the others by
+    what makes up for them. ``inverse`` (P, P): covariance of the values u (P,)."""
+    return np.asarray(inverse[:, gone] @ np.linalg.solve(inverse[np.ix_(gone, gone)], u[gone]))
 
 
 def _luck(problem: Problem, fit: Fit) -> Array:
@@ -204,7 +210,7 @@ def _without(fit: Fit, gone: Sequence[int]) -> Fit:
         for some in (gone, kept)
     )
     inverse = np.linalg.inv(fit.slopes.T @ fit.slopes + PRIOR * np.eye(len(fit.u)))
-    change = -inverse[:, at] @ np.linalg.solve(inverse[np.ix_(at, at)], fit.u[at])
+    change = -_made_up_for(inverse, at, fit.u)
     model, residual = Model(tuple(fit.model.parts[k] for k in kept)), fit.residual.copy()
     u = np.clip((fit.u + change)[stay], model.lower, model.upper)
     residual[fit.mask] += fit.slopes @ change

@@ -143,4 +143,4 @@ def gains_are_known(robot: Robot) -> bool:
 
 def is_adjustable(robot: Robot) -> bool:
     """An arm, whose maker or user set its controllers; or any robot whose description guesses at their gains."""
-    return is_arm(robot) or bool(robot.assumed_joints("kp"))
+    return is_arm(robot) or not gains_are_known(robot)

@@ -152,13 +152,13 @@ def candidates(
             parse(robot, name)
         else:
             find(effect)
+    named = {name.partition("@")[0] for name in wanted or ()}
     found = []
     for entry in CATALOGUE.values():
         if entry.name in banned or entry.family not in seen:
             continue
         # Who names an effect wants it tried also where it would not be proposed unasked.
-        named = wanted is not None and any(w.partition("@")[0] == entry.name for w in wanted)
-        places = entry.targets(robot) if named and entry.searchable else entry.proposed(robot)
+        places = entry.targets(robot) if entry.name in named and entry.searchable else entry.proposed(robot)
         if sharing and places and entry.parameters and entry.family in SHAREABLE:
             places = (*places, *entry.shared(robot))
         guess = entry.guessed(robot) if sharing else ""

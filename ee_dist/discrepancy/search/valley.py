@@ -188,14 +188,13 @@ def _next(run: _Run, far: float, last: float, more: bool) -> None:
     corrected ones are no evidence."""
     assert run.before is not None
     before, gained = run.before[0], run.before[0] - run.energy
-    if not run.followed:
-        if gained < GAIN * before:
-            run.done = run.width <= last
-            run.width = max(0.5 * run.width, NARROWEST) if run.energy <= far else NARROWEST
-        elif not run.rounds % 2:
-            run.width = max(0.7 * run.width, NARROWEST)
-    pays = more and gained > PAYS * before and run.followed < FOLLOWED
     run.still = not run.followed and gained < GAIN * before
+    if run.still:
+        run.done = run.width <= last
+        run.width = max(0.5 * run.width, NARROWEST) if run.energy <= far else NARROWEST
+    elif not run.followed and not run.rounds % 2:
+        run.width = max(0.7 * run.width, NARROWEST)
+    pays = more and gained > PAYS * before and run.followed < FOLLOWED
     run.followed = run.followed + 1 if pays else 0
 
 
