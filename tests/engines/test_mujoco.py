@@ -15,7 +15,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.bodies import Group
 from ee_dist.engines.mujoco.contact import IMPEDANCE, contact
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
-from ee_dist.engines.mujoco.model import Model, structure_key
+from ee_dist.engines.mujoco.model import NOTHING_TO_TOUCH, UNUSED, Model, structure_key
 from ee_dist.robots.inertia import mass_matrix
 from ee_dist.robots.model import Joint, Part, Robot, Shape
 from ee_dist.robots.quadruped import quadruped
@@ -68,6 +68,26 @@ def test_only_structure_is_compiled_anew() -> None:
     assert len(engine._models) == 2
     engine.close()
     assert not engine._models
+
+
+@pytest.mark.parametrize("fixed", [True, False])
+def test_what_a_robot_without_a_floor_leaves_out_moves_no_bit(fixed: bool) -> None:
+    robot = replace(quadruped().with_world(has_floor=False), free_base=not fixed)
+    short, whole = Model(robot), Model(robot)
+    for model in (short, whole):
+        model.fill(model.numbers(robot))
+    assert short.compiled.opt.disableflags & NOTHING_TO_TOUCH
+    assert (short.compiled.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER) is fixed
+    whole.compiled.opt.disableflags = int(UNUSED)
+    whole.compiled.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    rng, states = np.random.default_rng(3), [mujoco.MjData(m.compiled) for m in (short, whole)]
+    for _ in range(300):
+        torques = rng.normal(0, 0.3, short.compiled.nv)
+        for model, data in zip((short, whole), states, strict=True):
+            data.qfrc_applied[:] = torques - 0.05 * data.qvel
+            mujoco.mj_step(model.compiled, data)
+        assert states[0].qpos.tobytes() == states[1].qpos.tobytes()
+    assert np.abs(states[0].qvel).max() > 0.5
 
 
 @pytest.mark.parametrize("threads", [2, 3])

@@ -263,6 +263,9 @@ def test_a_joint_without_limits_goes_on_for_ever(tmp_path: Path, kind: str) -> N
     for torque in (DrivePath([wheel], 0.002).step(0.0, qd[None], q[None], qd[None])[0], shim.torque(0.0, qd, q, qd)):
         assert torque[place] == pytest.approx(0.0, abs=1e-12)
     m = mujoco.MjModel.from_xml_string(mjcf_text(wheel, False, [0.0] * 3))
+    # A robot without a floor is stepped without friction, stops and damping of MuJoCo's own; the model is not.
+    assert m.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    assert not m.opt.disableflags
     assert not m.joint("elbow").limited
     assert m.joint("turn").limited
     assert elbow.ends == elbow.stops

@@ -25,7 +25,8 @@ def mjcf_text(robot: Robot, motors_only: bool, damping: Sequence[float]) -> str:
     model.fill(model.numbers(robot))
     spec = _spec(robot)
     spec.modelname, spec.compiler.degree = robot.name, False
-    spec.option.disableflags = 0
+    # Here friction, stops and damping are MuJoCo's own, which an engine without a floor leaves out.
+    spec.option.disableflags, spec.option.integrator = 0, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = model.compiled.opt.gravity
     bodies = {b.name: b for b in spec.bodies}
     joints = {j.name: j for j in spec.joints}
