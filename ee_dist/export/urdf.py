@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ee_dist.robots.inertia import rotation_matrix
+from ee_dist.robots.mass_matrix import rotation_matrix
 from ee_dist.robots.model import CONTINUOUS_M, CONTINUOUS_RAD, NO_TURN, ZERO3, Joint, Part, Quat, Robot, Shape
 from ee_dist.robots.ranges import top_speed, top_torque
 from ee_dist.robots.urdf import WORLD

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.kinematics import compose
+from ee_dist.robots.mass_matrix import rotation_matrix
 from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, Shape, Vec3
 
 DUMMY_KG = 1e-6

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.basics.quoted import quoted
-from ee_dist.robots.inertia import rotation_matrix
+from ee_dist.robots.mass_matrix import rotation_matrix
 from ee_dist.robots.model import Joint, Robot, RobotError
 
 Array = NDArray[np.float64]

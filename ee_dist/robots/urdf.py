@@ -18,7 +18,7 @@ from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, HELPER_KG, HELPER_KG_M2, entries, folded, posed
-from ee_dist.robots.inertia import rotation_matrix
+from ee_dist.robots.mass_matrix import rotation_matrix
 from ee_dist.robots.model import (
     CONTINUOUS_M,
     CONTINUOUS_RAD,

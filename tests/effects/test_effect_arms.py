@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ee_dist.effects import CATALOGUE, apply, term
-from ee_dist.robots.inertia import mass_matrix
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.inverse_dynamics import joint_torques, parameters
+from ee_dist.robots.mass_matrix import mass_matrix
 from ee_dist.robots.model import Drive, Joint, Part, Robot, Sensor, Wiring, World
 from ee_dist.robots.quadruped import quadruped
 

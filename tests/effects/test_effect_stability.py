@@ -14,7 +14,8 @@ from ee_dist.effects import Term, apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drive import DrivePath
 from ee_dist.engines.drivers import Commands
-from ee_dist.robots.inertia import felt_inertia, mass_matrices, mass_matrix, steady_inertia
+from ee_dist.robots.inertia import felt_inertia, steady_inertia
+from ee_dist.robots.mass_matrix import mass_matrices, mass_matrix
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.trials.log import Array

@@ -20,7 +20,7 @@ from ee_dist.engines.mujoco.model import Model
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.engines.pybullet.world import World
 from ee_dist.robots.describe import load_robot
-from ee_dist.robots.inertia import rotation_matrix
+from ee_dist.robots.mass_matrix import rotation_matrix
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.starter import starter
 

@@ -16,7 +16,7 @@ from ee_dist.engines.mujoco.bodies import Group
 from ee_dist.engines.mujoco.contact import IMPEDANCE, contact
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.mujoco.model import NOTHING_TO_TOUCH, UNUSED, Model, structure_key
-from ee_dist.robots.inertia import mass_matrix
+from ee_dist.robots.mass_matrix import mass_matrix
 from ee_dist.robots.model import Joint, Part, Robot, Shape
 from ee_dist.robots.quadruped import quadruped
 

@@ -22,8 +22,8 @@ from ee_dist.engines.mujoco.mjcf_floor import floor_of
 from ee_dist.engines.mujoco.mjcf_left_out import left_out
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, entries, folded, posed
-from ee_dist.robots.inertia import rotation_matrix
 from ee_dist.robots.kinematics import quat_multiply, quat_rotate
+from ee_dist.robots.mass_matrix import rotation_matrix
 from ee_dist.robots.model import (
     CONTINUOUS_M,
     CONTINUOUS_RAD,
