@@ -26,7 +26,7 @@ from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
-from ee_dist.discrepancy.search.trials import calm_trials, telling_values
+from ee_dist.discrepancy.search.trials import calm_trials, telling, telling_values
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.discrepancy.sharing import apart, distinct, shared, singles, taken_apart
 from ee_dist.robots.model import Robot
@@ -238,7 +238,8 @@ class _Look:
         search, model = self.calm, alone.model
         refit = Refit(slopes_at(search, alone.model, alone.u))
         now = search.on(alone.hypothesis)
-        screened = screen(now, possible(search.problem.robot, now.fixed, self._others(model)), refit=refit)
+        one = telling(search.problem, alone.residual, np.unique(search.problem.trial_of[search.everything]).tolist())
+        screened = screen(now, possible(search.problem.robot, now.fixed, self._others(model)), refit=refit, trial=one)
         few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
         starts = []
         for s in few[:TRIED]:
@@ -270,14 +271,13 @@ class _Look:
         chosen = [k for k, c in enumerate(kept.parts) if k < own or c.name in names]
         shown, energy = set(chosen), next(float(r @ r) for cut, r in self.cuts if cut is found.cut)
         rungs: list[Rung] = []
-        order = self._order(kept)
+        order, taken = self._order(kept), []
         for kind in order:
-            chosen = sorted(
-                [*chosen, *(k for k, c in enumerate(kept.parts) if c.effect.name == kind and k not in shown)]
-            )
-            model = Model(tuple(kept.parts[k] for k in chosen))
-            start = _values(kept.u, places, chosen)
-            (held,) = cross_fit(search, [(model, start)], found.cut)
+            chosen = sorted({*chosen, *(k for k, c in enumerate(kept.parts) if c.effect.name == kind)})
+            taken.append(chosen)
+        starts = [(Model(tuple(kept.parts[k] for k in some)), _values(kept.u, places, some)) for some in taken]
+        fitted = cross_fit(search, starts, found.cut)
+        for kind, chosen, (model, start), held in zip(order, taken, starts, fitted, strict=True):
             now = float(held.residual @ held.residual)
             if now >= energy and kind != order[-1]:
                 continue

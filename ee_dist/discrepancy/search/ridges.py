@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit
 from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.rows import NOISE, over_rows
@@ -34,13 +35,14 @@ def over_ridges(search: Search, fit: Fit, prior: float = 0.0) -> Fit:
     """The fit, or a better one of the same model on the far side of a ridge."""
     floor = float(search.problem.floor[fit.mask].sum())
     for _ in range(ROUNDS):
-        wanted = fit.energy - PROMISE * max(fit.energy - floor, 0.0)
+        wanted = _wanted(search, fit.residual, fit.mask)
         if fit.energy <= NOISE * floor:
             break
-        starts = _beyond(search, fit, wanted, prior)
+        # Where one trial tells which way to go, on it alone: what it takes is judged on all of them.
+        few = telling_values(search.problem, fit.residual, fit.mask)
+        starts = _beyond(search.within(few), fit, few, prior)
         best = fit
         if starts:
-            few = telling_values(search.problem, fit.residual, fit.mask)
             best = race(search, [(fit.model, u) for u in starts], fit.mask, HEATS, prior, WIDTH, few)[0]
         if not best.energy < wanted:
             best = over_rows(search, fit, wanted, prior)
@@ -50,9 +52,15 @@ def over_ridges(search: Search, fit: Fit, prior: float = 0.0) -> Fit:
     return fit
 
 
-def _beyond(search: Search, fit: Fit, wanted: float, prior: float) -> list[Array]:
-    """Values (P,) to start from, the most promising first."""
-    model, mask = fit.model, fit.mask
+def _wanted(search: Search, residual: Array, mask: Mask) -> float:
+    """Energy of residual values (n,) that is worth a descent."""
+    energy, floor = float((residual[mask] ** 2).sum()), float(search.problem.floor[mask].sum())
+    return energy - PROMISE * max(energy - floor, 0.0)
+
+
+def _beyond(search: Search, fit: Fit, mask: Mask, prior: float) -> list[Array]:
+    """Values (P,) to start from, the most promising first, by the residual values of ``mask`` (n,)."""
+    model, wanted = fit.model, _wanted(search, fit.residual, mask)
     lower, upper = model.lower, model.upper
     points = []
     for k in range(len(fit.u)):
