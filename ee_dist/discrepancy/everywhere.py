@@ -17,7 +17,7 @@ from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment
-from ee_dist.discrepancy.pruning import pruned
+from ee_dist.discrepancy.pruning import AGAIN, pruned
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.race import race
@@ -277,27 +277,40 @@ class _Look:
             taken.append(chosen)
         starts = [(Model(tuple(kept.parts[k] for k in some)), _values(kept.u, places, some)) for some in taken]
         fitted = cross_fit(search, starts, found.cut)
-        for kind, chosen, (model, start), held in zip(order, taken, starts, fitted, strict=True):
-            now = float(held.residual @ held.residual)
-            if now >= energy and kind != order[-1]:
+        energies = [float(held.residual @ held.residual) for held in fitted]
+        last, model, held_energy = self._as_far(found, starts, energies)
+        for k in range(last + 1):
+            chosen, (part_of_it, start), held = taken[k], starts[k], fitted[k]
+            if energies[k] >= energy and k != last:
                 continue
-            mine = [k for k in chosen if k not in shown]
-            terms = model.hypothesis(start)
+            mine = [m for m in chosen if m not in shown]
+            terms = part_of_it.hypothesis(start)
             rungs.append(
                 Rung(
-                    _label([kept.parts[k] for k in mine]),
-                    tuple(t for k, t in zip(chosen, terms, strict=True) if k in mine),
+                    _label([kept.parts[m] for m in mine]),
+                    tuple(t for m, t in zip(chosen, terms, strict=True) if m in mine),
                     (*search.fixed, *terms),
                     float(np.sqrt(held.seen)),
                     error(held.residual),
                     per_segment(problem, held.residual),
                     found.cut.name,
-                    tied_with=[t for k in mine for t in found.ties.get(kept.parts[k].name, [])],
+                    tied_with=[t for m in mine for t in found.ties.get(kept.parts[m].name, [])],
                     dropped=() if rungs else gone,
                 )
             )
-            shown, energy = set(chosen), now
-        return Everywhere(kept, rungs, found.held)
+            shown, energy = set(chosen), energies[k]
+        return Everywhere(model, rungs, held_energy)
+
+    def _as_far(
+        self, found: _Kept, starts: Sequence[tuple[Model, Array]], energies: Sequence[float]
+    ) -> tuple[int, Current, float]:
+        """The last of the steps to take, the model there, and its held-out energy: all of them, unless those beyond another make
+        what is held out worse by more than luck."""
+        last, best = len(starts) - 1, int(np.argmin(energies))
+        if energies[last] <= energies[best] + self.luck(energies[best]):
+            return last, found.model, found.held
+        (fit,) = follow_valley(self.calm, [starts[best]], self.calm.everything, PRIOR, widths=(AGAIN,))
+        return best, Current(fit.model.parts, fit.u), energies[best]
 
     def _order(self, kept: Current) -> list[str]:
         """Kinds of effect that are new, by what the model would lose without them."""

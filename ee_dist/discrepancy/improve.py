@@ -51,7 +51,10 @@ RETURNS = 2
 """How often an effect may have been dropped and yet be looked at again: what came later may be dropped in turn."""
 MOST = 24
 """Effects that are added at most unless told otherwise."""
+REFUSALS = 2
+"""How many steps may be refused because what is held out gets no better by them, before no other is looked for."""
 NO_MORE = "no further effect earns its place: {why}"
+WORSE = "with all values fitted anew, data held out are foretold no better"
 NOTHING_LEFT = "nothing is left that counts, above the noise and above the resolution at which channels are compared"
 ASKED = "the effects asked for were added"
 REFITTED = "only the model's own values were to be fitted"
@@ -90,12 +93,14 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))
     else:
-        exchanges, looked, spread, anew, refused = 0, -1, 0, 0, 0
+        exchanges, looked, spread, anew, refused, refusals = 0, -1, 0, 0, 0, 0
         beside: set[str] = set()
+        worse: list[str] = []
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             has = (*search.fixed, *current.hypothesis)
-            others = on_top_of(problem.robot, has, _offered(pool, current, ladder))
+            others = [c for c in _offered(pool, current, ladder) if c.name not in worse]
+            others = on_top_of(problem.robot, has, others)
             last = examine(search, current, others, effort)
             if own and len(current.parts) == own:
                 kept = as_it_was(search, last, before, as_it_is, others, effort)
@@ -124,7 +129,7 @@ def improve(
                     current, rung = exchanged
                     climb(rung)
                     continue
-                nearest = last.judged[0].why_not if last.judged else LUCK
+                nearest = WORSE if worse else last.judged[0].why_not if last.judged else LUCK
                 stopped = NO_MORE.format(why=nearest)
                 if _settled(leftovers(problem, last.base), ladder[-1].error_heldout, problem.noise_floor()[0]):
                     stopped = NOTHING_LEFT
@@ -134,17 +139,24 @@ def improve(
                 # It was judged on top of a model that stayed as it was.
                 model, start = Model((*current.parts, *model.parts)), np.concatenate([current.u, start])
             fit = _with_room(search, fit_one(search, model, [start], None, WIDTHS[2:]))
-            current = Current(fit.model.parts, fit.u)
+            before_it, current = current, Current(fit.model.parts, fit.u)
             rung = _rung(search, best, [j.name for j in last.tied[1:]])
             # Shown are the values of a fit of all data, which the model keeps; the errors are those of data held out.
             rung.terms = (*search.fixed, *current.hypothesis)
             rung.added = current.hypothesis[len(current.parts) - len(best.proposal.parts) :]
             rung.alternatives = [(j.proposal, j.own) for j in last.tied[1:] if j.earned and len(j.proposal.parts) == 1]
-            current, rung.dropped = without_useless(
-                search, current, own, len(best.proposal.parts), best.outcome.cut, len(pool)
-            )
-            if len(current.u) >= LARGE:
-                _as_thoroughly(search, current, best.outcome.cut, rung)
+            cut = best.outcome.cut
+            current, rung.dropped = without_useless(search, current, own, len(best.proposal.parts), cut, len(pool))
+            _as_it_stands(search, current, cut, rung)
+            if rung.held_out == ladder[-1].held_out and rung.error_heldout >= ladder[-1].error_heldout:
+                # Beside a model that only goes along it was worth its place, and not where all values may follow the motions that
+                # are fitted.
+                worse += [c.name for c in best.proposal.parts]
+                current, refusals = before_it, refusals + 1
+                if refusals < REFUSALS:
+                    continue
+                stopped = NO_MORE.format(why=WORSE)
+                break
             climb(rung)
         if spread or len(current.parts) - own > 1:
             # Of two that leave the same mark the values may be anything, and one of them says it all.
@@ -219,8 +231,9 @@ def _refitted(
     )
 
 
-def _as_thoroughly(search: Search, current: Current, cut: Cut, rung: Rung) -> None:
-    """Errors of a step from fits as thorough as those of all that is a little wrong everywhere, so that steps compare."""
+def _as_it_stands(search: Search, current: Current, cut: Cut, rung: Rung) -> None:
+    """Errors of a step from fits of the whole model that is left after it, so that steps compare: where it was judged what the
+    model had before went along by its slopes alone."""
     (held,) = cross_fit(search, [(Model(current.parts), current.u)], cut)
     rung.error_fit, rung.error_heldout = float(np.sqrt(held.seen)), error(held.residual)
     rung.held = per_segment(search.problem, held.residual)

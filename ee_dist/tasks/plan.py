@@ -131,7 +131,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     account = account_of(
         robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED,
         every_s, measured.real,
-    ).warned(measured.remarks)  # fmt: skip
+    ).warned([*measured.remarks, *rated(robot)])  # fmt: skip
     digest = digest_of([(t.excitation, [round(s, 9) for s in t.separations]) for t in result.trials])
     rest = of_plan(result, explanations, found.folder, measured.files, options.limits, account)
     rest |= {"reading_s": every_s or robot.time_step_s, "csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}
@@ -173,6 +173,18 @@ def motions(robot: Robot, options: Options, seed: int, every_s: float = 0.0) -> 
             f"task.excursion={options.excursion:g}, task.speed={options.speed:g}: within these limits nothing moves; allow more"
         )
     return found
+
+
+def rated(robot: Robot) -> list[str]:
+    """A line for people on how fast the description lets commands change; none where it says nothing of it."""
+    told = [
+        f"{d.joint} {robot.joint(d.joint).top_speed:.3g} {unit}/s"
+        for d in robot.drives
+        if (unit := command_unit(robot, d))
+        and d.command == "position"
+        and math.isfinite(robot.joint(d.joint).top_speed)
+    ]
+    return [f"No command changes faster than the description lets its joint go: {', '.join(told)}."] if told else []
 
 
 def noise_share(robot: Robot) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import command_span
 from ee_dist.trials.excitation import FIXTURES, KINDS, Excitation
+from ee_dist.trials.log import Array
 
 PLANNED = tuple(k for k in KINDS if k != "gait")
 """Kinds whose commands are known beforehand: those of a gait come out of a network's loop."""
@@ -23,7 +24,8 @@ LEAST = 0.001
 @dataclass(frozen=True)
 class Limits:
     """What no trial may go beyond. ``amplitude``: share of half of each joint's range; ``excursion``: how far a command goes
-    from the middle, and ``speed``: how fast it changes, in its own unit (rad, m, N.m) and that in a second."""
+    from the middle, and ``speed``: how fast it changes, in its own unit (rad, m, N.m) and that in a second. Positions are
+    commanded no faster than a joint's data sheet says either (``Joint.top_speed``)."""
 
     seconds: float = 6.0
     amplitude: float = 0.5
@@ -67,22 +69,29 @@ def largest(robot: Robot, wanted: Excitation, limits: Limits) -> float:
     """The largest amplitude, up to that of ``wanted``, at which an excitation keeps to the limits."""
     half = max((high - low) / 2 for low, high in (command_span(robot, d) for d in robot.drives))
     most = min(wanted.amplitude, limits.excursion / half if half else math.inf)
-    if most < LEAST or not math.isfinite(limits.speed):
+    paces = allowed(robot, limits)
+    if most < LEAST or not np.isfinite(paces).any():
         return most
-    peak = fastest(robot, replace(wanted, amplitude=most))
-    most = _short(most * min(1.0, limits.speed / peak)) if peak else most
+    beyond = float(np.max(fastest(robot, replace(wanted, amplitude=most)) / paces))
+    most = _short(most / max(beyond, 1.0))
     # The way from where it stands to the middle may be too fast by itself.
     kept = most >= LEAST and _keeps(robot, replace(wanted, amplitude=most), limits)
     return most if kept else 0.0
 
 
 def _keeps(robot: Robot, excitation: Excitation, limits: Limits) -> bool:
-    return fastest(robot, excitation) <= limits.speed * (1 + 1e-9)
+    return bool((fastest(robot, excitation) <= allowed(robot, limits) * (1 + 1e-9)).all())
 
 
-def fastest(robot: Robot, excitation: Excitation) -> float:
-    """The fastest change of a command from row to row, in its unit per second."""
-    return float(np.abs(np.diff(excitation.commands(robot), axis=0)).max() / robot.time_step_s)
+def allowed(robot: Robot, limits: Limits) -> Array:
+    """(M,) how fast the command of each drive may change, in its unit per second."""
+    own = [robot.joint(d.joint).top_speed if d.command == "position" else math.inf for d in robot.drives]
+    return np.minimum(np.array(own), limits.speed)
+
+
+def fastest(robot: Robot, excitation: Excitation) -> Array:
+    """(M,) the fastest change of each drive's command from row to row, in its unit per second."""
+    return np.asarray(np.abs(np.diff(excitation.commands(robot), axis=0)).max(axis=0) / robot.time_step_s)
 
 
 def _short(amplitude: float) -> float:

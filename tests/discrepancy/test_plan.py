@@ -19,7 +19,7 @@ from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import ConfigError
-from ee_dist.tasks.plan import Options, motions
+from ee_dist.tasks.plan import Options, motions, rated
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.family import PLANNED, Limits, driven, family, fastest
 from ee_dist.trials.noise import with_noise
@@ -115,7 +115,20 @@ def test_no_trial_goes_beyond_what_was_said(robot, limits) -> None:
         half = np.array([(robot.joint(j).upper - robot.joint(j).lower) / 2 for j in robot.motor_names])
         assert (np.abs(sent - middle) <= np.minimum(limits.amplitude * half, limits.excursion) + 1e-9).all()
         if e.kind != "rest":
-            assert fastest(robot, e) <= limits.speed * (1 + 1e-9)
+            assert (fastest(robot, e) <= limits.speed * (1 + 1e-9)).all()
+
+
+def test_commands_change_no_faster_than_the_description_lets_joints_go() -> None:
+    stage, rated_m_s = linear_stage(), 0.05
+    positions = replace(stage, joints=tuple(replace(j, top_speed=rated_m_s) for j in stage.joints))
+    slow = replace(positions, drives=tuple(replace(d, command="torque") for d in positions.drives))
+    found = family(positions, Limits(2.0, 0.5), seed=1)
+    assert {e.kind for e in found} >= {"fast_sines", "sway"}
+    assert all((fastest(positions, e) <= rated_m_s * (1 + 1e-9)).all() for e in found)
+    # A speed or a torque may change as quickly as it likes.
+    assert any((fastest(slow, e) > rated_m_s).any() for e in family(slow, Limits(2.0, 0.5), seed=1))
+    (said,) = rated(positions)
+    assert "0.05 m/s" in said and not rated(slow)
 
 
 def test_a_robot_that_commands_cannot_drive_has_no_plan() -> None:

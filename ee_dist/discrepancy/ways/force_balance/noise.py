@@ -181,6 +181,12 @@ def prepared(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processin
 def _tried(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
     judged = judged_in(trials, models[0])
     motions = [motion_of(t, model, processing, judged) for t, model in zip(trials, models, strict=True)]
+    # At a joint that is held dry friction may be anything up to its limit, so that its torque tells nothing of a model; and it
+    # is often so small that its own noise would be the largest share of all.
+    slide = ~np.all([m.rest.all(axis=0) for m in motions], axis=0)
+    if slide[list(judged)].any():
+        judged = tuple(k for k in judged if slide[k])
+        motions = [replace(m, judged=judged) for m in motions]
     forces = np.concatenate([decimated(m.of_judged(m.torque), processing.keep_every) for m in motions])
     size = np.sqrt(np.mean(forces**2, axis=0))
     if not size.all():

@@ -23,7 +23,7 @@ from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.discrepancy.ways.force_balance.balance import INSTANT_S, Balance, told_by
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED, left_to_give
 from ee_dist.discrepancy.ways.force_balance.floor import floor_of
-from ee_dist.discrepancy.ways.force_balance.motion import Processing
+from ee_dist.discrepancy.ways.force_balance.motion import Processing, judged_in
 from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
@@ -37,7 +37,7 @@ LEAST_NOISE = 0.002
 
 
 class ForceBalance(Problem):
-    """A balance of forces. Channels are the drives whose torques are known, the ``judged``; all joints move.
+    """A balance of forces. Channels are the drives whose torques are known and whose joints slide, the ``judged``.
 
     A residual value is a force left over, in units of the noise of the measured force; ``natural`` makes a relative force
     error of it. Segments are blocks of time.
@@ -65,8 +65,11 @@ class ForceBalance(Problem):
             ready.noise,
         )
         self.judged = ready.judged
-        """(J,): the drives whose torques are known in every trial."""
+        """(J,): the drives whose torques are known in every trial, and whose joint slides in one."""
         self.unjudged = tuple(name for k, name in enumerate(robot.motor_names) if k not in self.judged)
+        known = set(judged_in(trials, robot))
+        self.held = tuple(name for k, name in enumerate(robot.motor_names) if k in known.difference(self.judged))
+        """Those of the others whose torques are known."""
         self.balances = [Balance(m, self.processing.keep_every, len(self.motions)) for m in self.motions]
         forces = [decimated(m.of_judged(m.torque), self.processing.keep_every) for m in self.motions]
         self.let_through = ready.noise.first
@@ -188,7 +191,7 @@ class ForceBalance(Problem):
 
     @cached_property
     def stuck(self) -> tuple[str, ...]:
-        """Judged drives whose joint does not slide in any trial."""
+        """Judged drives whose joint does not slide in any trial: all of them, or none."""
         never = np.all([m.of_judged(m.rest).all(axis=0) for m in self.motions], axis=0)
         return tuple(name for name, still in zip(self.channels, never, strict=True) if still)
 
@@ -213,17 +216,24 @@ class ForceBalance(Problem):
     @property
     def notes(self) -> list[str]:
         lines = []
-        if self.unjudged:
-            they_move = "it moves" if len(self.unjudged) == 1 else "they move"
+        unknown = tuple(name for name in self.unjudged if name not in self.held)
+        if unknown:
+            they_move = "it moves" if len(unknown) == 1 else "they move"
             lines.append(
                 f"Torques are compared at {len(self.judged)} of {len(self.robot.drives)} joints: {listed(self.channels)}. At "
-                f"{listed(self.unjudged)} they are not known: how {they_move} counts at the others, and what drives or rubs "
+                f"{listed(unknown)} they are not known: how {they_move} counts at the others, and what drives or rubs "
                 "there is not judged."
             )
-        if self.stuck:
+        if still := self.held or self.stuck:
+            one = len(still) == 1
             lines.append(
-                f"{listed(self.stuck)} hardly {'moves' if len(self.stuck) == 1 else 'move'} in any trial: what friction takes "
-                "there may be anything up to its limit, and no more of it can be told."
+                f"{listed(still)} hardly {'moves' if one else 'move'} in any trial: what friction takes there may be anything up "
+                "to its limit"
+                + (
+                    f", so that {'its' if one else 'their'} torque is not judged."
+                    if self.held
+                    else ", and no more of it can be told."
+                )
             )
         if self.left_to_give < CANCELLED:
             lines.append(
