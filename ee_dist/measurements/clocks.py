@@ -19,6 +19,8 @@ MOST_ROWS = 5_000_000
 SLOW_S = 1.0
 FASTEST_S, SLOWEST_S = 2e-4, 0.2
 """Steps of a robot's log. A factor of 1000 lies between them, so the size of a step tells the unit."""
+QUICKEST_S = 9e-5
+"""The least of one that says its unit: servo drives log at 10 kHz."""
 KEPT = 0.05
 TORN = 0.5
 """A single gap of more than this share of the record, or a record stretched by it, is a wrong time stamp."""
@@ -83,11 +85,11 @@ def check_grid(found: Clocked, step_s: float, rate_stated: bool, unit: str) -> N
     often the unit of the time is another one."""
     table, length = found.table, float(found.times_s[-1] - found.times_s[0])
     rows, median = length / step_s, found.timing.median_s
-    if length < step_s or (rows < KEPT * len(table) and median < FASTEST_S and not rate_stated):
+    if length < step_s or (rows < KEPT * len(table) and median < QUICKEST_S and not rate_stated):
         raise MeasurementError(
             f"{table}: the times of {len(table)} rows cover {length:.4g} s, {1e6 * median:.4g} us a row, so that steps of "
             f"{step_s:g} s would keep {int(rows) + 1}; if the times are not in {quoted(unit)}{_cure(median, unit)}; "
-            "if they are, set rate_hz"
+            "if they are, write 'rate_hz: ROWS_A_SECOND' into the mapping, the rate at which rows are wanted"
         )
     if median >= SLOW_S:
         raise MeasurementError(

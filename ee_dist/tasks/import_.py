@@ -83,7 +83,8 @@ def run(config: Config, options: Options, out: Path) -> None:
         proposal = proposal_for(files, robot, replace(hints, written=written_orders(config)))
         mapping = written(proposal, config, files, out, console)
     robot, remarks = with_gains(robot, mapping)
-    notes = (*notes, *left, *remarks)
+    robot, finer = at_rate(robot, mapping)
+    notes = (*notes, *left, *remarks, *finer)
     found = import_files(files, mapping, robot)
     reports = [report for _, report in found]
     text = describe(reports)
@@ -107,6 +108,16 @@ def run(config: Config, options: Options, out: Path) -> None:
         highlight=False,
         soft_wrap=True,
     )
+
+
+def at_rate(robot: Robot, mapping: Mapping) -> tuple[Robot, tuple[str, ...]]:
+    """The robot in steps of the rows that the mapping asks for, if they are finer than its own, and a line on it: a log and its
+    model go in the same steps."""
+    step_s = math.inf if mapping.rate_hz is None else 1.0 / mapping.rate_hz
+    if step_s >= robot.time_step_s - 1e-9:
+        return robot, ()
+    line = f"rate_hz: {mapping.rate_hz:g}: {robot.name} is stepped every {step_s:g} s, not every {robot.time_step_s:g} s"
+    return replace(robot, time_step_s=step_s), (line,)
 
 
 def hints_of(options: Options) -> Hints:

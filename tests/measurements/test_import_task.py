@@ -12,6 +12,7 @@ import measurement_files as samples
 import numpy as np
 import odd_files
 import pytest
+import small_logs as logs
 
 from ee_dist.__main__ import main
 from ee_dist.recording.reader import read_run
@@ -59,6 +60,29 @@ def test_a_file_without_a_mapping_becomes_a_recording(tmp_path: Path, command: C
     for metadata in kept:
         (line,) = changed_sources(metadata)
         assert str(robot) in line and "has changed since the import" in line
+
+
+def test_a_log_of_a_servo_drive_comes_in_at_five_kilohertz_or_at_the_rate_that_is_asked_for(
+    tmp_path: Path, command: Command
+) -> None:
+    """Finer rows than the model's steps would ask for become its steps: every verb wants them to be the same."""
+    t = np.arange(15_000) / 5000.0
+    goals, positions = (0.4 * np.stack([np.sin(3 * s), np.cos(2 * s)], axis=1) for s in (t, t - 0.04))
+    frame = logs.frame_of(t, positions, goals).rename(columns={"time": "time_s"})
+    file, robot = logs.written(tmp_path, frame), samples.robot_file(tmp_path)
+    given = (f"measured={file}", "robot=urdf", f"robot.drives={robot}")
+    status, _, complaint = command(*given, f"hydra.run.dir={tmp_path / 'out'}")
+    assert status == 0, complaint
+    usual = read_run(tmp_path / "out" / "measured.mcap")
+    mapping = tmp_path / "out" / "mapping.yaml"
+    mapping.write_text(mapping.read_text() + "rate_hz: 2500\n")
+    status, said, _ = command(*given, f"task.mapping={mapping}", f"hydra.run.dir={tmp_path / 'fine'}")
+    assert status == 0 and "is stepped every 0.0004 s" in said
+    fine = read_run(tmp_path / "fine" / "measured.mcap")
+    for run, step_s in ((usual, usual.robot.time_step_s), (fine, 0.0004)):
+        assert run.robot.time_step_s == step_s
+        assert np.diff(run.trials[0].log.times_s) == pytest.approx(step_s)
+    assert usual.robot.time_step_s > 0.0004
 
 
 def test_what_no_file_can_say_is_asked_in_one_line(tmp_path: Path, command: Command) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ee_dist.measurements.clocks import FASTEST_S, SLOWEST_S
+from ee_dist.measurements.clocks import FASTEST_S, QUICKEST_S, SLOWEST_S
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.blocks import series_of
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Hints
@@ -78,19 +78,19 @@ def _chosen(table: Table, candidates: list[str], rising: dict[str, Array], named
     stated = (unit_word(table.units[column]) if column in table.units else None) or _reading(column).unit
     stated = stated if stated in TIMES else None
     what = "is called a time and rises" if named else "is the only one that always rises"
-    if stated and stated not in fits:
+    if stated and not QUICKEST_S <= step * UNITS[stated][1] <= SLOWEST_S:
         better = f", in {fits[0]} {step * UNITS[fits[0]][1]:.4g} s" if fits else ""
         return TimeChoice(column, stated, seconds * UNITS[stated][1], UNKNOWN,
                           f"it says {stated}, but rows would be {step * UNITS[stated][1]:.4g} s apart{better}")  # fmt: skip
-    if not fits:
+    if not (fits or stated):
         return TimeChoice(
             column, "s", seconds, UNKNOWN, f"{column!r} rises by {step:.4g} a row, which fits no unit of time"
         )
     others = [a for a in candidates[1:] if not _same(rising[a], seconds)]
-    if others and not named:
-        return TimeChoice(column, fits[0], seconds * UNITS[fits[0]][1], UNKNOWN,
-                          f"several columns always rise: {', '.join(candidates[:4])}")  # fmt: skip
     unit = stated or fits[0]
+    if others and not named:
+        return TimeChoice(column, unit, seconds * UNITS[unit][1], UNKNOWN,
+                          f"several columns always rise: {', '.join(candidates[:4])}")  # fmt: skip
     why = f"{what}; {'it says' if stated else 'steps are those of'} {unit}: {1 / (step * UNITS[unit][1]):.4g} Hz"
     if others:
         why += f"; {others[0]!r} is another clock, not used"
