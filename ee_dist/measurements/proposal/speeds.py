@@ -88,7 +88,9 @@ def _estimate(v: View, names: list[str], positions: list[str], sure: str, why: l
         if called is not None:
             v.out.choices.append(called)
         elif name and of:
-            entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / v.step(v.position.block), 3))}
+            # It is made of rows as far apart as the log's, or as the steps that these are brought to.
+            apart_s = max(v.step(v.position.block), v.robot.time_step_s)
+            entry = {"speed_of": of, "cutoff_hz": min(50.0, round(0.2 / apart_s, 3))}
             v.out.choices.append(Choice("sensors", name, entry, sure, why[k]))
 
 
