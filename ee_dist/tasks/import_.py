@@ -116,7 +116,9 @@ def at_rate(robot: Robot, mapping: Mapping) -> tuple[Robot, tuple[str, ...]]:
     step_s = math.inf if mapping.rate_hz is None else 1.0 / mapping.rate_hz
     if step_s >= robot.time_step_s - 1e-9:
         return robot, ()
-    line = f"rate_hz: {mapping.rate_hz:g}: {robot.name} is stepped every {step_s:g} s, not every {robot.time_step_s:g} s"
+    line = (
+        f"rate_hz: {mapping.rate_hz:g}: {robot.name} is stepped every {step_s:g} s, not every {robot.time_step_s:g} s"
+    )
     return replace(robot, time_step_s=step_s), (line,)
 
 

@@ -145,6 +145,10 @@ def way_of(measured: Measurements, by: str) -> Way:
                 return _possible(replace(WAYS["free_run"], why=weak or WAYS["free_run"].why), measured)
         if by == "open_loop" and _only_motion(measured):
             return _possible(replace(WAYS["free_run"], why=ONLY_MOTION), measured)
+        if by == "open_loop" and torques and not measured.robot.free_base:
+            guessed = any(field == "kp" for _, field in measured.robot.assumed)
+            why = f"{WAYS[by].why}. {TORQUES_TOO.format(gains=GUESSED if guessed else '')}"
+            return _possible(replace(WAYS[by], why=why), measured)
     return _possible(WAYS[by], measured)
 
 
@@ -155,6 +159,8 @@ def _forces_known(log: SensorLog, robot: Robot, all_of_them: bool) -> bool:
     return torques is not None and (not all_of_them or len(torques_known(torques)) == len(robot.drives))
 
 
+TORQUES_TOO = "Torques of the drives were recorded too: task.by=force_balance compares these{gains}"
+GUESSED = ", and asks nothing of gains, which the description only assumed"
 ONLY_MOTION = (
     "of a real robot, positions and commands were recorded: the model runs freely from the measured state (faults of sensors "
     "are told by task.by=open_loop alone)"

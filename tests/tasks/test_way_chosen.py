@@ -58,6 +58,17 @@ def test_of_a_real_robot_with_nothing_but_its_motion_a_free_run_tells_most() -> 
     assert way_of(replace(real, trials=blind), AUTO).name == "open_loop"
 
 
+def test_where_torques_were_recorded_beside_commands_it_is_said_that_they_can_be_compared() -> None:
+    known = measured("position")
+    logged = replace(known.trials[0].log, torques=np.ones((ROWS, len(known.robot.drives))))
+    beside = replace(known, trials=(replace(known.trials[0], log=logged),))
+    way = way_of(beside, AUTO)
+    assert way.name == "open_loop" and "task.by=force_balance compares these" in way.why and "gains" not in way.why
+    guessed = replace(beside.robot, assumed=((beside.robot.drives[0].joint, "kp"),))
+    assert "gains, which the description only assumed" in way_of(replace(beside, robot=guessed), AUTO).why
+    assert "force_balance" not in way_of(known, AUTO).why
+
+
 def test_where_torques_lead_the_model_starts_anew_and_is_searched_as_it_is() -> None:
     config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
     free, held = (way_of(measured(c), "free_run").make(measured(c), config) for c in ("torque", "position"))
