@@ -10,6 +10,7 @@ from way_samples import measure, problem, samples, sines
 
 from ee_dist.discrepancy.ways.force_balance.motion import GIVE_RAD, Processing, at_rest, give
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.discrepancy.ways.force_balance.ripple import describe, remains
 from ee_dist.effects.catalogue import term
 from ee_dist.trials.noise import with_noise
 
@@ -85,3 +86,12 @@ def test_what_moves_from_rest_to_rest_slides_if_it_goes_farther_than_teeth_give(
 def test_a_joint_of_a_small_range_may_slide_all_of_it() -> None:
     robot = samples()["arm"].robot.with_joint("elbow", lower=-0.02, upper=0.02)
     assert give(robot)[1] < 0.001
+
+
+def test_of_a_drive_that_leaves_nothing_and_passes_no_place_twice_no_number_is_made_up() -> None:
+    t = np.linspace(0.0, 1.0, 400)
+    once = remains("joint", np.sin(30 * t), t, np.ones_like(t), np.zeros_like(t))
+    assert "no two passes are over the same positions" in "".join(describe(once, "N.m", "rad"))
+    with np.errstate(all="raise"):
+        nothing = remains("joint", 0.0 * t, t, np.ones_like(t), np.zeros_like(t))
+    assert "nan" not in "".join(describe(nothing, "N.m", "rad"))

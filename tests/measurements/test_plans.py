@@ -90,6 +90,13 @@ def test_a_joint_that_hardly_moves_decides_nothing() -> None:
     assert signals.lively(seen[:, 3:]) == [0], "alone it is all there is"
 
 
+def test_of_seven_joints_of_which_two_are_driven_these_decide() -> None:
+    wave, rng = plan(T)[:, 0], np.random.default_rng(0)
+    held = 0.002 * np.ptp(wave) * rng.standard_normal((len(T), 5)).clip(-1, 1)
+    seen = np.column_stack([held[:, 0], wave, held[:, 1], 0.7 * wave, held[:, 2:]])
+    assert signals.lively(seen) == [1, 3]
+
+
 def test_letters_in_pairs_only() -> None:
     assert spelled_out(["posd1", "posa1", "accd1", "time"]) == {"posd1": "pos desired 1", "posa1": "pos actual 1"}
     assert not spelled_out(["q", "qd", "qdd", "qa"])

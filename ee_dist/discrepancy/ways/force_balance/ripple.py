@@ -7,6 +7,7 @@ jerky.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -77,7 +78,7 @@ def _rms(values: Array) -> float:
 
 
 def _regime(name: str, left: Array, mask: Mask) -> Regime:
-    share = float(np.sum(left[mask] ** 2) / np.sum(left**2))
+    share = float(np.sum(left[mask] ** 2) / max(float(np.sum(left**2)), 1e-300))
     return Regime(name, float(mask.mean()), share, _rms(left[mask]), float(left[mask].mean()))
 
 
@@ -102,12 +103,14 @@ def _profile(where: Array, x: Array, left: Array) -> Array:
 
 
 def _repeats(profiles: Array) -> float:
-    """Share of the variance of the profiles (passes, bins) that is in their mean, over bins that several passes cover."""
+    """Share of the variance of the profiles (passes, bins) that is in their mean, over bins that several passes cover; NaN where
+    none are."""
     covered = np.isfinite(profiles).sum(axis=0) >= 2
     if not covered.any():
         return float("nan")
     some = profiles[:, covered]
-    return float(np.nanmean(np.nanmean(some, axis=0) ** 2) / np.nanmean(some**2))
+    # Bins that many passes cover weigh more below than above.
+    return min(1.0, float(np.nanmean(np.nanmean(some, axis=0) ** 2) / max(float(np.nanmean(some**2)), 1e-300)))
 
 
 def _explained(x: Array, left: Array, wavelength: float) -> float:
@@ -116,7 +119,7 @@ def _explained(x: Array, left: Array, wavelength: float) -> float:
     basis = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     z = left - left.mean()
     fit = np.linalg.lstsq(basis, z, rcond=None)[0]
-    return float(1 - np.sum((z - basis @ fit) ** 2) / np.sum(z**2))
+    return float(1 - np.sum((z - basis @ fit) ** 2) / max(float(np.sum(z**2)), 1e-300))
 
 
 def describe(found: Remains, unit: str, length: str) -> Sequence[str]:
@@ -130,8 +133,13 @@ def describe(found: Remains, unit: str, length: str) -> Sequence[str]:
         for r in found.regimes
     ]
     lines += [
-        f"  going {r.direction}: {r.repeats:.0%} of it repeats on each of {r.passes} passes; a ripple of "
-        f"{r.wavelength:.4g} {length} takes {r.share:.0%}"
+        f"  going {r.direction}: {_again(r)}; a ripple of {r.wavelength:.4g} {length} takes {r.share:.0%}"
         for r in found.ripples
     ]
     return lines
+
+
+def _again(r: Ripple) -> str:
+    if math.isnan(r.repeats):
+        return "no two passes are over the same positions"
+    return f"{r.repeats:.0%} of it repeats on each of {r.passes} passes"
