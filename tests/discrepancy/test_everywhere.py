@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.everywhere import everywhere
+from ee_dist.discrepancy.everywhere import _Kept, _Look, everywhere
 from ee_dist.discrepancy.evidence.holdout import travelling, windows
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.improve import improve
@@ -109,6 +109,21 @@ def test_all_that_is_a_little_wrong_is_found_and_nothing_else(robot):
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 1.1 * NOISE
     assert {t.effect for r in found.rungs for t in r.added} == set(truth)
+
+
+def test_kinds_that_make_what_is_held_out_worse_are_left_out_again(robot):
+    truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2}
+    problem, pool = Curved(robot, truth), pool_of(robot)[:2]
+    search, cut = Search(problem), travelling(problem)[0]
+    model = Current(tuple(pool), np.array([0.1, 0.2]))
+    looked = _Look(search, search, 0, tuple(pool), Current(), ((cut, search.base()),))
+    kept = _Kept(model, 5.0, cut, {})
+    starts = [(Model(tuple(pool[:k])), model.u[:k]) for k in (1, 2)]
+    assert looked._as_far(kept, starts, [9.0, 5.0]) == (1, model, 5.0)
+    luck = looked.luck(9.0)
+    assert looked._as_far(kept, starts, [9.0, 9.0 + 0.9 * luck])[0] == 1
+    last, less, energy = looked._as_far(kept, starts, [9.0, 9.0 + 1.1 * luck])
+    assert (last, energy) == (0, 9.0) and less.parts == tuple(pool[:1])
 
 
 def test_what_stands_out_beside_it_is_found_too(robot):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
 
+import ee_dist.discrepancy.improve as improving
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
 from ee_dist.discrepancy.evidence.judge import TOO_LITTLE
 from ee_dist.discrepancy.examine import STANDARD_EFFORT
@@ -49,6 +50,20 @@ def test_what_is_there_is_added_and_nothing_else() -> None:
     assert found.stopped == NOTHING_LEFT and found.verdict == EXPLAINED
     assert found.explained == pytest.approx(1.0, abs=0.05)
     assert found.last is not None and all(j.why_not for j in found.last.judged)
+
+
+def test_a_step_that_foretells_no_better_with_all_values_fitted_anew_is_refused(monkeypatch) -> None:
+    """It was judged beside a model that only went along with it."""
+    as_it_stands = improving._as_it_stands
+
+    def worse_with_the_jam(search, current, cut, rung) -> None:
+        as_it_stands(search, current, cut, rung)
+        rung.error_heldout += 9.0 * (rung.name == JAM)
+
+    monkeypatch.setattr(improving, "_as_it_stands", worse_with_the_jam)
+    found = improve(Linear(HIDDEN), POOL)
+    assert [r.name for r in found.ladder[1:]] == [WEAK] and {t.name for t in found.terms} == {WEAK}
+    assert improving.WORSE in found.stopped and found.verdict == BETTER
 
 
 def test_a_twin_is_called_tied() -> None:
