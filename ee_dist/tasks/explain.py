@@ -82,7 +82,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))
     following = []
     if found.verdict == EFFECT:
-        effect = setting("effect", typed(found.best.terms) if found.best else "auto")
+        # Where more than this is missing, the rest is looked for beside it.
+        alone = not account.more
+        effect = setting("effect", typed(found.best.terms) if found.best and alone else "auto")
         following = asked("improve", config, options.by, effect)
     story = links(out, measured.files, config.model)
     write_page(explain_page(problem, measured, found, account, following, story), out / "report.html")

@@ -106,6 +106,13 @@ def test_what_is_tied_is_open_and_told_apart_before_it_is_added() -> None:
     assert alone.lead == "Next" and alone.good
 
 
+def test_where_more_is_missing_it_is_added_before_what_is_tied_is_told_apart() -> None:
+    """Half an explanation each, as dry and viscous friction are: a trial between them tells which half is larger."""
+    halves = account(["a@c"], planner="plan it", left=(Leftover("a", "position", 9.0, 3.0, True),))
+    assert halves.more and halves.lead == "Next"
+    assert halves.first[-1] == "To tell apart what may stay tied then: plan it"
+
+
 def test_more_twins_than_a_headline_holds_are_named_below_it() -> None:
     assert "Of 9 explanations no other does as well." in account([]).sure
     assert "2 others do as well. " in account(["a@c", "b@c"]).sure, "the headline names them"

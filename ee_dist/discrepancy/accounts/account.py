@@ -32,7 +32,9 @@ CONTENT = (
 )
 NO_MOTION_TRIED = "None of the motions tried is expected to tell them apart."
 PLAN, PLAN_OTHERS = "Next, to tell them apart:", "To look for other motions:"
-"""Before the command that finds what to record: first of all, or, where no motion tried would help, as what else may be tried."""
+PLAN_LATER = "To tell apart what may stay tied then:"
+"""Before the command that finds what to record: first of all, or, where no motion tried would help, as what else may be tried, or
+where more is missing than what is tied, once that is added."""
 NEXT, OR = "Next", "Or go on without"
 """Before the command to type: the only one, or beside that which tells apart what is tied."""
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
@@ -53,11 +55,12 @@ class Account:
     advice: str = ""
     planner: str = ""
     warnings: tuple[str, ...] = ()
+    more: bool = False
 
     @property
     def first(self) -> list[str]:
         """What comes below the headline before anything else."""
-        before = PLAN_OTHERS if self.advice.endswith(NO_MOTION_TRIED) else PLAN
+        before = PLAN_OTHERS if self.advice.endswith(NO_MOTION_TRIED) else PLAN_LATER if self.more else PLAN
         planned = f"{before} {self.planner}" if self.planner else ""
         return [line for line in (*self.warnings, self.error, self.sure, self.advice, planned) if line]
 
@@ -68,7 +71,7 @@ class Account:
     @property
     def lead(self) -> str:
         """What stands before the command to type."""
-        return OR if self.planner and not self.advice.endswith(NO_MOTION_TRIED) else NEXT
+        return OR if self.planner and not self.more and not self.advice.endswith(NO_MOTION_TRIED) else NEXT
 
     @property
     def words(self) -> list[str]:

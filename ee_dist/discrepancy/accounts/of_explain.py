@@ -137,6 +137,7 @@ def explain_account(
         good,
         advised(problem, advice),
         planner if tied else "",
+        more=found.verdict == EFFECT and bool(rest),
     )
 
 
