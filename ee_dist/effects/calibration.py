@@ -164,11 +164,16 @@ def speed_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, lambda d: altered(d, kd=d.kd * values["factor"]))
 
 
+HEAVIEST = 20.0
+"""Times the rotors that were guessed: those of an arm for 300 kg (KUKA KR300, by its identified model) have 5 to 16."""
+
+
 def _heavier(robot: Robot, target: str) -> dict[str, Range]:
-    """As far as ``rotor_inertia`` goes."""
+    """As light as ``rotor_inertia`` goes, and heavier by more: a guess by the size of a motor is an order of magnitude short for
+    the high gears of a large arm."""
     rotor = scales.drive_of(robot, target).rotor_inertia
     less, more = find("rotor_inertia").bounds(robot, target)["added_kg_m2"]
-    return {"factor": ((rotor + less) / rotor, (rotor + more) / rotor)}
+    return {"factor": ((rotor + less) / rotor, max((rotor + more) / rotor, HEAVIEST))}
 
 
 @effect(

@@ -151,7 +151,9 @@ def test_rotor_factor_is_a_factor_on_what_is_described_at_each_joint() -> None:
     assert CATALOGUE["rotor_factor"].targets(robot.with_drive("elbow", rotor_inertia=0.0)) == ("shoulder",)
     low, high = CATALOGUE["rotor_factor"].bounds(robot, "elbow")["factor"]
     less, more = CATALOGUE["rotor_inertia"].bounds(robot, "elbow")["added_kg_m2"]
-    assert (0.006 * low, 0.006 * high) == pytest.approx((0.006 + less, 0.006 + more))
+    assert 0.006 * low == pytest.approx(0.006 + less)
+    # A guess may be an order of magnitude short.
+    assert 0.006 * high > 2 * (0.006 + more) and high == pytest.approx(20.0)
     assert "rotor_factor" not in {name for name, effect in CATALOGUE.items() if effect.proposed(robot)}
 
 
