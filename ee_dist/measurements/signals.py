@@ -62,11 +62,13 @@ def lively(*blocks: Array) -> list[int]:
 
 
 def _usual(spans: Array) -> float:
-    """How far joints move from which half of all motion comes: of seven of which two were driven it is theirs, and not that of
-    the five that were held."""
-    order = np.sort(spans)[::-1]
-    total = float(order.sum())
-    return float(order[np.searchsorted(np.cumsum(order), 0.5 * total)]) if total > 0 else 0.0
+    """How far joints move: the median of those that do; of seven of which two are driven, beside which the median hardly moves,
+    how far those go from which half of all motion comes."""
+    if not (spans > 0).any():
+        return 0.0
+    median, order = float(np.median(spans[spans > 0])), np.sort(spans)[::-1]
+    driven = float(order[np.searchsorted(np.cumsum(order), 0.5 * float(order.sum()))])
+    return driven if median < HARDLY * driven else median
 
 
 def smooth(values: Array, width: int) -> Array:
