@@ -93,13 +93,14 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))
     else:
-        exchanges, looked, spread, anew, refused, refusals = 0, -1, 0, 0, 0, 0
+        exchanges, looked, spread, anew, refused = 0, -1, 0, 0, 0
         beside: set[str] = set()
-        worse: list[str] = []
+        worse: list[Proposal] = []
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             has = (*search.fixed, *current.hypothesis)
-            others = [c for c in _offered(pool, current, ladder) if c.name not in worse]
+            no_better = {c.name for p in worse for c in p.parts}
+            others = [c for c in _offered(pool, current, ladder) if c.name not in no_better]
             others = on_top_of(problem.robot, has, others)
             last = examine(search, current, others, effort)
             if own and len(current.parts) == own:
@@ -151,9 +152,9 @@ def improve(
             if rung.held_out == ladder[-1].held_out and rung.error_heldout >= ladder[-1].error_heldout:
                 # Beside a model that only goes along it was worth its place, and not where all values may follow the motions that
                 # are fitted.
-                worse += [c.name for c in best.proposal.parts]
-                current, refusals = before_it, refusals + 1
-                if refusals < REFUSALS:
+                worse.append(best.proposal)
+                current = before_it
+                if len(worse) < REFUSALS:
                     continue
                 stopped = NO_MORE.format(why=WORSE)
                 break

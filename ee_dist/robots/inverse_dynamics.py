@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.basics.quoted import quoted
-from ee_dist.robots.mass_matrix import rotation_matrix
+from ee_dist.robots.mass_matrix import parents_first, rotation_matrix
 from ee_dist.robots.model import Joint, Robot, RobotError
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ def parameters(robot: Robot, of: Collection[str] | None = None) -> Array:
     ``of``: only of what one of these joints carries."""
     found: list[float] = []
     carried: set[str] = set()
-    for joint in _parents_first(robot):
+    for joint in _in_order(robot):
         if of is not None and joint.name not in of and joint.parent not in carried:
             continue
         carried.add(joint.child)
@@ -151,7 +151,7 @@ def course_of(robot: Robot, position: Array, speed: Array, acceleration: Array) 
     pull = {root: np.broadcast_to(-gravity(robot), (rows, 3))}
     arms: dict[str, Array] = {}
     axes: dict[str, Array] = {}
-    order = _parents_first(robot)
+    order = _in_order(robot)
     for joint in order:
         up, part = turn[joint.parent], joint.child
         arm = np.einsum("tij,j->ti", up, np.array(joint.position_m))
@@ -183,15 +183,5 @@ def _about(axis: Array, angle: Array) -> Array:
     return c * np.eye(3) + s * across + (1 - c) * axis[:, :, None] * axis[:, None, :]
 
 
-def _parents_first(robot: Robot) -> list[Joint]:
-    placed, order, waiting = {robot.root.name}, [], list(robot.present_joints)
-    while waiting:
-        ready = [j for j in waiting if j.parent in placed]
-        if not ready:
-            raise RobotError(
-                f"{robot.name}: joint {quoted(waiting[0].name)} hangs on {quoted(waiting[0].parent)}, which no joint carries"
-            )
-        order += ready
-        placed |= {j.child for j in ready}
-        waiting = [j for j in waiting if j.child not in placed]
-    return order
+def _in_order(robot: Robot) -> list[Joint]:
+    return parents_first(robot.present_joints, robot.root.name, f"{robot.name}: ")

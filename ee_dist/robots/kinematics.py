@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ee_dist.basics.quoted import quoted
+from ee_dist.robots.mass_matrix import parents_first
 from ee_dist.robots.model import Joint, Robot
 
 Array = NDArray[np.float64]
@@ -57,18 +57,9 @@ def part_poses(robot: Robot, base_pose: Array, joints: Array) -> dict[str, Array
         raise ValueError(f"base pose has shape {base_pose.shape}, expected ({rows}, 7)")
     column = {d.joint: k for k, d in enumerate(robot.drives)}
     poses: dict[str, Array] = {robot.root.name: np.broadcast_to(base_pose, (rows, 7)).astype(float)}
-    waiting = list(robot.present_joints)
-    # Joints may be listed in any order: a part is placed once its parent is.
-    while waiting:
-        ready = [j for j in waiting if j.parent in poses]
-        if not ready:
-            raise ValueError(
-                f"joint {quoted(waiting[0].name)} hangs on {quoted(waiting[0].parent)}, which no joint carries"
-            )
-        for joint in ready:
-            position = joints[:, column[joint.name]] if joint.name in column else np.zeros(rows)
-            poses[joint.child] = compose(poses[joint.parent], joint_pose(joint, position))
-        waiting = [j for j in waiting if j.child not in poses]
+    for joint in parents_first(robot.present_joints, robot.root.name):
+        position = joints[:, column[joint.name]] if joint.name in column else np.zeros(rows)
+        poses[joint.child] = compose(poses[joint.parent], joint_pose(joint, position))
     return {p.name: poses[p.name] for p in robot.present_parts}
 
 

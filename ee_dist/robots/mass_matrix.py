@@ -72,7 +72,7 @@ def placed(present: Sequence[Joint], root: str, free_base: bool, positions: Arra
     slides = np.zeros(n, dtype=bool)
     slides[: free // 2] = True
     axes[:, :free] = np.eye(3)[np.arange(free) % 3]
-    for joint in _parents_first(present, root):
+    for joint in parents_first(present, root):
         origin, turn = place[joint.parent]
         here, facing = origin + turn @ np.array(joint.position_m), turn @ rotation_matrix(joint.rotation)
         path[joint.child] = path[joint.parent]
@@ -101,26 +101,16 @@ def mass_matrix(robot: Robot) -> Array:
 
     Sums J^T I J over the parts (Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6), rotor inertia added.
     """
-    found: Array = plain(robot, _placed_at_zero(robot.present_joints, robot.root.name, robot.free_base))[0]
-    return found
+    places = _placed_at_zero(robot.present_joints, robot.root.name, robot.free_base)
+    return np.asarray((_of_parts(robot, places) + np.diag(_rotors(robot, places)))[0])
 
 
-def mass_matrices(robot: Robot, positions: Array) -> Array:
-    """Mass matrices (2, P, n, n) at joint positions (P, joints that move), for both ways in which engines count rotors.
+def both_ways(robot: Robot, places: Places) -> Array:
+    """Mass matrices (2, P, n, n) where the joints are, for both ways in which engines count rotors.
 
     The first counts a rotor's inertia on its joint, as it is. The second counts it on the part that the joint moves,
     where an engine that knows no rotors puts it.
     """
-    return both_ways(robot, placed(robot.present_joints, robot.root.name, robot.free_base, positions))
-
-
-def plain(robot: Robot, places: Places) -> Array:
-    """(P, n, n) with rotors on their joints."""
-    return _of_parts(robot, places) + np.diag(_rotors(robot, places))
-
-
-def both_ways(robot: Robot, places: Places) -> Array:
-    """(2, P, n, n) with rotors on their joints, and on the parts that these move."""
     of_parts, on_joint = _of_parts(robot, places), _rotors(robot, places)
     extra = np.zeros_like(of_parts)
     for part in robot.present_parts:
@@ -182,14 +172,14 @@ def _block(places: Places, name: str) -> tuple[NDArray[np.intp], ...]:
     return np.ix_(np.arange(places.size[0]), ways, ways)
 
 
-def _parents_first(joints: Sequence[Joint], root: str) -> list[Joint]:
-    """Joints, each after the one that carries its parent."""
+def parents_first(joints: Sequence[Joint], root: str, of: str = "") -> list[Joint]:
+    """Joints, each after the one that carries its parent. Raises RobotError, which begins with ``of``, where none does."""
     waiting, there, order = list(joints), {root}, []
     while waiting:
         ready = [j for j in waiting if j.parent in there]
         if not ready:
             raise RobotError(
-                f"joint {quoted(waiting[0].name)} hangs on {quoted(waiting[0].parent)}, which no joint carries"
+                f"{of}joint {quoted(waiting[0].name)} hangs on {quoted(waiting[0].parent)}, which no joint carries"
             )
         order += ready
         there |= {j.child for j in ready}

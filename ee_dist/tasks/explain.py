@@ -83,8 +83,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     following = []
     if found.verdict == EFFECT:
         # Where more than this is missing, the rest is looked for beside it.
-        alone = not account.more
-        effect = setting("effect", typed(found.best.terms) if found.best and alone else "auto")
+        effect = setting("effect", typed(found.best.terms) if found.best and not account.more else "auto")
         following = asked("improve", config, options.by, effect)
     story = links(out, measured.files, config.model)
     write_page(explain_page(problem, measured, found, account, following, story), out / "report.html")

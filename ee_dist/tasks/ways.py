@@ -14,6 +14,7 @@ from ee_dist.discrepancy.ways.force_balance.motion import motor_torques, torques
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun, led
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.effects.targets import gains_are_known
 from ee_dist.engines.one_joint import fits
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
@@ -146,8 +147,8 @@ def way_of(measured: Measurements, by: str) -> Way:
         if by == "open_loop" and _only_motion(measured):
             return _possible(replace(WAYS["free_run"], why=ONLY_MOTION), measured)
         if by == "open_loop" and torques and not measured.robot.free_base:
-            guessed = any(field == "kp" for _, field in measured.robot.assumed)
-            why = f"{WAYS[by].why}. {TORQUES_TOO.format(gains=GUESSED if guessed else '')}"
+            gains = "" if gains_are_known(measured.robot) else GUESSED
+            why = f"{WAYS[by].why}. {TORQUES_TOO.format(gains=gains)}"
             return _possible(replace(WAYS[by], why=why), measured)
     return _possible(WAYS[by], measured)
 

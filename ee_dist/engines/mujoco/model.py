@@ -135,14 +135,14 @@ def _spec(robot: Robot) -> Any:
     option.iterations, option.ls_iterations = ITERATIONS, LINE_SEARCH
     stiff = bool(stiff_joints(robot).any())
     option.disableflags = int(UNUSED) & ~(int(_OFF.mjDSBL_DAMPER) if stiff else 0)
-    if not robot.world.has_floor:
+    if robot.world.has_floor:
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(name="floor", type=plane, size=[0, 0, 1], contype=0, conaffinity=0)
+    else:
         option.disableflags = option.disableflags | int(NOTHING_TO_TOUCH)
         if not (stiff or robot.free_base):
             # Nothing to damp and no tumbling: the same bits, and one solve less.
             option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    if robot.world.has_floor:
-        plane = mujoco.mjtGeom.mjGEOM_PLANE
-        spec.worldbody.add_geom(name="floor", type=plane, size=[0, 0, 1], contype=0, conaffinity=0)
     carried_by = {j.child: j for j in robot.present_joints}
     bodies: dict[str, Any] = {}
     for part in _parents_first(robot):
