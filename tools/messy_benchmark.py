@@ -185,10 +185,11 @@ class Bench:
         doubt: neither tied with others, nor one that less depends on than is left unexplained."""
         steps = [r for r in result.ladder if r.added]
         named = {t.name for t in result.terms} | {name for r in steps for name in r.tied_with}
+        named |= {t.term.name for t in result.twins}
         found.within = all(self.covers(named, h) for h in hidden)
         at = {(t.effect, t.target) for t in truth}
         doubted = {t.name for s in shares(result, self.robot) if s.doubted for t in s.terms}
-        doubted |= {t.name for rung in steps if rung.tied_with for t in rung.added}
+        doubted |= {t.name for rung in steps if rung.tied_with for t in rung.added} | {t.name for t in result.twins}
         for t in added(result):
             if not any((t.effect, p) in at for p in (t.target, *self.places(t))):
                 (found.doubted if t.name in doubted else found.wrong).append(t.name)

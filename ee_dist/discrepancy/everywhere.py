@@ -243,8 +243,9 @@ class _Look:
         few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
         starts = []
         for s in few[:TRIED]:
-            more = s.starts[0] if s.candidate.size > 1 else np.zeros(s.candidate.size)
-            starts.append((Model((*model.parts, s.candidate)), np.concatenate([start, more])))
+            c = s.candidate
+            more = s.starts[0] if c.size > 1 else next(iter(c.hinted), np.zeros(c.size))
+            starts.append((Model((*model.parts, c)), np.concatenate([start, more])))
         if not starts:
             return None
         problem, own = search.problem, search.everything

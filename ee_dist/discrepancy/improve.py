@@ -17,16 +17,17 @@ from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import everywhere, stands_out
 from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
-from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, no_more_than_noise, surely_better
+from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, no_more_than_noise
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_be_noise
 from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
+from ee_dist.discrepancy.exchanges import exchanged, nearest, refitted, strictest, twins_of
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
-from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung
+from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung, Twin
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import told_only, without_neutral, without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, on_top_of, values_of
-from ee_dist.discrepancy.search.fit import fit_all, fit_one
+from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
@@ -43,8 +44,8 @@ OFTEN = 2
 come at once, and again beside those of them that stay."""
 REFUSED = 1
 """How often that may not earn its place before it is not looked for any more: it takes as long as all the rest."""
-EXCHANGES, LOOKED_AT = 2, 2
-"""How often an effect may be exchanged for what was tied with it, and how many of these are looked at."""
+EXCHANGES = 2
+"""How often an effect may be exchanged for what was tied with it."""
 ROOMS = 3
 """How often bounds that depend on other values are set anew."""
 RETURNS = 2
@@ -83,7 +84,7 @@ def improve(
             climbed(rung)
 
     if current.parts:
-        climb(_refitted(search, current))
+        climb(refitted(search, current))
     last: Examined | None = None
     own = len(current.parts)
     if wanted is not None:
@@ -111,8 +112,8 @@ def improve(
             special = {c.name for c in current.parts[own:] if stands_out(problem.robot, c)}
             ready = anew < OFTEN and special != beside and bool(special) if spread else len(current.parts) != looked
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
-                twins = [(k, p.parts[0], u) for k, p, u in _twins(current, ladder, own)]
-                found = everywhere(search, current, own, pool, travelling(problem), spread > 0, twins)
+                alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
+                found = everywhere(search, current, own, pool, travelling(problem), spread > 0, alike)
                 looked, anew, beside = len(current.parts), anew + (spread > 0), special
                 # Where a single one does more than all of them, it goes first.
                 if found is not None and (best is None or found.held < float(best.held.sum())):
@@ -122,16 +123,16 @@ def improve(
                     continue
                 refused += 1
             if best is None:
-                exchanged = None
+                other = None
                 if exchanges < EXCHANGES and len(current.u) < LARGE and leftovers(problem, last.base):
                     exchanges += 1
-                    exchanged = _exchanged(search, current, ladder, own, pool, effort)
-                if exchanged is not None:
-                    current, rung = exchanged
+                    other = exchanged(search, current, ladder, own, pool, effort)
+                if other is not None:
+                    current, rung = other
                     climb(rung)
                     continue
-                nearest = WORSE if worse else last.judged[0].why_not if last.judged else LUCK
-                stopped = NO_MORE.format(why=nearest)
+                why_not = WORSE if worse else last.judged[0].why_not if last.judged else LUCK
+                stopped = NO_MORE.format(why=why_not)
                 if _settled(leftovers(problem, last.base), ladder[-1].error_heldout, problem.noise_floor()[0]):
                     stopped = NOTHING_LEFT
                 break
@@ -161,11 +162,16 @@ def improve(
             climb(rung)
         if spread or len(current.parts) - own > 1:
             # Of two that leave the same mark the values may be anything, and one of them says it all.
-            current, gone = told_only(search, current, own, _cut(problem), len(pool), not spread)
+            current, gone = told_only(search, current, own, strictest(problem), len(pool), not spread)
             current, none = without_neutral(current, own)
             if gone or none:
-                climb(_refitted(search, current, "without what these data do not tell from neutral", (*gone, *none)))
-    return _finish(search, current, ladder, as_it_is, stopped, last)
+                climb(refitted(search, current, "without what these data do not tell from neutral", (*gone, *none)))
+    twins: list[Twin] = []
+    if wanted is None and len(current.parts) > own + 1:
+        current, twins, step = nearest(search, current, own, pool)
+        if step is not None:
+            climb(step)
+    return _finish(search, current, ladder, as_it_is, stopped, last, twins)
 
 
 def _with_room(search: Search, fit: Fit) -> Fit:
@@ -207,29 +213,6 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
 def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:
     e = error(residual)
     return Rung(name, (), terms, e, e, per_segment(problem, residual), UNFITTED)
-
-
-def _cut(problem: Problem) -> Cut:
-    """The strictest way of holding out that there is."""
-    return next(iter(travelling(problem)), windows(problem))
-
-
-def _refitted(
-    search: Search, current: Current, name: str = "its own values fitted anew", dropped: tuple[str, ...] = ()
-) -> Rung:
-    cut = _cut(search.problem)
-    held = cross_fit(search, [(Model(current.parts), current.u)], cut)[0]
-    terms = (*search.fixed, *current.hypothesis)
-    return Rung(
-        name,
-        (),
-        terms,
-        float(np.sqrt(held.seen)),
-        error(held.residual),
-        per_segment(search.problem, held.residual),
-        cut.name,
-        dropped=dropped,
-    )
 
 
 def _as_it_stands(search: Search, current: Current, cut: Cut, rung: Rung) -> None:
@@ -276,66 +259,6 @@ def _rung(search: Search, judged: Judged, ties: Sequence[str] = ()) -> Rung:
     )
 
 
-def _twins(current: Current, ladder: Sequence[Rung], own: int) -> list[tuple[int, Proposal, Array]]:
-    """What was tied with a single effect of the model when it was added: the number of that part, and the values that suited."""
-    where = {c.name: k for k, c in enumerate(current.parts) if k >= own}
-    return [
-        (where[t.name], p, u)
-        for rung in ladder
-        for t in rung.added
-        if t.name in where and len(rung.added) == 1
-        for p, u in rung.alternatives
-        if p.parts[0].name not in where
-    ]
-
-
-def _exchanged(
-    search: Search, current: Current, ladder: Sequence[Rung], own: int, pool: Sequence[Candidate], effort: Effort
-) -> tuple[Current, Rung] | None:
-    """The model with one of its effects exchanged for what was tied with it when it was added, if that is better by more
-    than luck: by itself, or with what earns its place only beside the other. Two effects that mimic one another decide
-    which third one can still be seen."""
-    problem, places = search.problem, Model(current.parts).places
-    options = _twins(current, ladder, own)
-    models = [(Model(current.parts), current.u)]
-    for k, p, u in options:
-        parts = (*current.parts[:k], p.parts[0], *current.parts[k + 1 :])
-        values = np.concatenate([current.u[: places[k].start], u, current.u[places[k].stop :]])
-        models.append((Model(parts), values))
-    if not options:
-        return None
-    cut = _cut(problem)
-    now, *others = cross_fit(search, models, cut, WIDTHS[1:])
-    order = sorted(range(len(options)), key=lambda i: float((others[i].residual ** 2).sum()))
-    for i in order[:LOOKED_AT]:
-        (k, proposal, _), (model, start), held = options[i], models[1 + i], others[i]
-        changed = Current(model.parts, fit_one(search, model, [start], None, WIDTHS[1:]).u)
-        if not surely_better(problem, now, held, len(pool)):
-            names = {c.name for c in changed.parts}
-            beside = examine(search, changed, [c for c in pool if c.name not in names], effort).best
-            if beside is None:
-                continue
-            if beside.outcome.cut.name == cut.name:
-                both = beside.outcome
-            else:
-                # Errors on motions and on settings that were not fitted do not compare.
-                both = cross_fit(search, [(beside.model, beside.u)], cut, WIDTHS[1:])[0]
-            if not surely_better(problem, now, both, len(pool)):
-                continue
-        rung = Rung(
-            proposal.name,
-            (changed.hypothesis[k],),
-            (*search.fixed, *changed.hypothesis),
-            float(np.sqrt(held.seen)),
-            error(held.residual),
-            per_segment(problem, held.residual),
-            cut.name,
-            dropped=(current.parts[k].name,),
-        )
-        return changed, rung
-    return None
-
-
 def _finish(
     search: Search,
     current: Current,
@@ -343,6 +266,7 @@ def _finish(
     base: Array,
     stopped: str,
     last: Examined | None,
+    twins: list[Twin],
 ) -> Improvement:
     problem = search.problem
     floor, source = problem.noise_floor()
@@ -351,8 +275,7 @@ def _finish(
     worth, left = None, leftovers(problem, base)
     residual = base
     if current.parts:
-        start = [(Model(current.parts), current.u)]
-        fit: Fit = fit_all(search, start, None, (*WIDTHS[2:], 0.006))[0]
+        fit = fit_one(search, Model(current.parts), [current.u], None, (*WIDTHS[2:], 0.006))
         residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
         left = leftovers(problem, residual)
         told = [replace(p, term=p.term + len(search.fixed)) for p in parameters(problem, fit, left)]
@@ -376,6 +299,7 @@ def _finish(
         last,
         worth=worth,
         unsure=may_be_noise(problem, residual),
+        twins=twins,
     )
 
 

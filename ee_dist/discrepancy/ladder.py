@@ -10,7 +10,7 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.evidence.worth import Worth
 from ee_dist.discrepancy.examine import Examined
 from ee_dist.discrepancy.search.candidates import Proposal
-from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.effects.catalogue import Hypothesis, Term
 from ee_dist.trials.log import Array
 
 UNFITTED = "nothing was fitted"
@@ -36,13 +36,23 @@ class Rung:
     """What was tied with it, and the values that suited then."""
 
 
+@dataclass(frozen=True)
+class Twin:
+    """What does as well as the effect ``name`` of the model: ``term`` in its place, and ``terms``, the model then."""
+
+    name: str
+    term: Term
+    terms: Hypothesis
+
+
 @dataclass(eq=False)
 class Improvement:
     """``terms``: the final model, fitted on all data. ``verdict``: ``explained`` (nothing is left above the noise),
     ``better_not_explained``, ``unexplained`` (nothing could be added) or ``nothing_missing``; ``explained``: the share of the
     squared error above the noise that the model takes off held-out data; ``worth``: what goes with each effect. ``last``: what
     was tried on top of it. ``odd``: of a calibration, the joints whose values stand out from those of like joints (see
-    calibrated_away.py). ``unsure``: channels in which what is left may be noise or not."""
+    calibrated_away.py). ``unsure``: channels in which what is left may be noise or not; ``twins``: what does as well as an effect
+    of the model, if other values follow."""
 
     verdict: str
     explained: float
@@ -59,6 +69,7 @@ class Improvement:
     odd: list[OddOne] = field(default_factory=list)
     worth: Worth | None = None
     unsure: list[str] = field(default_factory=list)
+    twins: list[Twin] = field(default_factory=list)
 
     @property
     def cuts(self) -> list[str]:

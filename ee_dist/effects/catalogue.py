@@ -26,6 +26,7 @@ from ee_dist.effects.groups import common, members_of, name_of, shared_targets
 from ee_dist.effects.scales import Range, Ranges
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.system import System
+from ee_dist.trials.log import Array
 
 FAMILIES = ("body", "world", "drive", "sensing", "wiring")
 OTHER_FAMILIES = ("genes",)
@@ -102,6 +103,9 @@ class Effect:
     guesses: Callable[[Robot], tuple[str, ...]] | None = None
     """The joints at which a description only assumed what it changes: ``explain`` asks for it first there, with one set of values
     for all of them, whether or not it proposes it elsewhere."""
+    seen_in: Callable[[Array], Mapping[str, float]] | None = None
+    """Its values as readings (T,) of a sensor show them without a model: a search looks there too, for no slope may lead there.
+    Empty where they show none."""
 
     def shared(self, robot: Robot) -> tuple[str, ...]:
         """Groups of joints or sensors that it can act on with one set of values (see groups.py). What is wrong with a part is
@@ -230,6 +234,7 @@ def effect(
     everywhere: bool = False,
     of: type = Robot,
     guesses: Callable[[Robot], tuple[str, ...]] | None = None,
+    seen_in: Callable[[Array], Mapping[str, float]] | None = None,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
@@ -263,6 +268,7 @@ def effect(
             everywhere,
             of,
             guesses,
+            seen_in,
         )
         return transform
 

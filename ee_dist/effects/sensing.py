@@ -10,6 +10,8 @@ from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range, always, longest_delay
 from ee_dist.effects.targets import continuous_sensors, sensor_groups, sensors, touch_sensors
 from ee_dist.robots.model import Robot, Sensor
+from ee_dist.trials.grid import grid_of
+from ee_dist.trials.log import Array
 from ee_dist.trials.noise import channel_range
 
 FAULTS = "Isermann 2006, Fault-Diagnosis Systems, chapter 20"
@@ -131,6 +133,10 @@ def _quanta(robot: Robot, target: str) -> dict[str, Range]:
     return {"step": (0.0, 0.25 * _span(robot, target))}
 
 
+def _steps_of(readings: Array) -> Mapping[str, float]:
+    return {"step": step} if (step := grid_of(readings)) > 0 else {}
+
+
 @effect(
     "sensor_quantisation",
     family="sensing",
@@ -142,6 +148,7 @@ def _quanta(robot: Robot, target: str) -> dict[str, Range]:
     signature="One channel moves in equal stairs; the residual is a saw tooth of half a step.",
     reference="Widrow and Kollar 2008, Quantization Noise",
     ranges=_quanta,
+    seen_in=_steps_of,
 )
 def sensor_quantisation(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.with_sensor(target, quantum=max(_sensor(robot, target).quantum, values["step"]))

@@ -93,7 +93,8 @@ def _of_explanation(summary: Mapping[str, Any]) -> list[tuple[str, Hypothesis]]:
 
 
 def _of_model(summary: Mapping[str, Any]) -> list[tuple[str, Hypothesis]]:
-    """The model in the end, and that with one of its effects exchanged for what was tied with it when it was added."""
+    """The model in the end, and that with one of its effects exchanged for what was tied with it when it was added, or does
+    as well in the end."""
     model = _terms(summary["model_terms"])
     present = {t.name for t in model}
     found: list[tuple[str, Hypothesis]] = [("the model as it is", model)]
@@ -105,6 +106,9 @@ def _of_model(summary: Mapping[str, Any]) -> list[tuple[str, Hypothesis]]:
         if others and found[0][1] is model and len(found) == 1:
             found = [(added[0].name, model)]
         found += [(t.name, with_one_exchanged(model, added[0].name, (t,))) for t in others]
+    found += [
+        ("@".join(filter(None, (t["effect"], t["target"]))), _terms(t["terms"])) for t in summary.get("twins", ())
+    ]
     return list(dict(found).items())
 
 

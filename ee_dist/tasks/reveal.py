@@ -130,7 +130,8 @@ def _of_model(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | Non
     for t in terms:
         by_effect.setdefault(t[0], []).append(places([t], robot))
     truth = {pair: places([pair], robot) for pair in _pairs(hidden)}
-    ties = {_pair(name): s for s in steps for name in s["tied_with"]}
+    ties = {_pair(name): s["added"] for s in steps for name in s["tied_with"]}
+    ties |= {(t["effect"], t["target"]): [t["in_place_of"]] for t in summary.get("twins", ())}
     missed, used = [], set()
     for pair, where in truth.items():
         # One effect on a group is not one of its members, and one for each member is the group.
@@ -138,7 +139,7 @@ def _of_model(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | Non
         if inside and frozenset().union(*inside) == where:
             used |= {t for t in terms if places([t], robot) in inside}
         elif pair in ties:
-            used |= {(t["effect"], t["target"]) for t in ties[pair]["added"]}
+            used |= {(t["effect"], t["target"]) for t in ties[pair]}
         else:
             missed.append(pair)
     invented = tuple(a for a in named if a not in used)

@@ -11,9 +11,11 @@ from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import _at_bounds, explain_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
+from ee_dist.discrepancy.ladder import Twin
 from ee_dist.discrepancy.search.candidates import Proposal, candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
@@ -222,7 +224,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     ):
         found = SimpleNamespace(
             ladder=[start, rung], left=[], verdict=verdict, explained=share, parameters=[], terms=rung.added, stopped="so",
-            noise_floor=1.0, floor_source="told", last=None, odd=[], worth=None, unsure=[],
+            noise_floor=1.0, floor_source="told", last=None, odd=[], worth=None, unsure=[], twins=[],
         )  # fmt: skip
         account = improve_account(problem, found)  # type: ignore[arg-type]
         assert account.headline.endswith(said) or said in account.headline
@@ -240,6 +242,23 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     swapped = improve_account(problem, found)  # type: ignore[arg-type]
     told_apart = "These measurements cannot tell x at y from: motor weak at servo."
     assert told_apart in swapped.lines and "not told from motor weak at servo" in swapped.sure
+    heavy, weak = (term("part_mass", "arm", change=c) for c in (1.2, 0.05)), term("motor_weak", "servo", loss=0.5)
+    more, less = heavy
+    rung.tied_with, rung.added = [], (weak,)
+    inertia = term("rotor_inertia", "servo", added_kg_m2=0.002)
+    twin = Twin(weak.name, inertia, (more, inertia))
+    own = ParameterReport(1, "change", 0.05, 0.04, 0.06, "")
+    found.terms, found.parameters, found.twins = (weak, less), [own], [twin]
+    rung.dropped = (inertia.name,)
+    either = improve_account(problem, found, "plan it")  # type: ignore[arg-type]
+    assert (
+        "These measurements cannot tell motor weak at servo from: rotor inertia at servo. With that in its place: rotor inertia "
+        "at servo (added 0.002 kg.m^2); part mass at arm (change +120 %)." in either.lines
+    )
+    assert not either.good and "not told from rotor inertia at servo" in either.sure and either.planner == "plan it"
+    assert not any("Dropped again" in line for line in either.lines)
+    found.terms, found.parameters, found.twins = (term("coulomb_friction", "servo", torque_nm=0.3),), [], []
+    rung.dropped = ("offset_torque@servo",)
     rung.added = (term("viscous_friction", "servo", damping_nm_s_rad=0.1),)
     gone = improve_account(problem, found)  # type: ignore[arg-type]
     assert not any("cannot tell" in line for line in gone.lines) and "not told from" not in gone.sure

@@ -157,3 +157,10 @@ def test_a_run_of_improve_gives_its_model_and_that_with_what_was_tied_in_its_pla
         ("load_friction@servo", ["command_delay", "load_friction", "viscous_friction"]),
     ]
     assert found.config.engine.name == "mujoco" and found.config.measured == "trial.mcap"
+    twin = {**entry("motor_weak", loss=0.2), "in_place_of": {"effect": viscous["effect"], "target": "servo"}}
+    twins = [{**twin, "terms": [slow, dry, entry("motor_weak", loss=0.2)]}]
+    (tmp_path / "summary.json").write_text(json.dumps(summary | {"model_terms": [slow, dry, viscous], "twins": twins}))
+    last = explained(str(tmp_path), Config(measured="trial.mcap")).explanations[-1]
+    assert (last[0], [t.effect for t in last[1]]) == (
+        "motor_weak@servo", ["command_delay", "coulomb_friction", "motor_weak"]
+    )  # fmt: skip

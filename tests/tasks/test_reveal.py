@@ -29,11 +29,17 @@ def explained(*candidates: tuple[str, ...], tied: tuple[str, ...] = (), verdict:
 
 
 def improved(
-    *steps: tuple[str, ...], tied: tuple[str, ...] = (), dropped: tuple[str, ...] = (), own: tuple[str, ...] = ()
+    *steps: tuple[str, ...],
+    tied: tuple[str, ...] = (),
+    dropped: tuple[str, ...] = (),
+    own: tuple[str, ...] = (),
+    twins: tuple[tuple[str, str], ...] = (),
 ):
     ladder = [{"added": terms(*s), "tied_with": list(tied), "dropped": list(dropped)} for s in steps]
     left = [n for s in steps for n in s if n not in dropped]
-    return {"task": "improve", "model_terms": terms(*own, *left), "ladder": [{"added": [], "dropped": []}, *ladder]}
+    alike = [{**terms(twin)[0], "in_place_of": terms(name)[0]} for twin, name in twins]
+    start = {"added": [], "dropped": []}
+    return {"task": "improve", "model_terms": terms(*own, *left), "ladder": [start, *ladder], "twins": alike}
 
 
 ALL = "coulomb_friction@all_joints"
@@ -68,6 +74,8 @@ OTHER = "motor_weak@hip_rear_left"
     (improved(EACH[:3]), (ALL,), False),
     (improved((OTHER,), tied=(KNEE,)), (KNEE,), True),
     (improved((OTHER,), (KNEE,), dropped=(OTHER,)), (KNEE,), True),
+    (improved((OTHER,), twins=((KNEE, OTHER),)), (KNEE,), True),
+    (improved((OTHER,), twins=((KNEE, OTHER),)), (ALL,), False),
     (improved((KNEE,), own=(OTHER,)), (KNEE,), True),
     (improved(), (), True),
     (improved((KNEE,)), (), False),

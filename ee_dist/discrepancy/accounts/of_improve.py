@@ -32,7 +32,7 @@ from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, WIDER, ParameterRe
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
-from ee_dist.discrepancy.ladder import Improvement
+from ee_dist.discrepancy.ladder import Improvement, Twin
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
 from ee_dist.discrepancy.words import much, named, percent, phrase, placed, plain, quantity, span
@@ -64,7 +64,11 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     names = {t.name for t in found.terms}
     ties = {r.name: [n for n in r.tied_with if not has(names, n)] for r in steps if names & {t.name for t in r.added}}
     lines += [tie_text(placed(name), others) for name, others in ties.items() if others]
-    gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in names)
+    lines += [twin_text(t, found, robot) for t in found.twins]
+    for t in found.twins:
+        ties[t.name] = [*ties.get(t.name, []), t.term.name]
+    told = names | {t.term.name for t in found.twins}
+    gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in told)
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]
     parts = shares(found, robot)
     lines += doubt_text([s for s in parts if s.doubted])
@@ -102,11 +106,24 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
         sure += f"{unsure_of(unsure)}."
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     advice = slower(unsure) if unsure else advice
-    tied = any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
+    tied = bool(found.twins) or any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
     good = settled and not warnings and not unsure and not any(ties.values())
     more = (*also, *lines, *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
+
+
+def twin_text(twin: Twin, found: Improvement, robot: Robot) -> str:
+    """What does as well as an effect of the model, and which values are others then."""
+    told = {found.terms[p.term].name: (p.low, p.high) for p in reversed(found.parameters)}
+    text = tie_text(placed(twin.name), [twin.term.name])
+    others = tuple(t for t in twin.terms if t.name in told and not _within(told[t.name], t))
+    return f"{text} With that in its place: {phrase((twin.term, *others), robot)}."
+
+
+def _within(interval: tuple[float, float], term: Term) -> bool:
+    low, high = interval
+    return low <= term.values[0][1] <= high
 
 
 def _many_times(ratio: float) -> str:

@@ -33,6 +33,8 @@ class Candidate:
     inert: tuple[int, ...] = ()
     guess: bool = False
     """Whether it puts right, with one set of values, all that a description only assumed of its kind."""
+    hint: tuple[float, ...] = ()
+    """A point (u) that the measurements show by themselves; none where it is empty."""
 
     @property
     def name(self) -> str:
@@ -96,7 +98,8 @@ class Candidate:
         return Term(self.effect.name, self.target, tuple(self.values(u).items()))
 
     def probes(self, shares: Sequence[float]) -> list[Array]:
-        """Points to look at first: each parameter alone, to both sides where it has two; the only one if it has none."""
+        """Points to look at first: each parameter alone, to both sides where it has two; the only one if it has none. And what
+        the measurements show by themselves."""
         if not self.size:
             return [np.zeros(0)]
         points = []
@@ -109,7 +112,12 @@ class Candidate:
         for k in self.inert:
             side = self.upper[k] or self.lower[k]
             points += [u + side * share * np.eye(self.size)[k] for u in beside for share in shares]
-        return points
+        return [*points, *self.hinted]
+
+    @property
+    def hinted(self) -> list[Array]:
+        """The point that the measurements show by themselves, if there is one."""
+        return [np.array(self.hint)] if self.hint else []
 
 
 def candidate(robot: Robot, effect: Effect | str, target: str) -> Candidate:

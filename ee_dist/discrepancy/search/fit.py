@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
@@ -41,5 +43,7 @@ def fit_all(
 def fit_one(
     search: Search, model: Model, starts: Sequence[Array], mask: Mask | None = None, widths: Sequence[float] = WIDTHS
 ) -> Fit:
-    """The best fit of a model from any of the starts."""
-    return min(fit_all(search, [(model, u) for u in starts], mask, widths), key=lambda f: f.energy)
+    """The best fit of a model from any of the starts, and from what the measurements show of its values by themselves, to which
+    no slope leads back."""
+    seen = [s for u in starts if not np.array_equal(s := model.as_seen(u), u)]
+    return min(fit_all(search, [(model, u) for u in (*starts, *seen)], mask, widths), key=lambda f: f.energy)

@@ -33,6 +33,14 @@ class Model:
         edges = np.concatenate([[0], np.cumsum([c.size for c in self.parts])]).astype(int)
         return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 
+    def as_seen(self, u: Array) -> Array:
+        """(P,) values with what the measurements show of some by themselves."""
+        out = np.array(u, dtype=float)
+        for c, place in zip(self.parts, self.places, strict=True):
+            if c.hint:
+                out[place] = c.hint
+        return out
+
     def hypothesis(self, u: Array) -> Hypothesis:
         terms, at = [], 0
         for c in self.parts:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates
 from ee_dist.effects.groups import JOIN
@@ -15,7 +17,7 @@ def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] =
     found = candidates(problem.robot, without, only or None, problem.families)
     able = (c for c in found if (c.size or problem.switches) and problem.shows(c.effect.name, c.target))
     # Several groups may be one where joints that nothing is known of are left out.
-    return list({c.name: c for c in (_judged(problem, c) for c in able) if c is not None}.values())
+    return list({c.name: _hinted(problem, c) for c in (_judged(problem, c) for c in able) if c is not None}.values())
 
 
 def _judged(problem: Problem, c: Candidate) -> Candidate | None:
@@ -28,3 +30,17 @@ def _judged(problem: Problem, c: Candidate) -> Candidate | None:
     if len(judged) < 2:
         return None
     return replace(candidate(problem.robot, c.effect, JOIN.join(judged)), guess=c.guess)
+
+
+def _hinted(problem: Problem, c: Candidate) -> Candidate:
+    """The candidate with what readings of its own sensor show of its values, where that is within what is worth trying."""
+    if c.effect.seen_in is None or c.target not in problem.robot.sensor_names:
+        return c
+    at = problem.robot.sensor_names.index(c.target)
+    read = [log.sensors[log.readings, at] for log in (t.log for t in problem.measured)]
+    values = c.effect.seen_in(np.concatenate(read)) if read else {}
+    if not values or not all(
+        low <= values[p.name] <= high for p, (low, high) in zip(c.effect.parameters, c.bounds, strict=True)
+    ):
+        return c
+    return replace(c, hint=tuple(c.shares(values).tolist()))

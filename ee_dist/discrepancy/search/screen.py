@@ -128,11 +128,11 @@ class _Probe:
 
 
 def _smallest(c: Candidate, shares: Sequence[float]) -> list[Array]:
-    """The smallest probe of each parameter, to the upper side where it has two."""
+    """The smallest probe of each parameter, to the upper side where it has two; and what the measurements show by themselves."""
     if not c.size:
         return c.probes(shares)
-    alone = [u for u in c.probes((min(shares),)) if np.count_nonzero(u) == 1]
-    return [u for u in alone if u.max() > 0 or not c.upper[_moved(u)]]
+    alone = [u for u in c.probes((min(shares),)) if np.count_nonzero(u) == 1 and tuple(u) != c.hint]
+    return [*(u for u in alone if u.max() > 0 or not c.upper[_moved(u)]), *c.hinted]
 
 
 def _further(pool: Sequence[Candidate], rows: Sequence[Sequence[_Probe]]) -> list[int]:
@@ -215,5 +215,7 @@ def _screened(candidate: Candidate, found: Sequence[_Probe], elsewhere: bool) ->
                 joint[k] = p.share * p.u[k]
         starts.append(np.clip(joint, candidate.lower, candidate.upper))
     for p in ordered[:3]:
-        starts.append(np.clip(p.share * p.u, candidate.lower, candidate.upper) if len(p.u) else p.u)
+        # What measurements show is so or it is not: a share of a grid's step is another grid.
+        share = 1.0 if tuple(p.u) == candidate.hint else p.share
+        starts.append(np.clip(share * p.u, candidate.lower, candidate.upper) if len(p.u) else p.u)
     return Screened(candidate, ordered[0].promise, tuple(starts), max(p.reach for p in found), elsewhere)

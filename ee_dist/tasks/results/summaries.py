@@ -118,6 +118,11 @@ def of_rung(problem: Problem, r: Rung) -> dict[str, Any]:
     }
 
 
+def _place(name: str) -> dict[str, str]:
+    effect, _, target = name.partition("@")
+    return {"effect": effect, "target": target}
+
+
 def of_improvement(problem: Problem, found: Improvement, account: Account, path: str) -> dict[str, Any]:
     terms = hypothesis_list(found.terms)
     return {
@@ -140,6 +145,10 @@ def of_improvement(problem: Problem, found: Improvement, account: Account, path:
         "worth": [
             {"words": s.text, "terms": hypothesis_list(s.terms), "share": s.worth, "doubted": s.doubted}
             for s in shares(found, problem.robot)
+        ],
+        "twins": [
+            {**entry, "in_place_of": _place(t.name), "terms": hypothesis_list(t.terms)}
+            for t, entry in zip(found.twins, hypothesis_list(tuple(t.term for t in found.twins)), strict=True)
         ],
         "stopped": found.stopped,
         "not_earned": [of_judged(problem, c) for c in (found.last.judged if found.last else []) if not c.earned],

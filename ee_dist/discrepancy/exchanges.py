@@ -1,0 +1,128 @@
+"""A model with one of its effects exchanged: for what was tied with it when it was added, or does as well in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
+from ee_dist.discrepancy.evidence.judge import surely_better
+from ee_dist.discrepancy.examine import Current, Effort, examine
+from ee_dist.discrepancy.instead import instead_of
+from ee_dist.discrepancy.ladder import Rung, Twin
+from ee_dist.discrepancy.problem import Problem, error, per_segment
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal
+from ee_dist.discrepancy.search.fit import fit_one
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.trials.log import Array
+
+LOOKED_AT = 2
+"""How many of those that were tied are looked at, the best first."""
+
+
+def strictest(problem: Problem) -> Cut:
+    """The strictest way of holding out that there is."""
+    return next(iter(travelling(problem)), windows(problem))
+
+
+def refitted(
+    search: Search, current: Current, name: str = "its own values fitted anew", dropped: tuple[str, ...] = ()
+) -> Rung:
+    cut = strictest(search.problem)
+    held = cross_fit(search, [(Model(current.parts), current.u)], cut)[0]
+    terms = (*search.fixed, *current.hypothesis)
+    return Rung(
+        name,
+        (),
+        terms,
+        float(np.sqrt(held.seen)),
+        error(held.residual),
+        per_segment(search.problem, held.residual),
+        cut.name,
+        dropped=dropped,
+    )
+
+
+def twins_of(current: Current, ladder: Sequence[Rung], own: int) -> list[tuple[int, Proposal, Array]]:
+    """What was tied with a single effect of the model when it was added: the number of that part, and the values that suited."""
+    where = {c.name: k for k, c in enumerate(current.parts) if k >= own}
+    return [
+        (where[t.name], p, u)
+        for rung in ladder
+        for t in rung.added
+        if t.name in where and len(rung.added) == 1
+        for p, u in rung.alternatives
+        if p.parts[0].name not in where
+    ]
+
+
+def exchanged(
+    search: Search, current: Current, ladder: Sequence[Rung], own: int, pool: Sequence[Candidate], effort: Effort
+) -> tuple[Current, Rung] | None:
+    """The model with one of its effects exchanged for what was tied with it when it was added, if that is better by more
+    than luck: by itself, or with what earns its place only beside the other. Two effects that mimic one another decide
+    which third one can still be seen."""
+    problem, places = search.problem, Model(current.parts).places
+    options = twins_of(current, ladder, own)
+    models = [(Model(current.parts), current.u)]
+    for k, p, u in options:
+        parts = (*current.parts[:k], p.parts[0], *current.parts[k + 1 :])
+        values = np.concatenate([current.u[: places[k].start], u, current.u[places[k].stop :]])
+        models.append((Model(parts), values))
+    if not options:
+        return None
+    cut = strictest(problem)
+    now, *others = cross_fit(search, models, cut, WIDTHS[1:])
+    order = sorted(range(len(options)), key=lambda i: float((others[i].residual ** 2).sum()))
+    for i in order[:LOOKED_AT]:
+        (k, proposal, _), (model, start), held = options[i], models[1 + i], others[i]
+        changed = Current(model.parts, fit_one(search, model, [start], None, WIDTHS[1:]).u)
+        if not surely_better(problem, now, held, len(pool)):
+            names = {c.name for c in changed.parts}
+            beside = examine(search, changed, [c for c in pool if c.name not in names], effort).best
+            if beside is None:
+                continue
+            if beside.outcome.cut.name == cut.name:
+                both = beside.outcome
+            else:
+                # Errors on motions and on settings that were not fitted do not compare.
+                both = cross_fit(search, [(beside.model, beside.u)], cut, WIDTHS[1:])[0]
+            if not surely_better(problem, now, both, len(pool)):
+                continue
+        rung = Rung(
+            proposal.name,
+            (changed.hypothesis[k],),
+            (*search.fixed, *changed.hypothesis),
+            float(np.sqrt(held.seen)),
+            error(held.residual),
+            per_segment(problem, held.residual),
+            cut.name,
+            dropped=(current.parts[k].name,),
+        )
+        return changed, rung
+    return None
+
+
+def nearest(
+    search: Search, current: Current, own: int, pool: Sequence[Candidate]
+) -> tuple[Current, list[Twin], Rung | None]:
+    """The model, or, where another does as well that is nearer to the description, that one and the step to it; and what does as
+    well as an effect of the model in its place."""
+    found = instead_of(search, current, own, pool)
+    nearer = min((i for i in found if i.nearer), key=lambda i: float(i.then.u @ i.then.u), default=None)
+    fixed = search.fixed
+    twins = [
+        Twin(i.gone.name, i.then.hypothesis[-1], (*fixed, *i.then.hypothesis))
+        for i in found
+        if nearer is None or (not i.nearer and i.gone.name != nearer.gone.name)
+    ]
+    if nearer is None:
+        return current, twins, None
+    names, was = [c.name for c in current.parts], current.hypothesis
+    gone = was[names.index(nearer.gone.name)]
+    rung = refitted(search, nearer.then, nearer.comes.name, (gone.name,))
+    rung.added = nearer.then.hypothesis[-1:]
+    return nearer.then, [Twin(nearer.comes.name, gone, (*fixed, *was)), *twins], rung

@@ -1,0 +1,124 @@
+"""What could be in the place of an effect of the model that was found.
+
+Where only motion was measured, a weak motor moves a robot as mass, rotor and friction that are all larger by one factor do. No
+single effect looks like another there: several values together do. So it is asked of the whole model at its end, along the
+directions that leave its residual as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.discrepancy.everywhere import stands_out
+from ee_dist.discrepancy.evidence.holdout import PRIOR
+from ee_dist.discrepancy.evidence.judge import TIE_ENERGY
+from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.search.candidates import Candidate, on_top_of, possible
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.race import race
+from ee_dist.discrepancy.search.screen import SHOWS
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import slopes_at
+from ee_dist.discrepancy.search.trials import calm_trials
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+ALIKE = 0.02
+"""Share of the mark of an effect that the model's values may leave, for them to do what it does."""
+PROBE = 0.02
+"""Finite differences of these marks: a ridge is straight for a short way only."""
+TRIED, HEATS, WIDTH = 8, ((4, 3),), 0.03
+"""Exchanges that are tried, how many of them are fitted out, after how many steps, and their finite differences."""
+NEARER, REST = 0.05, 0.5
+"""By how much less the squares of all values, as shares of their ranges, must add up to, for a model to be nearer to the
+description than one that does as well; and share of it that those of the rest may keep, for one effect to say most of what they
+said together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instead:
+    """``gone``: an effect of the model; ``comes``: what does as well in its place, if all other values follow: the last part of
+    the model ``then``. ``nearer``: to the description than the model was."""
+
+    gone: Candidate
+    then: Current
+    nearer: bool
+
+    @property
+    def comes(self) -> Candidate:
+        return self.then.parts[-1]
+
+
+def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candidate]) -> list[Instead]:
+    """What of ``pool`` could be in the place of an effect beyond the first ``own``, the best for each: the residual is larger by
+    no more than two explanations may differ that are not told apart. Effects of which a little is in every robot are asked for
+    only if the rest of the model is much nearer to the description then: else nobody needs to know which of two it is."""
+    model = Model(current.parts)
+    (base,) = search.residuals([model.hypothesis(current.u)])
+    search = search.among(calm_trials(search.problem, base))
+    exchanges = sorted(_exchanges(search, current, own, pool), key=lambda e: e.rise)[:TRIED]
+    if not exchanges:
+        return []
+    mine, floor = search.everything, search.problem.floor
+    (now,) = race(search, [(model, current.u)], mine, (), PRIOR, WIDTH)
+    fits = race(search, [(e.model, e.u) for e in exchanges], mine, HEATS, PRIOR, WIDTH)
+    allowed = TIE_ENERGY * max(float(floor[mine].mean()), now.energy / int(mine.sum()))
+    out: dict[str, Instead] = {}
+    for fit in fits:
+        (gone,) = (c for c in current.parts if c not in fit.model.parts)
+        nearer = bool(fit.u @ fit.u + NEARER < now.u @ now.u)
+        if fit.energy - now.energy < allowed and gone.name not in out:
+            out[gone.name] = Instead(gone, Current(fit.model.parts, fit.u), nearer)
+    return list(out.values())
+
+
+@dataclass(frozen=True, eq=False)
+class _Exchange:
+    """``rise``: energy that slopes foretell beside that of the model as it is."""
+
+    rise: float
+    model: Model
+    u: Array
+
+
+def _exchanges(search: Search, current: Current, own: int, pool: Sequence[Candidate]) -> Iterator[_Exchange]:
+    """The model with one part exchanged for what leaves the same mark as its values together, from where that leads."""
+    robot, have = search.problem.robot, Model(current.parts)
+    others = _others(robot, search, current, pool)
+    together = Model((*current.parts, *others))
+    slopes = slopes_at(search, together, np.concatenate([current.u, *(np.zeros(c.size) for c in others)]), PROBE)
+    mine, far = slopes[:, : len(current.u)], float(current.u @ current.u)
+    normal = mine.T @ mine + PRIOR * np.eye(len(current.u))
+    for c, place in zip(others, together.places[len(current.parts) :], strict=True):
+        for k in range(c.size):
+            mark = slopes[:, place.start + k]
+            size = float(mark @ mark)
+            like = np.linalg.solve(normal, mine.T @ mark)
+            left = mark - mine @ like
+            if size < SHOWS or float(left @ left) > ALIKE * size:
+                continue
+            for at, where in enumerate(have.places):
+                gone = current.parts[at]
+                if at < own or gone.size != 1 or not like[where].any():
+                    continue
+                much = float(current.u[where][0] / like[where][0])
+                if not c.lower[k] <= much <= c.upper[k]:
+                    continue
+                values = np.delete(current.u - much * like, where)
+                rest = far - float(current.u[where][0]) ** 2
+                if not stands_out(robot, gone) and values @ values > REST * rest:
+                    continue
+                parts = (*current.parts[:at], *current.parts[at + 1 :], c)
+                u = np.concatenate([values, much * np.eye(c.size)[k]])
+                yield _Exchange(float(left @ left) * much**2, Model(parts), u)
+
+
+def _others(robot: Robot, search: Search, current: Current, pool: Sequence[Candidate]) -> list[Candidate]:
+    """What has values, is not in the model, and for which it has room; not what the model has already, shared otherwise."""
+    has, kinds = (*search.fixed, *current.hypothesis), {c.effect.name for c in current.parts}
+    names = {c.name for c in current.parts}
+    new = [c for c in pool if c.size and c.name not in names and not (c.effect.name in kinds and c.members(robot))]
+    return possible(robot, has, on_top_of(robot, has, new))

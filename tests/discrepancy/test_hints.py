@@ -1,0 +1,57 @@
+"""What readings show by themselves of an effect's values, and a search that looks there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from way_samples import Sample, measure, problem_by
+
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import Candidate
+from ee_dist.discrepancy.search.fit import fit_one
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.search.scan import scan
+from ee_dist.discrepancy.search.screen import screen
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.noise import with_noise
+
+STEP = 0.0731
+COARSE = (term("sensor_quantisation", "position", step=STEP),)
+
+
+def problem_of(hidden: Hypothesis) -> Problem:
+    robot = with_noise(servo_pendulum(), 1e-3)
+    plan = tuple(Excitation(kind, 3.0, 0.5, k) for k, kind in enumerate(("multisine", "steps")))
+    return problem_by("open_loop", measure(Sample(robot, plan, hidden, ()), hidden), robot)
+
+
+def steps_of(problem: Problem) -> dict[str, Candidate]:
+    return {c.target: c for c in pool_of(problem) if c.effect.name == "sensor_quantisation"}
+
+
+def test_steps_of_a_sensor_are_taken_from_its_readings() -> None:
+    problem = problem_of(COARSE)
+    found = steps_of(problem)
+    assert found["position"].values(np.array(found["position"].hint))["step"] == pytest.approx(STEP, rel=1e-6)
+    assert found["speed"].hint == (), "it has noise, and no steps"
+    assert not any(c.hint for c in pool_of(problem) if c.effect.name != "sensor_quantisation")
+
+
+def test_what_no_slope_leads_to_is_looked_at_and_kept() -> None:
+    problem = problem_of(COARSE)
+    coarse, search = steps_of(problem)["position"], Search(problem)
+    (screened,) = screen(search, [coarse])
+    (scanned,) = scan(search, [screened])
+    assert scanned.starts[0] == pytest.approx(coarse.hint)
+    fit = fit_one(search, Model((coarse,)), [np.array([0.6])])
+    assert fit.hypothesis[0].values[0][1] == pytest.approx(STEP, rel=0.01)
+    (true,) = problem.residuals([COARSE])
+    assert fit.energy <= 1.001 * float(true @ true)
+
+
+def test_a_sensor_with_many_steps_gives_no_hint() -> None:
+    assert all(c.hint == () for c in steps_of(problem_of(())).values())
