@@ -9,6 +9,7 @@ from typing import Any
 
 from ee_dist.basics.names import did_you_mean, listed
 from ee_dist.basics.quoted import quoted
+from ee_dist.robots import held
 from ee_dist.robots.body import Body
 from ee_dist.robots.model import COMMANDS, DRIVE_NUMBERS, Drive, Joint, Part, Robot, RobotError, Sensor, Wiring, World
 from ee_dist.robots.moments import refused
@@ -16,6 +17,7 @@ from ee_dist.robots.numbers import checked, number
 from ee_dist.robots.pivots import PIVOT_HINT, about_centre
 from ee_dist.robots.time_step import FINE_S, default_step_s, too_coarse
 
+FIXED = held.KEY
 KEYS = (
     "name",
     "free_base",
@@ -25,6 +27,7 @@ KEYS = (
     "gravity_m_s2",
     "inertia_about",
     "velocity_limits",
+    FIXED,
     "drives",
     "sensors",
 )
@@ -66,6 +69,9 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
 
     Raises RobotError.
     """
+    still = data.get(FIXED)
+    body = held.held_still(body, still, where)
+    data = _without(data, still or {})
     drives = _obeying(_drives(data.get("drives"), body, where), data.get("velocity_limits", SCALE), body, where)
     joints = {j.name: j for j in body.joints}
     driven = [joints[d.joint] for d in drives]
@@ -112,6 +118,21 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     if coarse := too_coarse(robot):
         notes.append(coarse)
     return robot, tuple(notes)
+
+
+def _without(data: Mapping[str, Any], still: Mapping[str, float]) -> Mapping[str, Any]:
+    """What a description says, less the drives and sensors of joints that stand still, which may be left in it."""
+    drives, sensors = data.get("drives"), data.get("sensors")
+    if isinstance(drives, Mapping):
+        data = {**data, "drives": {name: entry for name, entry in drives.items() if name not in still}}
+    if isinstance(sensors, list):
+        kept = [
+            s
+            for s in sensors
+            if not (isinstance(s, Mapping) and s.get("kind") in OF_JOINT and s.get("target") in still)
+        ]
+        data = {**data, "sensors": kept}
+    return data
 
 
 def _hinged(body: Body) -> tuple[str, ...]:

@@ -78,9 +78,8 @@ def ask_for_positions(v: View) -> None:
         rest = [m for m in v.robot.motor_names if m not in some]
         v.out.ask(
             f"positions: the columns name {listed(some)} alone; of {listed(rest)} nothing was recorded. Those that stood "
-            'still are type="fixed" in a copy of the URDF (no <joint> in the body of an MJCF), with their place in <origin>, '
-            "and are taken out of the drives and sensors of the description; one that moved unrecorded leaves the motion of "
-            "the others unknown"
+            f"still are written into the description of the robot, each with its place (rad, m): 'fixed_joints: "
+            f"{{{', '.join(f'{m}: 0.0' for m in rest)}}}'; one that moved unrecorded leaves the motion of the others unknown"
         )
     elif v.hints.joints is None and n > 1 and (called := _other_joints(v)):
         v.out.ask(
