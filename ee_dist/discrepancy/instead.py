@@ -22,7 +22,7 @@ from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.screen import SHOWS
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
-from ee_dist.discrepancy.search.trials import calm_trials
+from ee_dist.discrepancy.search.trials import calm_trials, telling
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -59,7 +59,10 @@ def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candid
     model = Model(current.parts)
     (base,) = search.residuals([model.hypothesis(current.u)])
     search = search.among(calm_trials(search.problem, base))
-    exchanges = sorted(_exchanges(search, current, own, pool), key=lambda e: e.rise)[:TRIED]
+    # What is alike in one trial is tried on all.
+    one = telling(search.problem, base, search.trials or range(len(search.problem.trials)))
+    looked = search if one is None else search.among([one])
+    exchanges = sorted(_exchanges(looked, current, own, pool), key=lambda e: e.rise)[:TRIED]
     if not exchanges:
         return []
     mine, floor = search.everything, search.problem.floor
