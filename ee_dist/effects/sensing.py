@@ -10,10 +10,12 @@ from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range, always, longest_delay
 from ee_dist.effects.targets import continuous_sensors, sensor_groups, sensors, touch_sensors
 from ee_dist.robots.model import Robot, Sensor
-from ee_dist.trials.grid import grid_of
+from ee_dist.trials.grid import reading_step
 from ee_dist.trials.log import Array
 from ee_dist.trials.noise import channel_range
 
+FEW_LEVELS = 3
+"""Levels at which a sensor must rest for its steps to be looked for: of coarse ones a motion crosses few."""
 FAULTS = "Isermann 2006, Fault-Diagnosis Systems, chapter 20"
 
 
@@ -134,7 +136,7 @@ def _quanta(robot: Robot, target: str) -> dict[str, Range]:
 
 
 def _steps_of(readings: Array) -> Mapping[str, float]:
-    return {"step": step} if (step := grid_of(readings)) > 0 else {}
+    return {"step": step} if (step := reading_step(readings, FEW_LEVELS)) > 0 else {}
 
 
 @effect(

@@ -6,29 +6,31 @@ import numpy as np
 
 from ee_dist.trials.log import Array
 
-FEWEST = 4
-"""Different readings that there must be."""
-SAME, OFF = 1e-6, 0.02
-"""Share of the range within which two readings are one; and by how much of a step they may lie off the grid."""
+RESTS, LEVELS, MULTIPLES = 0.1, 5, 0.9
+"""A reading comes in steps where it rests in this share of the rows, on so many levels, this share of whose gaps are whole
+multiples of one step."""
 
 
-def grid_of(readings: Array) -> float:
-    """The largest step of which all differences between readings (T,) are multiples, 0 where there is none."""
-    known = np.sort(readings[np.isfinite(readings)])
-    span = float(known[-1] - known[0]) if len(known) else 0.0
-    if span <= 0:
+def reading_step(values: Array, levels: int = LEVELS) -> float:
+    """The step in which readings (R,) come; 0 where none is seen, or on fewer than so many ``levels``. Only readings that repeat
+    the last one are looked at: others may lie between two levels where a log was brought to another grid."""
+    rests = values[1:][np.diff(values) == 0]
+    seen = np.unique(rests)
+    if len(rests) < RESTS * len(values) or len(seen) < levels:
         return 0.0
-    levels = known[np.concatenate([[True], np.diff(known) > SAME * span])]
-    if len(levels) < FEWEST:
-        return 0.0
-    step = float(np.diff(levels).min())
-    # From the least gap, which is known least, to the whole range, which is known best.
-    for reach in (4.0, 32.0, 256.0, np.inf):
-        from_first = levels - levels[0]
-        near = from_first[from_first <= reach * step * 1.5]
-        counts = np.round(near / step)
-        if not counts.any():
-            continue
-        step = float(near @ counts / (counts @ counts))
-    counts = np.diff(levels) / step
-    return step if bool(np.all(np.abs(counts - np.round(counts)) <= OFF)) else 0.0
+    gaps = np.diff(seen)
+    gaps = gaps[gaps > 1e-6 * (seen[-1] - seen[0])]
+    step = _step_of(gaps)
+    multiples = gaps / step
+    return step if np.mean(np.abs(multiples - np.round(multiples)) < 0.1) > MULTIPLES else 0.0
+
+
+def _step_of(gaps: Array) -> float:
+    """The step that gaps (G,) are multiples of, from the least one to ever larger ones: a log that was written with three digits
+    is a hundredth of a step off, and ten steps of that are a tenth."""
+    step = float(gaps.min())
+    for most in (1.5, 4.5, 16.5, np.inf):
+        near = gaps[gaps < most * step]
+        count = np.round(near / step)
+        step = float(near @ count / (count @ count))
+    return step

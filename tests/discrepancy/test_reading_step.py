@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.slow_noise import reading_step, slow_noise
+from ee_dist.discrepancy.slow_noise import slow_noise
+from ee_dist.trials.grid import reading_step
 
 T = np.arange(1500) * 0.02
 TICK = 2 * np.pi / 4096
@@ -52,3 +53,11 @@ def test_steps_that_were_written_with_few_digits_are_whole_ones_all_the_same() -
     written = np.round(np.round(swing / turn) * turn, 3)
     assert reading_step(written) == pytest.approx(turn, rel=1e-3)
     assert slow_noise(T, written[:, None])[0] >= 0.9 * turn / np.sqrt(12)
+
+
+def test_coarse_steps_are_seen_on_few_levels_only_if_that_is_asked_for() -> None:
+    values = stepped(0.1)
+    assert len(np.unique(values)) == 5
+    few = values[np.abs(values) < 0.15]
+    assert reading_step(few) == 0.0
+    assert reading_step(few, 3) == pytest.approx(0.1)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.discrepancy.slow_noise import MEDIAN_OF_SQUARES, reading_step
+from ee_dist.discrepancy.slow_noise import MEDIAN_OF_SQUARES
 from ee_dist.discrepancy.ways.force_balance.balance import Balance
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
 from ee_dist.discrepancy.ways.force_balance.noise import Prepared, roughness_of_noise, share_of_noise
@@ -23,6 +23,7 @@ from ee_dist.discrepancy.ways.force_balance.places import Way, share_of_no_place
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.model import Robot
+from ee_dist.trials.grid import reading_step
 from ee_dist.trials.log import Array
 
 ALIKE = 2.0
