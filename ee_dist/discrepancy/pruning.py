@@ -144,18 +144,22 @@ def _by_slopes(
     kept = pruned(search, fit, own, tried, added)
     names = {c.name for c in kept.parts}
     gone = tuple(c.name for c in current.parts if c.name not in names)
-    if gone and not _as_good(search, current, kept, cut, tried):
+    if gone and not _as_good(search, _held_energy(search, current, cut), kept, cut, tried):
         return Current(fit.model.parts, fit.u), ()
     return kept, gone
 
 
-def _as_good(search: Search, whole: Current, less: Current, cut: Cut, tried: int) -> bool:
-    """Whether held-out data do without what one of two models has not."""
-    a, b = (
-        float((h.residual**2).sum()) for h in cross_fit(search, [(Model(m.parts), m.u) for m in (whole, less)], cut)
-    )
+def _held_energy(search: Search, current: Current, cut: Cut) -> float:
+    """Energy of a model on what its fits had not seen."""
+    (held,) = cross_fit(search, [(Model(current.parts), current.u)], cut)
+    return float((held.residual**2).sum())
+
+
+def _as_good(search: Search, energy: float, less: Current, cut: Cut, tried: int) -> bool:
+    """Whether held-out data do without what a model has less than another, of that ``energy`` on them."""
     # Many small effects may each be below the resolution at which channels are compared, and not all together.
-    return b - a <= _allowed(search.problem, a, cut, tried, float(search.problem.floor.mean()))
+    allowed = _allowed(search.problem, energy, cut, tried, float(search.problem.floor.mean()))
+    return _held_energy(search, less, cut) - energy <= allowed
 
 
 def _allowed(problem: Problem, energy: float, cut: Cut, tried: int, least: float = 1.0) -> float:
@@ -186,7 +190,8 @@ def told_only(
             break
         current = models[-1]
     # Slopes may mislead where a joint sticks.
-    while gone and not _as_good(search, models[0], models[len(gone)], cut, tried):
+    energy = _held_energy(search, models[0], cut) if gone else 0.0
+    while gone and not _as_good(search, energy, models[len(gone)], cut, tried):
         gone = gone[: len(gone) // 2]
     return models[len(gone)], tuple(name for names in gone for name in names)
 
