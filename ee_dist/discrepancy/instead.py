@@ -12,17 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ee_dist.discrepancy.everywhere import stands_out
+from ee_dist.discrepancy.everywhere import FEWEST, stands_out
 from ee_dist.discrepancy.evidence.holdout import PRIOR
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.search.candidates import Candidate, on_top_of, possible
 from ee_dist.discrepancy.search.fitted import Model
-from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.screen import SHOWS
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.discrepancy.search.trials import calm_trials, telling
+from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -30,8 +30,9 @@ ALIKE = 0.02
 """Share of the mark of an effect that the model's values may leave, for them to do what it does."""
 PROBE = 0.02
 """Finite differences of these marks: a ridge is straight for a short way only."""
-TRIED, HEATS, WIDTH = 8, ((4, 3),), 0.03
-"""Exchanges that are tried, how many of them are fitted out, after how many steps, and their finite differences."""
+LOOKED_AT, BACK, NEARLY, TRIED, WIDTH = 24, 2.0, 0.04, 3, 0.03
+"""Exchanges that are simulated once; up to which energy, as a share of that of the model as it is, or of what is left there,
+slopes must lead back from there for one to be fitted; how many are; and their finite differences."""
 NEARER, REST = 0.05, 0.5
 """By how much less the squares of all values, as shares of their ranges, must add up to, for a model to be nearer to the
 description than one that does as well; and share of it that those of the rest may keep, for one effect to say most of what they
@@ -54,23 +55,23 @@ class Instead:
 
 def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candidate]) -> list[Instead]:
     """What of ``pool`` could be in the place of an effect beyond the first ``own``, the best for each: the residual is larger by
-    no more than two explanations may differ that are not told apart. Effects of which a little is in every robot are asked for
-    only if the rest of the model is much nearer to the description then: else nobody needs to know which of two it is."""
+    no more than two explanations may differ that are not told apart. Effects of which a little is in every robot, and that the
+    model has at many joints, are asked for only if the rest is much nearer to the description then: else nobody needs to know
+    which of two it is."""
     model = Model(current.parts)
     (base,) = search.residuals([model.hypothesis(current.u)])
     search = search.among(calm_trials(search.problem, base))
+    mine, floor = search.everything, search.problem.floor
     # What is alike in one trial is tried on all.
     one = telling(search.problem, base, search.trials or range(len(search.problem.trials)))
     looked = search if one is None else search.among([one])
-    exchanges = sorted(_exchanges(looked, current, own, pool), key=lambda e: e.rise)[:TRIED]
-    if not exchanges:
+    starts = _promising(looked, base, list(_exchanges(looked, current, own, pool)))
+    if not starts:
         return []
-    mine, floor = search.everything, search.problem.floor
-    (now,) = race(search, [(model, current.u)], mine, (), PRIOR, WIDTH)
-    fits = race(search, [(e.model, e.u) for e in exchanges], mine, HEATS, PRIOR, WIDTH)
+    now, *fits = follow_valley(search, [(model, current.u), *starts], mine, PRIOR, widths=(WIDTH,))
     allowed = TIE_ENERGY * max(float(floor[mine].mean()), now.energy / int(mine.sum()))
     out: dict[str, Instead] = {}
-    for fit in fits:
+    for fit in sorted(fits, key=lambda f: f.energy):
         (gone,) = (c for c in current.parts if c not in fit.model.parts)
         nearer = bool(fit.u @ fit.u + NEARER < now.u @ now.u)
         if fit.energy - now.energy < allowed and gone.name not in out:
@@ -80,11 +81,31 @@ def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candid
 
 @dataclass(frozen=True, eq=False)
 class _Exchange:
-    """``rise``: energy that slopes foretell beside that of the model as it is."""
+    """``slopes`` (n, P) of its values are those where the model is as it was; ``rise``: energy that they foretell."""
 
     rise: float
     model: Model
     u: Array
+    slopes: Array
+
+
+def _promising(search: Search, base: Array, exchanges: Sequence[_Exchange]) -> list[tuple[Model, Array]]:
+    """Those from whose starts slopes lead back to about the energy of the model as it is, and where to, the best first: a
+    ridge bends, and how high a straight step along it ends says little of what is on it."""
+    some = sorted(exchanges, key=lambda e: e.rise)[:LOOKED_AT]
+    rows = search.residuals([e.model.hypothesis(e.u) for e in some])
+    mine = search.everything
+    wanted = BACK * max(float(base[mine] @ base[mine]), float(search.problem.floor[mine].sum()))
+    found = []
+    for e, row in zip(some, rows, strict=True):
+        if not np.isfinite(row).all():
+            continue
+        normal = e.slopes.T @ e.slopes + PRIOR * np.eye(len(e.u))
+        step = -np.linalg.solve(normal, e.slopes.T @ row + PRIOR * e.u)
+        left = row + e.slopes @ step
+        if float(left @ left) <= max(wanted, NEARLY * float(row @ row)):
+            found.append((float(left @ left), e.model, np.clip(e.u + step, e.model.lower, e.model.upper)))
+    return [(model, u) for _, model, u in sorted(found, key=lambda f: f[0])[:TRIED]]
 
 
 def _exchanges(search: Search, current: Current, own: int, pool: Sequence[Candidate]) -> Iterator[_Exchange]:
@@ -108,15 +129,23 @@ def _exchanges(search: Search, current: Current, own: int, pool: Sequence[Candid
                 if at < own or gone.size != 1 or not like[where].any():
                     continue
                 much = float(current.u[where][0] / like[where][0])
-                if not c.lower[k] <= much <= c.upper[k]:
+                if not c.lower[k] <= much <= c.upper[k] or size * much**2 < SHOWS:
                     continue
                 values = np.delete(current.u - much * like, where)
                 rest = far - float(current.u[where][0]) ** 2
-                if not stands_out(robot, gone) and values @ values > REST * rest:
+                if not _special(robot, current, gone) and values @ values > REST * rest:
                     continue
                 parts = (*current.parts[:at], *current.parts[at + 1 :], c)
                 u = np.concatenate([values, much * np.eye(c.size)[k]])
-                yield _Exchange(float(left @ left) * much**2, Model(parts), u)
+                of_it = np.concatenate([np.delete(mine, where, axis=1), slopes[:, place]], axis=1)
+                yield _Exchange(float(left @ left) * much**2, Model(parts), u, of_it)
+
+
+def _special(robot: Robot, current: Current, c: Candidate) -> bool:
+    """Whether a part of the model is one that somebody would go and look at: a fault, or what other joints could have, and only
+    this one has."""
+    alone = sum(other.effect is c.effect for other in current.parts) == 1
+    return stands_out(robot, c) or (alone and not c.members(robot) and len(c.effect.targets(robot)) >= FEWEST)
 
 
 def _others(robot: Robot, search: Search, current: Current, pool: Sequence[Candidate]) -> list[Candidate]:
