@@ -33,6 +33,8 @@ PROBE = 0.02
 LOOKED_AT, BACK, NEARLY, TRIED, WIDTH = 24, 2.0, 0.04, 3, 0.03
 """Exchanges that are simulated once; up to which energy, as a share of that of the model as it is, or of what is left there,
 slopes must lead back from there for one to be fitted; how many are; and their finite differences."""
+ASIDE = 0.6
+"""Where values are that do nothing by themselves, as a share of their ranges."""
 NEARER, REST = 0.05, 0.5
 """By how much less the squares of all values, as shares of their ranges, must add up to, for a model to be nearer to the
 description than one that does as well; and share of it that those of the rest may keep, for one effect to say most of what they
@@ -113,11 +115,11 @@ def _exchanges(search: Search, current: Current, own: int, pool: Sequence[Candid
     robot, have = search.problem.robot, Model(current.parts)
     others = _others(robot, search, current, pool)
     together = Model((*current.parts, *others))
-    slopes = slopes_at(search, together, np.concatenate([current.u, *(np.zeros(c.size) for c in others)]), PROBE)
+    slopes = slopes_at(search, together, np.concatenate([current.u, *map(_at_rest, others)]), PROBE)
     mine, far = slopes[:, : len(current.u)], float(current.u @ current.u)
     normal = mine.T @ mine + PRIOR * np.eye(len(current.u))
     for c, place in zip(others, together.places[len(current.parts) :], strict=True):
-        for k in range(c.size):
+        for k in (k for k in range(c.size) if k not in c.inert):
             mark = slopes[:, place.start + k]
             size = float(mark @ mark)
             like = np.linalg.solve(normal, mine.T @ mark)
@@ -136,9 +138,17 @@ def _exchanges(search: Search, current: Current, own: int, pool: Sequence[Candid
                 if not _special(robot, current, gone) and values @ values > REST * rest:
                     continue
                 parts = (*current.parts[:at], *current.parts[at + 1 :], c)
-                u = np.concatenate([values, much * np.eye(c.size)[k]])
+                u = np.concatenate([values, _at_rest(c) + much * np.eye(c.size)[k]])
                 of_it = np.concatenate([np.delete(mine, where, axis=1), slopes[:, place]], axis=1)
                 yield _Exchange(float(left @ left) * much**2, Model(parts), u, of_it)
+
+
+def _at_rest(c: Candidate) -> Array:
+    """Values (P,) of an effect that does nothing, and at which its others begin to: a load has no place while it has no mass."""
+    u = np.zeros(c.size)
+    for k in c.inert:
+        u[k] = ASIDE * (c.upper[k] or c.lower[k])
+    return u
 
 
 def _special(robot: Robot, current: Current, c: Candidate) -> bool:
