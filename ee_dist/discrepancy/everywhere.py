@@ -244,7 +244,8 @@ class _Look:
         starts = []
         for s in few[:TRIED]:
             c = s.candidate
-            more = s.starts[0] if c.size > 1 else next(iter(c.hinted), np.zeros(c.size))
+            # Small values take in least of what is not theirs, where they do anything.
+            more = s.starts[0] if c.size > 1 or s.late else next(iter(c.hinted), np.zeros(c.size))
             starts.append((Model((*model.parts, c)), np.concatenate([start, more])))
         if not starts:
             return None

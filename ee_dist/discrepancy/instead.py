@@ -26,13 +26,15 @@ from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
-ALIKE = 0.02
-"""Share of the mark of an effect that the model's values may leave, for them to do what it does."""
+ALIKE = 0.3
+"""Share of what an effect leaves that its model cannot make up for without it, that may be left with another in its place."""
 PROBE = 0.02
 """Finite differences of these marks: a ridge is straight for a short way only."""
 LOOKED_AT, BACK, NEARLY, TRIED, WIDTH = 24, 2.0, 0.04, 3, 0.03
 """Exchanges that are simulated once; up to which energy, as a share of that of the model as it is, or of what is left there,
 slopes must lead back from there for one to be fitted; how many are; and their finite differences."""
+FAR_MORE = 4.0
+"""Times the median of an effect's values at its places, from which one of them is looked at by itself."""
 ASIDE = 0.6
 """Where values are that do nothing by themselves, as a share of their ranges."""
 NEARER, REST = 0.05, 0.5
@@ -111,36 +113,57 @@ def _promising(search: Search, base: Array, exchanges: Sequence[_Exchange]) -> l
 
 
 def _exchanges(search: Search, current: Current, own: int, pool: Sequence[Candidate]) -> Iterator[_Exchange]:
-    """The model with one part exchanged for what leaves the same mark as its values together, from where that leads."""
+    """The model with one part exchanged for another effect, from where slopes say that this would lead."""
     robot, have = search.problem.robot, Model(current.parts)
     others = _others(robot, search, current, pool)
     together = Model((*current.parts, *others))
     slopes = slopes_at(search, together, np.concatenate([current.u, *map(_at_rest, others)]), PROBE)
-    mine, far = slopes[:, : len(current.u)], float(current.u @ current.u)
-    normal = mine.T @ mine + PRIOR * np.eye(len(current.u))
+    marks = _Marks(slopes.T @ slopes, current.u)
+    alone = [marks.left_without(where) for where in have.places]
     for c, place in zip(others, together.places[len(current.parts) :], strict=True):
-        for k in (k for k in range(c.size) if k not in c.inert):
-            mark = slopes[:, place.start + k]
-            size = float(mark @ mark)
-            like = np.linalg.solve(normal, mine.T @ mark)
-            left = mark - mine @ like
-            if size < SHOWS or float(left @ left) > ALIKE * size:
+        moves = [place.start + k for k in range(c.size) if k not in c.inert]
+        if max((marks.gram[m, m] for m in moves), default=0.0) < SHOWS:
+            continue
+        for at, where in enumerate(have.places):
+            gone = current.parts[at]
+            if at < own or alone[at] < SHOWS:
                 continue
-            for at, where in enumerate(have.places):
-                gone = current.parts[at]
-                if at < own or gone.size != 1 or not like[where].any():
-                    continue
-                much = float(current.u[where][0] / like[where][0])
-                if not c.lower[k] <= much <= c.upper[k] or size * much**2 < SHOWS:
-                    continue
-                values = np.delete(current.u - much * like, where)
-                rest = far - float(current.u[where][0]) ** 2
-                if not _special(robot, current, gone) and values @ values > REST * rest:
-                    continue
-                parts = (*current.parts[:at], *current.parts[at + 1 :], c)
-                u = np.concatenate([values, _at_rest(c) + much * np.eye(c.size)[k]])
-                of_it = np.concatenate([np.delete(mine, where, axis=1), slopes[:, place]], axis=1)
-                yield _Exchange(float(left @ left) * much**2, Model(parts), u, of_it)
+            rise, values, much = marks.exchanged(where, moves)
+            if rise > ALIKE * alone[at]:
+                continue
+            rest = np.delete(current.u, where)
+            if not _special(robot, current, gone) and values @ values > REST * float(rest @ rest):
+                continue
+            new = _at_rest(c)
+            new[[m - place.start for m in moves]] += much
+            if np.any(new < c.lower) or np.any(new > c.upper):
+                continue
+            parts = (*current.parts[:at], *current.parts[at + 1 :], c)
+            of_it = np.concatenate([np.delete(slopes[:, : len(current.u)], where, axis=1), slopes[:, place]], axis=1)
+            yield _Exchange(rise, Model(parts), np.concatenate([values, new]), of_it)
+
+
+@dataclass(frozen=True, eq=False)
+class _Marks:
+    """``gram`` (P, P): products of the slopes of the model's values ``u`` and, behind these, of all other effects' values."""
+
+    gram: Array
+    u: Array
+
+    def left_without(self, gone: slice) -> float:
+        """Energy of what the values ``gone`` leave and the model's others cannot make up for; 0 where nothing is gone."""
+        return self.exchanged(gone, ())[0] if gone.stop > gone.start else 0.0
+
+    def exchanged(self, gone: slice, comes: Sequence[int]) -> tuple[float, Array, Array]:
+        """Energy of what the values ``gone`` leave, once the model's others and those of ``comes`` (numbers) make up for it, and
+        what both are then."""
+        stay = np.delete(np.arange(len(self.u)), gone)
+        at = np.concatenate([stay, np.array(comes, dtype=int)])
+        mark, size = self.gram[:, gone] @ self.u[gone], float(self.u[gone] @ self.gram[gone, gone] @ self.u[gone])
+        normal = self.gram[np.ix_(at, at)]
+        values = np.linalg.solve(normal + PRIOR * np.eye(len(at)), mark[at])
+        left = max(0.0, size - 2 * float(values @ mark[at]) + float(values @ normal @ values))
+        return left, self.u[stay] + values[: len(stay)], values[len(stay) :]
 
 
 def _at_rest(c: Candidate) -> Array:
@@ -153,9 +176,14 @@ def _at_rest(c: Candidate) -> Array:
 
 def _special(robot: Robot, current: Current, c: Candidate) -> bool:
     """Whether a part of the model is one that somebody would go and look at: a fault, or what other joints could have, and only
-    this one has."""
-    alone = sum(other.effect is c.effect for other in current.parts) == 1
-    return stands_out(robot, c) or (alone and not c.members(robot) and len(c.effect.targets(robot)) >= FEWEST)
+    this one has, or has far more of."""
+    if stands_out(robot, c):
+        return True
+    if c.members(robot) or len(c.effect.targets(robot)) < FEWEST:
+        return False
+    places = zip(current.parts, Model(current.parts).places, strict=True)
+    much = {other.target: float(np.abs(current.u[where]).max()) for other, where in places if other.effect is c.effect}
+    return len(much) == 1 or much[c.target] >= FAR_MORE * float(np.median(list(much.values())))
 
 
 def _others(robot: Robot, search: Search, current: Current, pool: Sequence[Candidate]) -> list[Candidate]:

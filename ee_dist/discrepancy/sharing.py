@@ -26,14 +26,15 @@ def singles(robot: Robot, pool: Iterable[Candidate]) -> list[Candidate]:
 
 
 def shared(robot: Robot, pool: Iterable[Candidate]) -> list[Candidate]:
-    """Each kind of effect with one set of values for as many places as may share it; at its single places where none do."""
+    """Each kind of effect with one set of values for as many places as may share it, and at the others by themselves."""
     kinds: dict[str, list[Candidate]] = {}
     for c in pool:
         kinds.setdefault(c.effect.name, []).append(c)
     out: list[Candidate] = []
     for some in kinds.values():
         widest = max(some, key=lambda c: len(c.members(robot)))
-        out += [widest] if widest.members(robot) else some
+        members = widest.members(robot)
+        out += [widest, *(c for c in some if not c.members(robot) and c.target not in members)] if members else some
     return out
 
 

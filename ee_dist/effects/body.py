@@ -53,7 +53,7 @@ def _shifts(robot: Robot, target: str) -> dict[str, Range]:
         half = max(shape.size) if shape.kind != "capsule" else shape.size[0] + shape.size[1] / 2
         reach = max(reach, middle + half)
     most = min(0.1, 0.8 * (reach or 0.1))
-    return {"along_x_m": (-most, most), "along_y_m": (-most, most)}
+    return dict.fromkeys(("along_x_m", "along_y_m", "along_z_m"), (-most, most))
 
 
 @effect(
@@ -63,6 +63,7 @@ def _shifts(robot: Robot, target: str) -> dict[str, Range]:
     parameters=(
         Parameter("along_x_m", "m", -math.inf, math.inf, 0.0, "shift along the part's x axis", 0.002),
         Parameter("along_y_m", "m", -math.inf, math.inf, 0.0, "shift along the part's y axis", 0.002),
+        Parameter("along_z_m", "m", -math.inf, math.inf, 0.0, "shift along the part's z axis", 0.002),
     ),
     physics="The centre of mass of a part lies elsewhere than in the model, as with a payload or a battery put on one side.",
     signature="A lean that is constant at rest and turns with the part; joint load differs between the sides.",
@@ -71,7 +72,7 @@ def _shifts(robot: Robot, target: str) -> dict[str, Range]:
 )
 def com_shifted(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     x, y, z = robot.part(target).com_m
-    return robot.with_part(target, com_m=(x + values["along_x_m"], y + values["along_y_m"], z))
+    return robot.with_part(target, com_m=(x + values["along_x_m"], y + values["along_y_m"], z + values["along_z_m"]))
 
 
 def _loads(robot: Robot, target: str) -> dict[str, Range]:
@@ -124,30 +125,6 @@ def payload(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     shift = (dy * dy + dz * dz, dx * dx + dz * dz, dx * dx + dy * dy, -dx * dy, -dx * dz, -dy * dz)
     xx, yy, zz, xy, xz, yz = (i + reduced * s for i, s in zip(part.inertia_kg_m2, shift, strict=True))
     return robot.with_part(target, mass_kg=total, com_m=(x, y, z), inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
-
-
-def _all_shifts(robot: Robot, target: str) -> dict[str, Range]:
-    return dict.fromkeys(("along_x_m", "along_y_m", "along_z_m"), _shifts(robot, target)["along_x_m"])
-
-
-@effect(
-    "com_moved",
-    family="body",
-    targets=parts,
-    parameters=(
-        Parameter("along_x_m", "m", -math.inf, math.inf, 0.0, "shift along the part's x axis", 0.002),
-        Parameter("along_y_m", "m", -math.inf, math.inf, 0.0, "shift along the part's y axis", 0.002),
-        Parameter("along_z_m", "m", -math.inf, math.inf, 0.0, "shift along the part's z axis", 0.002),
-    ),
-    physics="The centre of mass of a part lies elsewhere than in the model, in any direction; com_shifted knows two of them.",
-    signature="Residual torque at rest in proportion to the part's weight, which turns with the part.",
-    reference="Featherstone 2008, Rigid Body Dynamics Algorithms, section 2.13",
-    ranges=_all_shifts,
-    searchable=False,
-)
-def com_moved(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    x, y, z = robot.part(target).com_m
-    return robot.with_part(target, com_m=(x + values["along_x_m"], y + values["along_y_m"], z + values["along_z_m"]))
 
 
 @effect(

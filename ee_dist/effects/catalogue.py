@@ -109,10 +109,16 @@ class Effect:
 
     def shared(self, robot: Robot) -> tuple[str, ...]:
         """Groups of joints or sensors that it can act on with one set of values (see groups.py). What is wrong with a part is
-        so with all of them only where a little of it is in every robot: masses, but not loads or lost parts."""
+        so with all of them only where a little of it is in every robot: masses, but not loads or lost parts. Nor do hinges
+        share with slides what has another unit there."""
         if self.family == "body" and not self.everywhere:
             return ()
-        return shared_targets(robot, self.targets(robot))
+        allowed = self.targets(robot)
+        found = shared_targets(robot, allowed)
+        if not any(p.unit in SLIDE_UNITS or p.unit == "channel" for p in self.parameters):
+            return found
+        units = {g: {_measured_in(robot, m) for m in members_of(robot, g, allowed)} for g in found}
+        return tuple(g for g in found if len(units[g]) == 1)
 
     def proposed(self, robot: Robot) -> tuple[str, ...]:
         """The targets at which ``explain`` proposes it by itself: all or none."""
@@ -178,6 +184,12 @@ class Effect:
             return next((s.unit for s in robot.sensors if s.name == target), unit)
         slide = any(j.name == target and j.kind == "slide" for j in robot.joints)
         return SLIDE_UNITS.get(unit, unit) if slide else unit
+
+
+def _measured_in(robot: Robot, place: str) -> str:
+    """What tells apart the units of an effect at a joint or a sensor; empty for other places."""
+    of = {j.name: j.kind for j in robot.joints} | {x.name: x.unit for x in robot.sensors}
+    return of.get(place, "")
 
 
 @dataclass(frozen=True)

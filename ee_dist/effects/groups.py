@@ -17,15 +17,17 @@ ALL_JOINTS = "all_joints"
 """All that have friction, stops or a spring: those with a drive, be it a passive one."""
 DRIVEN_JOINTS = "driven_joints"
 """Those that a motor moves, where that is not all: what is of motors and controllers is shared by these."""
-WHOLE = (ALL_JOINTS, DRIVEN_JOINTS)
+OF_A_KIND = {"hinge": "all_hinges", "slide": "all_slides"}
+"""Where a robot has both: what is in N.m at the one and in N at the other is no one number."""
+WHOLE = (ALL_JOINTS, DRIVEN_JOINTS, *OF_A_KIND.values())
 JOIN = "+"
 _SETTINGS = tuple(f for f in Drive.__dataclass_fields__ if f != "joint")
 
 
 def groups(robot: System) -> dict[str, tuple[str, ...]]:
-    """Names of groups and their members (two or more): all joints with a drive, those of them that a motor moves, joints of
-    equal drives where these differ (named by their members, ``a+b+c``), all parts, all sensors of a kind. A system that is no
-    robot has none."""
+    """Names of groups and their members (two or more): all joints with a drive, those of them that a motor moves, all hinges and
+    all slides, joints of equal drives where these differ (named by their members, ``a+b+c``), all parts, all sensors of a
+    kind. A system that is no robot has none."""
     if not isinstance(robot, Robot):
         return {}
     found: dict[str, tuple[str, ...]] = {}
@@ -34,7 +36,9 @@ def groups(robot: System) -> dict[str, tuple[str, ...]]:
         found[ALL_JOINTS] = joints
         if 1 < len(driven) < len(joints):
             found[DRIVEN_JOINTS] = driven
-        found |= {JOIN.join(names): names for names in like_joints(robot) if names not in (joints, driven)}
+        found |= _of_a_kind(robot)
+        known = tuple(found.values())
+        found |= {JOIN.join(names): names for names in like_joints(robot) if names not in known}
     parts = tuple(p.name for p in robot.parts[0 if robot.free_base else 1 :])
     if len(parts) > 1:
         found["all_parts"] = parts
@@ -44,6 +48,12 @@ def groups(robot: System) -> dict[str, tuple[str, ...]]:
             found[f"all_{kind}_sensors"] = names
     taken = {n for names in found.values() for n in names}
     return {name: members for name, members in found.items() if name not in taken}
+
+
+def _of_a_kind(robot: Robot) -> dict[str, tuple[str, ...]]:
+    """Two hinges or slides and more, of a robot that has both."""
+    of = {name: tuple(m for m in robot.motor_names if robot.joint(m).kind == kind) for kind, name in OF_A_KIND.items()}
+    return {name: joints for name, joints in of.items() if 1 < len(joints) < len(robot.motor_names)}
 
 
 def like_joints(robot: Robot, within: float = 0.0) -> list[tuple[str, ...]]:

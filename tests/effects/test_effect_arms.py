@@ -98,12 +98,14 @@ def test_payload_of_nothing_is_the_robot_itself() -> None:
     assert apply(arm(), [term("payload", "lower", mass_kg=0.0, x_m=0.2)]) == arm()
 
 
-def test_com_moved_knows_all_three_axes(bench: Bench) -> None:
+def test_com_shifted_knows_all_three_axes(bench: Bench) -> None:
     robot = replace(lever(kp=100.0, kd=10.0))
     turned = robot.with_joint("joint", axis=(1.0, 0.0, 0.0)).with_part("arm", com_m=(0.0, -ARM_M, 0.0))
-    assert held(bench, robot, term("com_moved", "arm", along_x_m=0.06)) == pytest.approx(MASS_KG * G * 0.36, rel=1e-3)
-    assert held(bench, turned, term("com_moved", "arm", along_y_m=-0.06)) == pytest.approx(MASS_KG * G * 0.36, rel=1e-3)
-    model = apply(robot, [term("com_moved", "arm", along_z_m=0.1)])
+    assert held(bench, robot, term("com_shifted", "arm", along_x_m=0.06)) == pytest.approx(MASS_KG * G * 0.36, rel=1e-3)
+    assert held(bench, turned, term("com_shifted", "arm", along_y_m=-0.06)) == pytest.approx(
+        MASS_KG * G * 0.36, rel=1e-3
+    )
+    model = apply(robot, [term("com_shifted", "arm", along_z_m=0.1)])
     assert model.part("arm").com_m == (ARM_M, 0.0, 0.1)
 
 
@@ -194,7 +196,7 @@ def test_what_suits_arms_is_proposed_for_arms_alone() -> None:
     for robot, wanted in ((arm(), True), (quadruped(), False), (lever(), False)):
         names = {name for name, effect in CATALOGUE.items() if effect.proposed(robot)}
         assert ({"payload", "mounting_tilt"} <= names) == wanted
-        assert not {"com_moved", "part_inertia", "gear_ratio", "sensor_group_delay"} & names
+        assert not {"part_inertia", "gear_ratio", "sensor_group_delay"} & names
 
 
 def test_effects_act_where_the_kind_of_command_has_them() -> None:

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ee_dist.discrepancy.search.candidates import candidates
+from ee_dist.discrepancy.sharing import shared as widest
 from ee_dist.effects import CATALOGUE, EffectError, Parameter, Term, apply, effect, term
 from ee_dist.effects.catalogue import find, from_dict
 from ee_dist.effects.described import check_written
@@ -136,6 +137,29 @@ def test_joints_share_what_is_of_motors_where_one_of_them_has_none() -> None:
         names = groups(untouched)
         assert len(set(names.values())) == len(names), "one group has two names"
     assert "driven_joints" not in groups(QUADRUPED)
+
+
+def test_hinges_share_with_slides_no_number_that_has_another_unit_there() -> None:
+    robot = QUADRUPED
+    slides = ("knee_front_left", "knee_rear_right")
+    for name in slides:
+        robot = robot.with_joint(name, kind="slide")
+    hinges = tuple(j for j in robot.motor_names if j not in slides)
+    assert {k: groups(robot)[k] for k in ("all_hinges", "all_slides")} == {"all_hinges": hinges, "all_slides": slides}
+    for name, shared in (
+        ("coulomb_friction", False),
+        ("zero_offset", False),
+        ("command_delay", True),
+        ("motor_weak", True),
+    ):
+        found = find(name).shared(robot)
+        assert ("all_joints" in found) is shared and {"all_hinges", "all_slides"} <= set(found)
+    assert not any("slides" in g or "hinges" in g for g in groups(QUADRUPED))
+    rubbing = [c.target for c in candidates(robot) if c.effect.name == "coulomb_friction"]
+    assert {c.target for c in widest(robot, [c for c in candidates(robot) if c.effect.name == "coulomb_friction"])} == {
+        "all_hinges", *slides
+    }  # fmt: skip
+    assert "all_joints" not in rubbing
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])

@@ -166,7 +166,7 @@ def candidates(
         if entry.name in banned or entry.family not in seen:
             continue
         # Who names an effect wants it tried also where it would not be proposed unasked.
-        places = entry.targets(robot) if entry.name in named and entry.searchable else entry.proposed(robot)
+        places = entry.targets(robot) if entry.name in named else entry.proposed(robot)
         if sharing and places and entry.parameters and entry.family in SHAREABLE:
             places = (*places, *entry.shared(robot))
         guess = entry.guessed(robot) if sharing else ""

@@ -31,13 +31,14 @@ six robots the hidden one was among the first twenty as often as with all."""
 class Screened:
     """``promise``: energy that the candidate could take off the residual. ``starts``: values (u) to fit from, best
     first. ``reach``: largest change of the prediction that any probe made, as energy. ``elsewhere``: it shows in other
-    trials than the one by which most are screened."""
+    trials than the one by which most are screened; ``late``: a little of it does nothing, as of a limit that no load reaches."""
 
     candidate: Candidate
     promise: float
     starts: tuple[Array, ...]
     reach: float
     elsewhere: bool = False
+    late: bool = False
 
 
 def screen(
@@ -218,4 +219,5 @@ def _screened(candidate: Candidate, found: Sequence[_Probe], elsewhere: bool) ->
         # What measurements show is so or it is not: a share of a grid's step is another grid.
         share = 1.0 if tuple(p.u) == candidate.hint else p.share
         starts.append(np.clip(share * p.u, candidate.lower, candidate.upper) if len(p.u) else p.u)
-    return Screened(candidate, ordered[0].promise, tuple(starts), max(p.reach for p in found), elsewhere)
+    late = candidate.size == 1 and not found[0].shows
+    return Screened(candidate, ordered[0].promise, tuple(starts), max(p.reach for p in found), elsewhere, late)
