@@ -25,6 +25,7 @@ from ee_dist.measurements.robot_channels import check_names, command_kind, comma
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
     pace_suspicion,
+    repeat_suspicion,
     speed_suspicion,
     suspicions,
     time_suspicion,
@@ -81,6 +82,7 @@ class _Import:
     def run(self) -> tuple[TrialRecord, Report]:
         self._time()
         positions = self._sensors()
+        self._look_at_repeats()
         torques = self._torques()
         commands = self._commands(torques)
         self._on_one_turn(commands)
@@ -357,6 +359,17 @@ class _Import:
         self._look_at_pace()
         for name, flaw in command_flaws(self.robot, self.mapping, commands, position_of, self.step_s):
             self._judge(flaw, self.mapping.commands.get(name))
+
+    def _look_at_repeats(self) -> None:
+        """Rows in which nothing was read anew: what sensors say in one table, as the file has it."""
+        by_table: dict[str, list[str]] = {}
+        for column in self.mapping.sensors.values():
+            if isinstance(column, Column):
+                by_table.setdefault(column.table, []).append(column.column)
+        for table, names in by_table.items():
+            own = self.clocks[table].table
+            if note := repeat_suspicion(np.stack([own.numbers(n, gaps=True) for n in names], axis=1)):
+                self.report.suspicious.append(note)
 
     def _look_at_pace(self) -> None:
         """Measured speeds of all joints beside the change of their positions."""

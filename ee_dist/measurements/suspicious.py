@@ -27,6 +27,8 @@ OTHER_UNIT, OTHER_SIZE = 4.0, 20.0
 """A soft drive goes only part of the way to its command, and a model may be off by a lot: beyond these it is another unit."""
 
 
+STALE, SELDOM = 0.03, 0.45
+"""Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
 PACE, CLEAR, ALIKE = 0.05, 0.95, 1.15
 """Share by which speeds must be off the change of their positions to be told (clocks and encoders are ten times as good);
 correlation from which a joint tells it, and the largest ratio between two joints that are off by the same."""
@@ -129,6 +131,23 @@ def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> 
         certain = correlation > 0.9 and _between_units(slope, RATIOS)
         return f"{name}: is {slope:.3g} times the change of its position: another unit of one of the two?", certain
     return None
+
+
+def repeat_suspicion(readings: Array) -> str | None:
+    """Whether now and then a row (of T, S) of readings that move before and after is the one before, in each of two columns or
+    more: it was written before anything new was read."""
+    if readings.shape[1] < 2 or len(readings) < 10:
+        return None
+    same = np.all(np.diff(readings, axis=0) == 0, axis=1)
+    # At rest, and where sensors are read seldom, rows repeat for longer, or nearly always.
+    alone = same[1:-1] & ~same[:-2] & ~same[2:]
+    share = float(alone.mean())
+    if not STALE < share < SELDOM:
+        return None
+    return (
+        f"{100 * share:.0f} % of the rows repeat the row before in all {readings.shape[1]} columns of sensors, while these move: "
+        "they were written before anything new was read, and count as readings all the same; drop them from the file if you can"
+    )
 
 
 def pace_suspicion(speed: Array, position: Array, step_s: float, rate_hz: float) -> str | None:

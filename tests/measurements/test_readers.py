@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import sys
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ import pytest
 from scipy import io
 
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.readers import options, read
+from ee_dist.measurements.readers import matlab_apart, options, read
 
 
 @pytest.fixture(params=list(written.FORMATS))
@@ -259,3 +261,18 @@ def test_our_own_recording_needs_no_import(tmp_path: Path) -> None:
         pass
     with pytest.raises(MeasurementError, match=r"is a recording of ours already; use it as it is: measured="):
         read(tmp_path / "own.mcap")
+
+
+def test_arrays_beside_an_object_of_matlab_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SciPy lists no shapes of a file that holds a timeseries, and reads the arrays beside it."""
+    path = tmp_path / "run.mat"
+    io.savemat(path, {"t": np.arange(5.0), "q": np.ones(5)})
+
+    def without_shape(_: str) -> list[tuple[str, tuple[int, ...], str]]:
+        raise TypeError("'NoneType' object is not iterable")
+
+    monkeypatch.setattr(matlab_apart, "whosmat", without_shape)
+    with np.load(BytesIO(matlab_apart.answer(str(path), 10**6))) as found:
+        said = json.loads(found["said"].tobytes())
+        ((_, columns),) = said["trials"]
+        assert found[str(columns["t"][0])].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]

@@ -8,6 +8,7 @@ import pytest
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
     command_suspicion,
+    repeat_suspicion,
     speed_suspicion,
     suspicions,
     time_suspicion,
@@ -83,3 +84,28 @@ def test_torques_that_cannot_be(correlation: float, slope: float, word: str, cer
 @pytest.mark.parametrize(("correlation", "slope"), [(0.95, 1.2), (0.95, 4.0), (0.3, 900.0), (-0.9, -6.0), (0.0, 0.0)])
 def test_a_model_that_is_off_makes_no_torque_suspicious(correlation: float, slope: float) -> None:
     assert torque_suspicion("torque of j", Relation(correlation, slope), "N.m") is None
+
+
+def moving(rows: int = 300) -> np.ndarray:
+    t = np.arange(rows) * 0.01
+    return np.stack([np.sin(3 * t), np.cos(2 * t), 0.3 * np.sin(5 * t)], axis=1)
+
+
+def test_rows_that_were_written_before_anything_new_was_read_are_told() -> None:
+    readings = moving()
+    stale = np.arange(5, 295, 8)
+    readings[stale] = readings[stale - 1]
+    note = repeat_suspicion(readings)
+    assert note is not None and note.startswith("12 % of the rows repeat the row before in all 3 columns")
+
+
+def test_rest_steps_and_a_slower_rate_are_no_stale_rows() -> None:
+    assert repeat_suspicion(moving()) is None
+    resting = np.concatenate([moving(), np.repeat(moving()[-1:], 300, axis=0)])
+    assert repeat_suspicion(resting) is None
+    assert repeat_suspicion(np.repeat(moving(), 2, axis=0)) is None
+    assert repeat_suspicion(np.round(moving() / 0.2) * 0.2) is None
+    one = moving()
+    one[5:295:8, 0] = one[4:294:8, 0]
+    assert repeat_suspicion(one) is None, "of the others new readings came"
+    assert repeat_suspicion(moving()[:, :1]) is None

@@ -37,7 +37,7 @@ def answer(path: str, most_bytes: int) -> bytes:
 
 
 def _content(path: str, most_bytes: int, arrays: list[Any]) -> dict[str, Any]:
-    size = 8 * sum(float(np.prod(shape, dtype=float)) for _, shape, _ in whosmat(path))
+    size = _size(path)
     if size > most_bytes:
         return {"size": size}
     content = loadmat(path, simplify_cells=True, verify_compressed_data_integrity=True)
@@ -53,6 +53,15 @@ def _content(path: str, most_bytes: int, arrays: list[Any]) -> dict[str, Any]:
         _flatten(run, "", inner, {}, 0)
         told.append([f"{name} {k + 1}", _told(inner, arrays)])
     return {"trials": told}
+
+
+def _size(path: str) -> float:
+    """Bytes of all arrays; 0 where SciPy cannot tell, as beside an object of MATLAB's (a timeseries), which has no shape: then
+    what this process may take at most is the bound."""
+    try:
+        return 8 * sum(float(np.prod(shape, dtype=float)) for _, shape, _ in whosmat(path))
+    except TypeError:
+        return 0.0
 
 
 def _flatten(data: Mapping[str, Any], before: str, into: dict[str, Any], trials: dict[str, Any], depth: int) -> None:
