@@ -23,7 +23,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.ridges import over_ridges
-from ee_dist.discrepancy.search.screen import Screened, screen
+from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.discrepancy.search.trials import calm_trials, telling, telling_values
@@ -39,9 +39,8 @@ WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
 where it costs little, for fewer than MANY values."""
 TWINS = 2
 """Twins of effects that are tried in their place."""
-TRIED, BEGUN = 20, 6
-"""Effects that are tried one by one beside all that may be a little wrong, and how many of them are what promises most where its
-values begin,"""
+TRIED = 20
+"""Effects that are tried one by one beside all that may be a little wrong,"""
 HEATS = ((3, 5), (4, 2))
 """in a race: how many of them go on after how many steps."""
 MOST_OF_IT = 0.5
@@ -237,13 +236,13 @@ class _Look:
     def _beside(self, alone: Fit, start: Array) -> _Kept | None:
         """The model of a fit with one more effect, of those that promise most on top of it; all values from ``start`` (P,)."""
         search, model = self.calm, alone.model
-        # Where the values ended they stand in for it, and a limit may be reached by nothing any more.
-        few = self._promising(model, alone.u)[: TRIED - BEGUN]
-        names = {s.candidate.name for s in few}
-        begun = [s for s in self._promising(model, start) if s.candidate.name not in names]
-        few += [s for s in begun if stands_out(search.problem.robot, s.candidate)][:BEGUN]
+        refit = Refit(slopes_at(search, alone.model, alone.u))
+        now = search.on(alone.hypothesis)
+        one = telling(search.problem, alone.residual, np.unique(search.problem.trial_of[search.everything]).tolist())
+        screened = screen(now, possible(search.problem.robot, now.fixed, self._others(model)), refit=refit, trial=one)
+        few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
         starts = []
-        for s in few:
+        for s in few[:TRIED]:
             c = s.candidate
             # Small values take in least of what is not theirs, where they do anything.
             more = s.starts[0] if c.size > 1 or s.late else next(iter(c.hinted), np.zeros(c.size))
@@ -257,15 +256,6 @@ class _Look:
         noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))
         ties = [f.model.parts[-1].name for f in others if f.energy - best.energy < TIE_ENERGY * noise]
         return self._worth(best, {best.model.parts[-1].name: ties})
-
-    def _promising(self, model: Model, u: Array) -> list[Screened]:
-        """What could be beside a model with values u (P,), which may all follow it, the most promising first."""
-        search, terms = self.calm, model.hypothesis(u)
-        now, base = search.on(terms), search.residuals([terms])[0]
-        one = telling(search.problem, base, np.unique(search.problem.trial_of[search.everything]).tolist())
-        refit = Refit(slopes_at(search, model, u))
-        found = screen(now, possible(search.problem.robot, now.fixed, self._others(model)), refit=refit, trial=one)
-        return sorted((s for s in found if s.starts), key=lambda s: -s.promise)
 
     def _others(self, model: Model) -> list[Candidate]:
         names = {c.name for c in model.parts}

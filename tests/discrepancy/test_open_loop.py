@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import compare
@@ -151,3 +153,16 @@ def test_what_an_effect_took_off_an_untouched_robot_is_no_evidence(mujoco: MuJoC
         "an effect took as much where nothing was wrong"
     )
     assert again.candidates[0].why_not == LUCK
+
+
+def test_errors_are_told_in_the_units_of_the_channels_too() -> None:
+    sample = samples()["pendulum"]
+    problem = problem_by("open_loop", measure(sample, sample.hidden), sample.robot)
+    (line,) = problem.other_errors((), sample.hidden)
+    assert line.startswith("Root mean squares over all rows of these trials: position ")
+    worst = 0.0
+    for series in problem.series(()):
+        if problem.robot.sensors[series.channel].kind == "position":
+            worst = max(worst, float(np.sqrt(np.mean((series.measured - series.predicted) ** 2))))
+    before, after = (float(word) for word in re.findall(r"([\d.e+-]+) mrad", line))
+    assert 0 < after < 0.2 * before and before <= 1001 * worst

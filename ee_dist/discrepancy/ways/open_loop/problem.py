@@ -366,6 +366,20 @@ class OpenLoop(Problem):
                 out.append(Series(k, c, sensor.unit, log.times_s[read], log.sensors[read, c], values[read, c]))
         return out
 
+    def other_errors(self, *models: Hypothesis) -> list[str]:
+        """In the units of the channels: root mean squares over all rows, by kind of sensor."""
+        told: dict[tuple[str, str], list[str]] = {}
+        for model in models:
+            squares: dict[tuple[str, str], list[Array]] = {}
+            for s in self.series(model):
+                squares.setdefault((self.robot.sensors[s.channel].kind, s.unit), []).append(
+                    (s.measured - s.predicted) ** 2
+                )
+            for of, rows in squares.items():
+                told.setdefault(of, []).append(_in_unit(float(np.sqrt(np.mean(np.concatenate(rows)))), of[1]))
+        parts = [f"{kind.replace('_', ' ')} {' -> '.join(each)}" for (kind, _), each in told.items() if kind != "touch"]
+        return [f"Root mean squares over all rows of these trials: {'; '.join(parts)}."] if parts else []
+
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         believed = apply(self.robot, hypothesis)
         rollouts = [replace(rollout_of(t, apply(believed, t.setup)), pose=True) for t in self.measured]
@@ -379,6 +393,13 @@ class OpenLoop(Problem):
         jobs = [Job(r, ToSensors(t.early(self.robot))) for t, r in zip(self.measured, rollouts, strict=True)]
         true = self.evaluator.evaluate(jobs)
         return [report(m, v) for m, v in zip(models, true, strict=True)]
+
+
+def _in_unit(value: float, unit: str) -> str:
+    small = {"rad": "mrad", "m": "mm"}.get(unit)
+    if small is not None and value < 1:
+        return f"{1e3 * value:.3g} {small}"
+    return f"{value:.3g}" + ("" if unit == "1" else f" {unit}")
 
 
 def _spans(robot: Robot) -> Array:
