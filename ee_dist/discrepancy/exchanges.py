@@ -9,7 +9,7 @@ import numpy as np
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.judge import surely_better
 from ee_dist.discrepancy.examine import Current, Effort, examine
-from ee_dist.discrepancy.instead import instead_of
+from ee_dist.discrepancy.instead import Instead, instead_of
 from ee_dist.discrepancy.ladder import Rung, Twin
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
@@ -109,9 +109,12 @@ def exchanged(
 def nearest(
     search: Search, current: Current, own: int, pool: Sequence[Candidate]
 ) -> tuple[Current, list[Twin], Rung | None]:
-    """The model, or, where another does as well that is nearer to the description, that one and the step to it; and what does as
-    well as an effect of the model in its place."""
+    """The model, or, where another is surely better or does as well and is nearer to the description, that one and the step to
+    it; and what does as well as an effect of the model in its place."""
     found = instead_of(search, current, own, pool)
+    best = next((i for i in found if i.better), None)
+    if best is not None and _surely(search, current, best.then, len(pool)):
+        return best.then, [], _step(search, best)
     nearer = min((i for i in found if i.nearer), key=lambda i: float(i.then.u @ i.then.u), default=None)
     fixed = search.fixed
     twins = [
@@ -123,6 +126,18 @@ def nearest(
         return current, twins, None
     names, was = [c.name for c in current.parts], current.hypothesis
     gone = was[names.index(nearer.gone.name)]
-    rung = refitted(search, nearer.then, nearer.comes.name, (gone.name,))
-    rung.added = nearer.then.hypothesis[-1:]
-    return nearer.then, [Twin(nearer.comes.name, gone, (*fixed, *was)), *twins], rung
+    return nearer.then, [Twin(nearer.comes.name, gone, (*fixed, *was)), *twins], _step(search, nearer)
+
+
+def _surely(search: Search, current: Current, then: Current, tried: int) -> bool:
+    """Whether another model is better on data that its fits had not seen."""
+    one, other = cross_fit(
+        search, [(Model(m.parts), m.u) for m in (current, then)], strictest(search.problem), WIDTHS[1:]
+    )
+    return surely_better(search.problem, one, other, tried)
+
+
+def _step(search: Search, found: Instead) -> Rung:
+    rung = refitted(search, found.then, found.comes.name, (found.gone.name,))
+    rung.added = found.then.hypothesis[-1:]
+    return rung

@@ -46,11 +46,13 @@ said together."""
 @dataclass(frozen=True, eq=False)
 class Instead:
     """``gone``: an effect of the model; ``comes``: what does as well in its place, if all other values follow: the last part of
-    the model ``then``. ``nearer``: to the description than the model was."""
+    the model ``then``. ``nearer``: to the description than the model was; ``better``: what was fitted is told apart in favour of
+    it."""
 
     gone: Candidate
     then: Current
     nearer: bool
+    better: bool
 
     @property
     def comes(self) -> Candidate:
@@ -69,7 +71,8 @@ def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candid
     # What is alike in one trial is tried on all.
     one = telling(search.problem, base, search.trials or range(len(search.problem.trials)))
     looked = search if one is None else search.among([one])
-    starts = _promising(looked, base, list(_exchanges(looked, current, own, pool)))
+    base = np.where(looked.everything, base, 0.0)
+    starts = _promising(looked, base, list(_exchanges(looked, base, current, own, pool)))
     if not starts:
         return []
     now, *fits = follow_valley(search, [(model, current.u), *starts], mine, PRIOR, widths=(WIDTH,))
@@ -79,7 +82,8 @@ def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candid
         (gone,) = (c for c in current.parts if c not in fit.model.parts)
         nearer = bool(fit.u @ fit.u + NEARER < now.u @ now.u)
         if fit.energy - now.energy < allowed and gone.name not in out:
-            out[gone.name] = Instead(gone, Current(fit.model.parts, fit.u), nearer)
+            better = now.energy - fit.energy > allowed
+            out[gone.name] = Instead(gone, Current(fit.model.parts, fit.u), nearer, better)
     return list(out.values())
 
 
@@ -112,14 +116,17 @@ def _promising(search: Search, base: Array, exchanges: Sequence[_Exchange]) -> l
     return [(model, u) for _, model, u in sorted(found, key=lambda f: f[0])[:TRIED]]
 
 
-def _exchanges(search: Search, current: Current, own: int, pool: Sequence[Candidate]) -> Iterator[_Exchange]:
-    """The model with one part exchanged for another effect, from where slopes say that this would lead."""
+def _exchanges(
+    search: Search, base: Array, current: Current, own: int, pool: Sequence[Candidate]
+) -> Iterator[_Exchange]:
+    """The model, which leaves ``base`` (n,), with one part exchanged for another effect, from where slopes say that this would
+    lead."""
     robot, have = search.problem.robot, Model(current.parts)
     others = _others(robot, search, current, pool)
     together = Model((*current.parts, *others))
     slopes = slopes_at(search, together, np.concatenate([current.u, *map(_at_rest, others)]), PROBE)
-    marks = _Marks(slopes.T @ slopes, current.u)
-    alone = [marks.left_without(where) for where in have.places]
+    marks = _Marks(slopes.T @ slopes, slopes.T @ base, float(base @ base), current.u)
+    alone = [marks.rise_without(where) for where in have.places]
     for c, place in zip(others, together.places[len(current.parts) :], strict=True):
         moves = [place.start + k for k in range(c.size) if k not in c.inert]
         if max((marks.gram[m, m] for m in moves), default=0.0) < SHOWS:
@@ -145,25 +152,29 @@ def _exchanges(search: Search, current: Current, own: int, pool: Sequence[Candid
 
 @dataclass(frozen=True, eq=False)
 class _Marks:
-    """``gram`` (P, P): products of the slopes of the model's values ``u`` and, behind these, of all other effects' values."""
+    """``gram`` (P, P): products of the slopes of the model's values ``u`` and, behind these, of all other effects' values;
+    ``along`` (P,): theirs with what the model leaves, which has this ``energy``."""
 
     gram: Array
+    along: Array
+    energy: float
     u: Array
 
-    def left_without(self, gone: slice) -> float:
-        """Energy of what the values ``gone`` leave and the model's others cannot make up for; 0 where nothing is gone."""
+    def rise_without(self, gone: slice) -> float:
+        """By how much the energy rises where the values ``gone`` are, and the model's others follow; 0 where nothing is gone."""
         return self.exchanged(gone, ())[0] if gone.stop > gone.start else 0.0
 
     def exchanged(self, gone: slice, comes: Sequence[int]) -> tuple[float, Array, Array]:
-        """Energy of what the values ``gone`` leave, once the model's others and those of ``comes`` (numbers) make up for it, and
-        what both are then."""
-        stay = np.delete(np.arange(len(self.u)), gone)
+        """By how much the energy rises where the values ``gone`` are, and the model's others and those of ``comes`` (numbers)
+        follow, and what both are then."""
+        stay, u = np.delete(np.arange(len(self.u)), gone), self.u[gone]
         at = np.concatenate([stay, np.array(comes, dtype=int)])
-        mark, size = self.gram[:, gone] @ self.u[gone], float(self.u[gone] @ self.gram[gone, gone] @ self.u[gone])
+        target = self.gram[:, gone] @ u - self.along
+        size = float(u @ self.gram[gone, gone] @ u) - 2 * float(u @ self.along[gone])
         normal = self.gram[np.ix_(at, at)]
-        values = np.linalg.solve(normal + PRIOR * np.eye(len(at)), mark[at])
-        left = max(0.0, size - 2 * float(values @ mark[at]) + float(values @ normal @ values))
-        return left, self.u[stay] + values[: len(stay)], values[len(stay) :]
+        values = np.linalg.solve(normal + PRIOR * np.eye(len(at)), target[at])
+        rise = size - 2 * float(values @ target[at]) + float(values @ normal @ values)
+        return max(rise, -self.energy), self.u[stay] + values[: len(stay)], values[len(stay) :]
 
 
 def _at_rest(c: Candidate) -> Array:
