@@ -279,7 +279,7 @@ def test_an_interval_below_what_there_is_is_told_as_it_is() -> None:
     [
         ("part mass at arm (change +266 %)", "part_mass", {"change": 2.66}),
         (
-            "centre of mass shifted at arm (along x 0.02 m, along y 0.01 m)",
+            "centre of mass shifted at arm (along x 0.02 m, along y 0.01 m, along z 0 m)",
             "com_shifted",
             {"along_x_m": 0.02, "along_y_m": 0.01},
         ),
