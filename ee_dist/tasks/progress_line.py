@@ -39,8 +39,9 @@ class SearchProgress:
         self.told(what, share)
         another = what != self.stage
         if another or share <= self.share:
-            # It, or the same one once more, began when the last word of what came before was said.
-            self.stage_began, self.short = self.heard, True
+            # It, or the same one once more, began when the last word of what came before was said. Of many alike in a row each
+            # would say anew how long it takes.
+            self.stage_began, self.short = self.heard, self.short or another
         self.stage, self.share, self.heard = what, share, now
         left = (now - self.stage_began) * (1 - share) / share if share > 0 else 0.0
         ahead = f"{what} {share:.0%}, about {left:.0f} s left of this stage"
