@@ -79,6 +79,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         progress("weighing the measurements", 0.0)
         problem = way.make(measured, config).searched
         progress("weighing the measurements", 1.0)
+        if problem.doubts:
+            # It may decide everything, and a search takes minutes.
+            progress.note(f"Before anything is believed: {problem.doubts}")
         pool = chosen(problem, options.without, options.only)
         calibration = None
         if options.calibrate:

@@ -11,7 +11,7 @@ from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import _at_bounds, explain_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
-from ee_dist.discrepancy.evidence.intervals import ParameterReport
+from ee_dist.discrepancy.evidence.intervals import NEUTRAL, ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
@@ -257,6 +257,11 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     )
     assert not either.good and "not told from rotor inertia at servo" in either.sure and either.planner == "plan it"
     assert not any("Dropped again" in line for line in either.lines)
+    found.ladder, found.twins = [start, SimpleNamespace(**{**vars(rung), "added": (less, weak)})], []
+    assert improve_account(problem, found).headline.startswith("Added: motor weak at servo")  # type: ignore[arg-type]
+    found.parameters = [own, ParameterReport(0, "loss", 0.5, -0.1, 0.9, NEUTRAL)]
+    assert improve_account(problem, found).headline.startswith("Added: part mass at arm")  # type: ignore[arg-type]
+    found.ladder = [start, rung, end]
     found.terms, found.parameters, found.twins = (term("coulomb_friction", "servo", torque_nm=0.3),), [], []
     rung.dropped = ("offset_torque@servo",)
     rung.added = (term("viscous_friction", "servo", damping_nm_s_rad=0.1),)

@@ -61,8 +61,9 @@ def test_a_long_stage_says_from_its_first_word_how_long_it_will_take(monkeypatch
     with SearchProgress(Console(file=out, width=100)) as progress:
         for at, what, share in ((1.0, "weighing", 0.0), (6.0, "screening", 0.05), (8.0, "screening", 0.07),
                                 (56.0, "screening", 0.5), (106.0, "screening", 1.0), (107.0, "scanning", 0.5),
-                                (127.0, "fitting", 0.2), (207.0, "fitting", 1.0), (217.0, "fitting", 0.1), (219.0, "fitting", 1.0),
-                                (220.0, "fitting", 0.03), (221.0, "fitting", 1.0), (223.0, "fitting", 0.03)):  # fmt: skip
+                                (127.0, "fitting", 0.2), (207.0, "fitting", 1.0), (217.0, "fitting", 0.1),
+                                (219.0, "fitting", 1.0), (220.0, "fitting", 0.03), (221.0, "fitting", 1.0),
+                                (223.0, "fitting", 0.03)):  # fmt: skip
             now = at
             progress(what, share)
     assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [

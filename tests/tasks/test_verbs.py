@@ -15,6 +15,7 @@ import pytest
 import yaml
 from rerun.chunk import RrdReader
 
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.effects.catalogue import apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -276,3 +277,10 @@ def test_one_digest_of_a_search_wherever_its_models_are_simulated(cli, imported,
     digests = [json.loads((run(cli, *asked, *extra)[0] / "summary.json").read_text()) for extra in (here, elsewhere)]
     assert "friction" in digests[0]["headline"], "something was found, and fitted"
     assert len({d["result_digest"] for d in digests}) == 1
+
+
+def test_what_may_decide_everything_is_said_before_a_search(cli, imported, monkeypatch):
+    monkeypatch.setattr(ForceBalance, "doubts", property(lambda _: "the torques are odd."))
+    for asked in (["task=explain"], ["task=improve", "effect=coulomb_friction@servo"]):
+        _, said = run(cli, *asked, f"measured={imported}", "task.by=force_balance", *QUICK)
+        assert said.out.index("Before anything is believed: the torques are odd.") < said.out.index("noise floor")

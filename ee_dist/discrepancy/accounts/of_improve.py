@@ -28,7 +28,7 @@ from ee_dist.discrepancy.accounts.account import (
     was_or_were,
 )
 from ee_dist.discrepancy.calibrated_away import OddOne
-from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, WIDER, ParameterReport, called
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, NEUTRAL, WIDER, ParameterReport, called
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
@@ -70,7 +70,8 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     told = names | {t.term.name for t in found.twins}
     gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in told)
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]
-    parts = shares(found, robot)
+    # What may be nothing is no news, whatever depends on it together with others.
+    parts = sorted(shares(found, robot), key=lambda s: _may_be_nothing(found, s))
     lines += doubt_text([s for s in parts if s.doubted])
     vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
     if vague:
@@ -111,6 +112,12 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     good = settled and not warnings and not unsure and not any(ties.values())
     more = (*also, *lines, *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
+
+
+def _may_be_nothing(found: Improvement, share: Share) -> bool:
+    """Whether none of the values that a phrase tells is told from neutral."""
+    flags = [p.flag for p in found.parameters if found.terms[p.term] in share.terms]
+    return bool(flags) and all(flag == NEUTRAL for flag in flags)
 
 
 def twin_text(twin: Twin, found: Improvement, robot: Robot) -> str:
