@@ -7,6 +7,7 @@ directions that leave its residual as it is.
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -71,8 +72,7 @@ def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candid
     # What is alike in one trial is tried on all.
     one = telling(search.problem, base, search.trials or range(len(search.problem.trials)))
     looked = search if one is None else search.among([one])
-    base = np.where(looked.everything, base, 0.0)
-    starts = _promising(looked, base, list(_exchanges(looked, base, current, own, pool)))
+    starts = _promising(looked, np.where(looked.everything, base, 0.0), current, own, pool)
     if not starts:
         return []
     now, *fits = follow_valley(search, [(model, current.u), *starts], mine, PRIOR, widths=(WIDTH,))
@@ -89,91 +89,105 @@ def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candid
 
 @dataclass(frozen=True, eq=False)
 class _Exchange:
-    """``slopes`` (n, P) of its values are those where the model is as it was; ``rise``: energy that they foretell."""
+    """Part number ``at`` of a model for ``comes``, whose slopes are ``marks`` (n, K); ``u``: all values then, its own last;
+    ``rise``: of the energy, as slopes foretell it."""
 
     rise: float
-    model: Model
+    at: int
+    comes: Candidate
     u: Array
-    slopes: Array
+    marks: Array
 
 
-def _promising(search: Search, base: Array, exchanges: Sequence[_Exchange]) -> list[tuple[Model, Array]]:
-    """Those from whose starts slopes lead back to about the energy of the model as it is, and where to, the best first: a
-    ridge bends, and how high a straight step along it ends says little of what is on it."""
-    some = sorted(exchanges, key=lambda e: e.rise)[:LOOKED_AT]
-    rows = search.residuals([e.model.hypothesis(e.u) for e in some])
-    mine = search.everything
-    wanted = BACK * max(float(base[mine] @ base[mine]), float(search.problem.floor[mine].sum()))
-    found = []
-    for e, row in zip(some, rows, strict=True):
+def _promising(
+    search: Search, base: Array, current: Current, own: int, pool: Sequence[Candidate]
+) -> list[tuple[Model, Array]]:
+    """Exchanges in a model that leaves ``base`` (n,), from whose starts slopes lead back to about that energy, and where to, the
+    best first: a ridge bends, and how high a straight step along it ends says little of what is on it."""
+    have, mine = Model(current.parts), search.everything
+    slopes = slopes_at(search, have, current.u, PROBE)
+    marks = _Marks(slopes, slopes.T @ slopes, base, slopes.T @ base, float(base @ base), current.u)
+    some: list[_Exchange] = []
+    others = _others(search.problem.robot, search, current, pool)
+    for few in search.batches(len(others)):
+        found = _exchanges(search, marks, current, own, others[few])
+        some = heapq.nsmallest(LOOKED_AT, (*some, *found), key=lambda e: e.rise)
+    models = [Model((*have.parts[: e.at], *have.parts[e.at + 1 :], e.comes)) for e in some]
+    rows = search.residuals([m.hypothesis(e.u) for m, e in zip(models, some, strict=True)])
+    wanted = BACK * max(float(base @ base), float(search.problem.floor[mine].sum()))
+    starts = []
+    for model, e, row in zip(models, some, rows, strict=True):
         if not np.isfinite(row).all():
             continue
-        normal = e.slopes.T @ e.slopes + PRIOR * np.eye(len(e.u))
-        step = -np.linalg.solve(normal, e.slopes.T @ row + PRIOR * e.u)
-        left = row + e.slopes @ step
+        around = np.concatenate([np.delete(slopes, have.places[e.at], axis=1), e.marks], axis=1)
+        normal = around.T @ around + PRIOR * np.eye(len(e.u))
+        step = -np.linalg.solve(normal, around.T @ row + PRIOR * e.u)
+        left = row + around @ step
         if float(left @ left) <= max(wanted, NEARLY * float(row @ row)):
-            found.append((float(left @ left), e.model, np.clip(e.u + step, e.model.lower, e.model.upper)))
-    return [(model, u) for _, model, u in sorted(found, key=lambda f: f[0])[:TRIED]]
+            starts.append((float(left @ left), model, np.clip(e.u + step, model.lower, model.upper)))
+    return [(model, u) for _, model, u in sorted(starts, key=lambda f: f[0])[:TRIED]]
 
 
 def _exchanges(
-    search: Search, base: Array, current: Current, own: int, pool: Sequence[Candidate]
+    search: Search, marks: _Marks, current: Current, own: int, others: Sequence[Candidate]
 ) -> Iterator[_Exchange]:
-    """The model, which leaves ``base`` (n,), with one part exchanged for another effect, from where slopes say that this would
-    lead."""
-    robot, have = search.problem.robot, Model(current.parts)
-    others = _others(robot, search, current, pool)
-    together = Model((*current.parts, *others))
-    slopes = slopes_at(search, together, np.concatenate([current.u, *map(_at_rest, others)]), PROBE)
-    marks = _Marks(slopes.T @ slopes, slopes.T @ base, float(base @ base), current.u)
-    alone = [marks.rise_without(where) for where in have.places]
-    for c, place in zip(others, together.places[len(current.parts) :], strict=True):
-        moves = [place.start + k for k in range(c.size) if k not in c.inert]
-        if max((marks.gram[m, m] for m in moves), default=0.0) < SHOWS:
+    """The model with one part exchanged for one of ``others``, from where slopes say that this would lead."""
+    robot, have, u = search.problem.robot, Model(current.parts), current.u
+    alone = [marks.rise(where) for where in have.places]
+    together, at_rest = Model(tuple(others)), [_at_rest(c) for c in others]
+    slopes = slopes_at(search.on(current.hypothesis), together, np.concatenate([*at_rest, np.zeros(0)]), PROBE)
+    for c, rest, place in zip(others, at_rest, together.places, strict=True):
+        moves = [k for k in range(c.size) if k not in c.inert]
+        its = slopes[:, place]
+        if max((float(its[:, k] @ its[:, k]) for k in moves), default=0.0) < SHOWS:
             continue
+        beside = marks.beside(its[:, moves])
         for at, where in enumerate(have.places):
-            gone = current.parts[at]
             if at < own or alone[at] < SHOWS:
                 continue
-            rise, values, much = marks.exchanged(where, moves)
+            rise, values, much = marks.exchanged(where, beside)
             if rise > ALIKE * alone[at]:
                 continue
-            rest = np.delete(current.u, where)
-            if not _special(robot, current, gone) and values @ values > REST * float(rest @ rest):
+            stay = np.delete(u, where)
+            if not _special(robot, current, current.parts[at]) and values @ values > REST * float(stay @ stay):
                 continue
-            new = _at_rest(c)
-            new[[m - place.start for m in moves]] += much
+            new = rest.copy()
+            new[moves] += much
             if np.any(new < c.lower) or np.any(new > c.upper):
                 continue
-            parts = (*current.parts[:at], *current.parts[at + 1 :], c)
-            of_it = np.concatenate([np.delete(slopes[:, : len(current.u)], where, axis=1), slopes[:, place]], axis=1)
-            yield _Exchange(rise, Model(parts), np.concatenate([values, new]), of_it)
+            yield _Exchange(rise, at, c, np.concatenate([values, new]), its.copy())
 
 
 @dataclass(frozen=True, eq=False)
 class _Marks:
-    """``gram`` (P, P): products of the slopes of the model's values ``u`` and, behind these, of all other effects' values;
-    ``along`` (P,): theirs with what the model leaves, which has this ``energy``."""
+    """``slopes`` (n, P) of a model's values ``u``, ``gram`` (P, P) their products; ``base`` (n,) what it leaves, ``along`` (P,)
+    its products with the slopes, ``energy`` with itself."""
 
+    slopes: Array
     gram: Array
+    base: Array
     along: Array
     energy: float
     u: Array
 
-    def rise_without(self, gone: slice) -> float:
-        """By how much the energy rises where the values ``gone`` are, and the model's others follow; 0 where nothing is gone."""
-        return self.exchanged(gone, ())[0] if gone.stop > gone.start else 0.0
+    def beside(self, marks: Array) -> tuple[Array, Array, Array]:
+        """Products of the marks (n, K) of another effect with the model's, (P, K), with one another, and with what is left."""
+        return self.slopes.T @ marks, marks.T @ marks, marks.T @ self.base
 
-    def exchanged(self, gone: slice, comes: Sequence[int]) -> tuple[float, Array, Array]:
-        """By how much the energy rises where the values ``gone`` are, and the model's others and those of ``comes`` (numbers)
-        follow, and what both are then."""
-        stay, u = np.delete(np.arange(len(self.u)), gone), self.u[gone]
-        at = np.concatenate([stay, np.array(comes, dtype=int)])
-        target = self.gram[:, gone] @ u - self.along
+    def rise(self, gone: slice) -> float:
+        """By how much the energy rises where the values ``gone`` are, and the model's others follow; 0 where nothing is gone."""
+        return self.exchanged(gone, self.beside(np.zeros((len(self.base), 0))))[0] if gone.stop > gone.start else 0.0
+
+    def exchanged(self, gone: slice, comes: tuple[Array, Array, Array]) -> tuple[float, Array, Array]:
+        """By how much the energy rises where the values ``gone`` are, and the model's others and those of an effect that comes
+        (its products, as ``beside`` gives them) follow, and what both are then."""
+        (cross, own, along), u = comes, self.u[gone]
+        stay = np.delete(np.arange(len(self.u)), gone)
+        normal = np.block([[self.gram[np.ix_(stay, stay)], cross[stay]], [cross[stay].T, own]])
+        target = np.concatenate([self.gram[stay, gone] @ u - self.along[stay], cross[gone].T @ u - along])
         size = float(u @ self.gram[gone, gone] @ u) - 2 * float(u @ self.along[gone])
-        normal = self.gram[np.ix_(at, at)]
-        values = np.linalg.solve(normal + PRIOR * np.eye(len(at)), target[at])
-        rise = size - 2 * float(values @ target[at]) + float(values @ normal @ values)
+        values = np.linalg.solve(normal + PRIOR * np.eye(len(target)), target)
+        rise = size - 2 * float(values @ target) + float(values @ normal @ values)
         return max(rise, -self.energy), self.u[stay] + values[: len(stay)], values[len(stay) :]
 
 
