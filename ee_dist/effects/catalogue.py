@@ -176,6 +176,17 @@ class Effect:
         most = common([self.within(robot, m) for m in members])
         return {n: (max(low, most[n][0]), min(high, most[n][1])) for n, (low, high) in worth.items()}
 
+    def shown_in(self, readings: Array) -> dict[str, float]:
+        """Its values by parameter, as readings (T,) of a sensor show them by themselves; empty where they show none. Raises
+        EffectError where a user's own ``seen_in`` fails, or gives what is none of them."""
+        if self.seen_in is None:
+            return {}
+        try:
+            found = dict(self.seen_in(readings))
+        except (Exception, SystemExit) as error:
+            raise EffectError(f"{self.name}: its seen_in failed: {type(error).__name__}: {error}") from error
+        return dict(term(self.name, **found).values) if found else {}
+
     def unit(self, parameter: str, robot: Robot, target: str) -> str:
         """The unit of a parameter at this target: N on a slide where it is N.m on a hinge, or the unit of a channel."""
         unit = self.parameter(parameter).unit

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from way_samples import Sample, measure, problem_by
@@ -14,9 +17,10 @@ from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.effects.catalogue import CATALOGUE, EffectError, Hypothesis, term
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.log import Array
 from ee_dist.trials.noise import with_noise
 
 STEP = 0.0731
@@ -51,6 +55,16 @@ def test_what_no_slope_leads_to_is_looked_at_and_kept() -> None:
     assert fit.hypothesis[0].values[0][1] == pytest.approx(STEP, rel=0.01)
     (true,) = problem.residuals([COARSE])
     assert fit.energy <= 1.001 * float(true @ true)
+
+
+@pytest.mark.parametrize(
+    ("seen_in", "said"),
+    [(lambda _: 1 / 0, "its seen_in failed: ZeroDivisionError"), (lambda _: {"size": 1.0}, "no parameter 'size'")],
+)
+def test_what_a_user_s_own_reading_gets_wrong_is_said(seen_in: Callable[[Array], dict[str, float]], said: str) -> None:
+    own = replace(CATALOGUE["sensor_quantisation"], seen_in=seen_in)
+    with pytest.raises(EffectError, match=said):
+        own.shown_in(np.zeros(5))
 
 
 def test_a_sensor_with_many_steps_gives_no_hint() -> None:

@@ -38,7 +38,7 @@ def _hinted(problem: Problem, c: Candidate) -> Candidate:
         return c
     at = problem.robot.sensor_names.index(c.target)
     read = [log.sensors[log.readings, at] for log in (t.log for t in problem.measured)]
-    values = c.effect.seen_in(np.concatenate(read)) if read else {}
+    values = c.effect.shown_in(np.concatenate(read)) if read else {}
     if not values or not all(
         low <= values[p.name] <= high for p, (low, high) in zip(c.effect.parameters, c.bounds, strict=True)
     ):
