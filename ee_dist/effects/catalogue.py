@@ -185,7 +185,7 @@ class Effect:
             found = dict(self.seen_in(readings))
         except (Exception, SystemExit) as error:
             raise EffectError(f"{self.name}: its seen_in failed: {type(error).__name__}: {error}") from error
-        return dict(term(self.name, **found).values) if found else {}
+        return dict(term(self.name, "", **found).values) if found else {}
 
     def unit(self, parameter: str, robot: Robot, target: str) -> str:
         """The unit of a parameter at this target: N on a slide where it is N.m on a hinge, or the unit of a channel."""
