@@ -8,7 +8,7 @@ directions that leave its residual as it is.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,10 +107,13 @@ def _promising(
     have, mine = Model(current.parts), search.everything
     slopes = slopes_at(search, have, current.u, PROBE)
     marks = _Marks(slopes, slopes.T @ slopes, base, slopes.T @ base, float(base @ base), current.u)
+    # What may go: parts without which the model is worse.
+    rises = {at: marks.rise(have.places[at]) for at in range(own, len(have.parts))}
+    may_go = {at: rise for at, rise in rises.items() if rise >= SHOWS}
     some: list[_Exchange] = []
     others = _others(search.problem.robot, search, current, pool)
     for few in search.batches(len(others)):
-        found = _exchanges(search, marks, current, own, others[few])
+        found = _exchanges(search, marks, current, may_go, others[few])
         some = heapq.nsmallest(LOOKED_AT, (*some, *found), key=lambda e: e.rise)
     models = [Model((*have.parts[: e.at], *have.parts[e.at + 1 :], e.comes)) for e in some]
     rows = search.residuals([m.hypothesis(e.u) for m, e in zip(models, some, strict=True)])
@@ -129,11 +132,11 @@ def _promising(
 
 
 def _exchanges(
-    search: Search, marks: _Marks, current: Current, own: int, others: Sequence[Candidate]
+    search: Search, marks: _Marks, current: Current, may_go: Mapping[int, float], others: Sequence[Candidate]
 ) -> Iterator[_Exchange]:
-    """The model with one part exchanged for one of ``others``, from where slopes say that this would lead."""
-    robot, have, u = search.problem.robot, Model(current.parts), current.u
-    alone = [marks.rise(where) for where in have.places]
+    """The model with one part of those that ``may_go`` (number: rise of the energy without it) exchanged for one of ``others``,
+    from where slopes say that this would lead."""
+    robot, places, u = search.problem.robot, Model(current.parts).places, current.u
     together, at_rest = Model(tuple(others)), [_at_rest(c) for c in others]
     slopes = slopes_at(search.on(current.hypothesis), together, np.concatenate([*at_rest, np.zeros(0)]), PROBE)
     for c, rest, place in zip(others, at_rest, together.places, strict=True):
@@ -142,11 +145,10 @@ def _exchanges(
         if max((float(its[:, k] @ its[:, k]) for k in moves), default=0.0) < SHOWS:
             continue
         beside = marks.beside(its[:, moves])
-        for at, where in enumerate(have.places):
-            if at < own or alone[at] < SHOWS:
-                continue
+        for at, without in may_go.items():
+            where = places[at]
             rise, values, much = marks.exchanged(where, beside)
-            if rise > ALIKE * alone[at]:
+            if rise > ALIKE * without:
                 continue
             stay = np.delete(u, where)
             if not _special(robot, current, current.parts[at]) and values @ values > REST * float(stay @ stay):

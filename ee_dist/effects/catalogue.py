@@ -115,10 +115,10 @@ class Effect:
             return ()
         allowed = self.targets(robot)
         found = shared_targets(robot, allowed)
-        if not any(p.unit in SLIDE_UNITS or p.unit == "channel" for p in self.parameters):
-            return found
-        units = {g: {_measured_in(robot, m) for m in members_of(robot, g, allowed)} for g in found}
-        return tuple(g for g in found if len(units[g]) == 1)
+        members = {g: members_of(robot, g, allowed) for g in found}
+        return tuple(
+            g for g in found if all(len({self._unit_at(p, robot, m) for m in members[g]}) == 1 for p in self.parameters)
+        )
 
     def proposed(self, robot: Robot) -> tuple[str, ...]:
         """The targets at which ``explain`` proposes it by itself: all or none."""
@@ -189,18 +189,17 @@ class Effect:
 
     def unit(self, parameter: str, robot: Robot, target: str) -> str:
         """The unit of a parameter at this target: N on a slide where it is N.m on a hinge, or the unit of a channel."""
-        unit = self.parameter(parameter).unit
-        target = next(iter(members_of(robot, target, self.targets(robot))), target)
+        place = next(iter(members_of(robot, target, self.targets(robot))), target)
+        return self._unit_at(self.parameter(parameter), robot, place)
+
+    @staticmethod
+    def _unit_at(parameter: Parameter, robot: Robot, place: str) -> str:
+        """The same at a single joint, part or sensor."""
+        unit = parameter.unit
         if unit == "channel":
-            return next((s.unit for s in robot.sensors if s.name == target), unit)
-        slide = any(j.name == target and j.kind == "slide" for j in robot.joints)
+            return next((s.unit for s in robot.sensors if s.name == place), unit)
+        slide = any(j.name == place and j.kind == "slide" for j in robot.joints)
         return SLIDE_UNITS.get(unit, unit) if slide else unit
-
-
-def _measured_in(robot: Robot, place: str) -> str:
-    """What tells apart the units of an effect at a joint or a sensor; empty for other places."""
-    of = {j.name: j.kind for j in robot.joints} | {x.name: x.unit for x in robot.sensors}
-    return of.get(place, "")
 
 
 @dataclass(frozen=True)

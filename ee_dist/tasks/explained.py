@@ -106,9 +106,7 @@ def _of_model(summary: Mapping[str, Any]) -> list[tuple[str, Hypothesis]]:
         if others and found[0][1] is model and len(found) == 1:
             found = [(added[0].name, model)]
         found += [(t.name, with_one_exchanged(model, added[0].name, (t,))) for t in others]
-    found += [
-        ("@".join(filter(None, (t["effect"], t["target"]))), _terms(t["terms"])) for t in summary.get("twins", ())
-    ]
+    found += [(_terms([t])[0].name, _terms(t["terms"])) for t in summary.get("twins", ())]
     return list(dict(found).items())
 
 
