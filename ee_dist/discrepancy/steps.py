@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
+from ee_dist.basics.altered import altered
 from ee_dist.engines.drive import stiff_joints
 from ee_dist.robots.model import Drive, Robot
 from ee_dist.trials.log import Array
@@ -43,9 +45,10 @@ def between_steps(robot: Robot) -> Robot:
     an engine takes at the end of a step is as much too much."""
     ends = stiff_joints(robot)
     drives = [_made_up(d, robot.time_step_s / 2, bool(end)) for d, end in zip(robot.drives, ends, strict=True)]
-    return replace(robot, drives=tuple(drives))
+    return altered(robot, drives=tuple(drives))
 
 
+@lru_cache(4096)
 def _made_up(drive: Drive, half_s: float, at_end: bool) -> Drive:
     controller = {"position": drive.kd, "speed": drive.kp}.get(drive.command, 0.0)
     voltage = drive.command in ("position", "speed") and np.isfinite(drive.speed_limit)

@@ -357,28 +357,48 @@ def from_dict(entry: Mapping[str, Any]) -> Term:
 def apply(robot: Model, hypothesis: Iterable[Term]) -> Model:
     """The model: the system under every effect of the hypothesis, in order. Raises EffectError for a wrong target."""
     for t in hypothesis:
-        entry = find(t.effect)
-        if not isinstance(robot, entry.of):
-            raise EffectError(f"{t.effect} is an effect on a {_kind(entry.of)}; {robot.name} is a {_kind(type(robot))}")
-        allowed = entry.targets(robot)
-        places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
-        if not places:
-            shared = entry.shared(robot) if isinstance(robot, Robot) else ()
-            near = nearest(t.target, [*allowed, *shared]) or allowed
-            raise EffectError(
-                f"{t.effect} cannot act on {quoted(t.target)} of {robot.name}; it can act on: {listed(near)}"
-            )
-        try:
-            for place in places:
-                robot = entry.transform(robot, place, dict(t.values))
-        except RobotError as error:
-            raise EffectError(f"{t}: {error}") from error
-        except (Exception, SystemExit) as error:
-            raise EffectError(f"{t}: its transform failed: {type(error).__name__}: {error}") from error
-        if not isinstance(robot, entry.of):
-            raise EffectError(
-                f"{t}: its transform gave {type(robot).__name__}, not a {entry.of.__name__}; does it return one?"
-            )
+        robot = _under(robot, t)
+    return robot
+
+
+def applied(robot: Model, hypotheses: Iterable[Iterable[Term]]) -> list[Model]:
+    """The model of each hypothesis, as ``apply`` gives it. What several begin with alike is applied once: of hypotheses that
+    differ in one of fifty terms that is half of all."""
+    known: dict[tuple[int, Term], Model] = {}
+    out = []
+    for hypothesis in hypotheses:
+        model = robot
+        for t in hypothesis:
+            key = id(model), t
+            if key not in known:
+                known[key] = _under(model, t)
+            model = known[key]
+        out.append(model)
+    return out
+
+
+def _under(robot: Model, t: Term) -> Model:
+    """The system under one effect."""
+    entry = find(t.effect)
+    if not isinstance(robot, entry.of):
+        raise EffectError(f"{t.effect} is an effect on a {_kind(entry.of)}; {robot.name} is a {_kind(type(robot))}")
+    allowed = entry.targets(robot)
+    places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
+    if not places:
+        shared = entry.shared(robot) if isinstance(robot, Robot) else ()
+        near = nearest(t.target, [*allowed, *shared]) or allowed
+        raise EffectError(f"{t.effect} cannot act on {quoted(t.target)} of {robot.name}; it can act on: {listed(near)}")
+    try:
+        for place in places:
+            robot = entry.transform(robot, place, dict(t.values))
+    except RobotError as error:
+        raise EffectError(f"{t}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise EffectError(f"{t}: its transform failed: {type(error).__name__}: {error}") from error
+    if not isinstance(robot, entry.of):
+        raise EffectError(
+            f"{t}: its transform gave {type(robot).__name__}, not a {entry.of.__name__}; does it return one?"
+        )
     return robot
 
 

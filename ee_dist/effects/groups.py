@@ -30,15 +30,25 @@ def groups(robot: System) -> dict[str, tuple[str, ...]]:
     kind. A system that is no robot has none."""
     if not isinstance(robot, Robot):
         return {}
-    found: dict[str, tuple[str, ...]] = {}
+    joints = _of_joints(robot)
+    alike = {JOIN.join(names): names for names in like_joints(robot) if names not in joints.values()}
+    return _free(joints | alike | _of_others(robot))
+
+
+def _of_joints(robot: Robot) -> dict[str, tuple[str, ...]]:
+    """All joints with a drive, those of them that a motor moves, all hinges and all slides."""
     joints, driven = robot.motor_names, powered(robot)
-    if len(joints) > 1:
-        found[ALL_JOINTS] = joints
-        if 1 < len(driven) < len(joints):
-            found[DRIVEN_JOINTS] = driven
-        found |= _of_a_kind(robot)
-        known = tuple(found.values())
-        found |= {JOIN.join(names): names for names in like_joints(robot) if names not in known}
+    if len(joints) < 2:
+        return {}
+    found = {ALL_JOINTS: joints}
+    if 1 < len(driven) < len(joints):
+        found[DRIVEN_JOINTS] = driven
+    return found | _of_a_kind(robot)
+
+
+def _of_others(robot: Robot) -> dict[str, tuple[str, ...]]:
+    """All parts, and all sensors of a kind."""
+    found = {}
     parts = tuple(p.name for p in robot.parts[0 if robot.free_base else 1 :])
     if len(parts) > 1:
         found["all_parts"] = parts
@@ -46,6 +56,11 @@ def groups(robot: System) -> dict[str, tuple[str, ...]]:
         names = tuple(s.name for s in robot.sensors if s.kind == kind)
         if len(names) > 1:
             found[f"all_{kind}_sensors"] = names
+    return found
+
+
+def _free(found: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+    """Groups of which no member has the name."""
     taken = {n for names in found.values() for n in names}
     return {name: members for name, members in found.items() if name not in taken}
 
@@ -86,7 +101,13 @@ def name_of(robot: System, members: tuple[str, ...]) -> str:
 
 def members_of(robot: System, target: str, allowed: tuple[str, ...]) -> tuple[str, ...]:
     """The members of a group, or of any list ``a+b+c``, if an effect can act on each of them; empty otherwise."""
-    found = tuple(target.split(JOIN)) if JOIN in target else groups(robot).get(target, ())
+    if JOIN in target:
+        found = tuple(target.split(JOIN))
+    elif isinstance(robot, Robot):
+        # Which drives are equal takes a look at each, and names those with a join.
+        found = _free(_of_joints(robot) | _of_others(robot)).get(target, ())
+    else:
+        found = ()
     return found if set(found) <= set(allowed) else ()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from ee_dist.discrepancy.search.candidates import candidates
 from ee_dist.discrepancy.sharing import shared as widest
 from ee_dist.effects import CATALOGUE, EffectError, Parameter, Term, apply, effect, term
-from ee_dist.effects.catalogue import find, from_dict
+from ee_dist.effects.catalogue import applied, find, from_dict
 from ee_dist.effects.described import check_written
 from ee_dist.effects.groups import groups
 from ee_dist.effects.targets import motors
@@ -57,6 +58,21 @@ def test_a_hypothesis_gives_the_same_model_each_time_and_leaves_the_robot_alone(
     assert model.motor_names == QUADRUPED.motor_names
     assert model.sensor_names == QUADRUPED.sensor_names
     assert quadruped().digest == before
+
+
+@given(st.lists(terms(), min_size=1, max_size=3), terms())
+@settings(max_examples=25, deadline=None)
+def test_models_of_many_hypotheses_are_those_of_each_alone(first: list[Term], other: Term) -> None:
+    hypotheses = [tuple(first), (*first, other), (other, *first), (), (*first, other)]
+    try:
+        alone = [apply(QUADRUPED, h) for h in hypotheses]
+    except EffectError as refused:
+        with pytest.raises(EffectError, match=re.escape(str(refused))):
+            applied(QUADRUPED, hypotheses)
+        return
+    together = applied(QUADRUPED, hypotheses)
+    assert together == alone
+    assert together[1] is together[4] and together[3] is QUADRUPED
 
 
 @settings(deadline=None, max_examples=60)

@@ -27,7 +27,7 @@ from ee_dist.discrepancy.ways.force_balance.motion import Processing, judged_in
 from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
-from ee_dist.effects.catalogue import Hypothesis, apply, find, term
+from ee_dist.effects.catalogue import Hypothesis, applied, apply, find, term
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -143,9 +143,8 @@ class ForceBalance(Problem):
         chosen = range(len(self.measured)) if trials is None else trials
         out = np.zeros((len(hypotheses), len(self.segment_of)))
         own = self.scale * self.own_noise
-        for row, hypothesis in enumerate(hypotheses):
-            for k in chosen:
-                model = apply(self.models[k], hypothesis)
+        for k in chosen:
+            for row, model in enumerate(applied(self.models[k], hypotheses)):
                 kept = self.balances[k](model)
                 if kept is None:
                     out[row, self.slices[k]] = np.inf

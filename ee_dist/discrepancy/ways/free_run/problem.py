@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -26,7 +26,7 @@ from ee_dist.discrepancy.problem import TIMES_NOISE, Layout, Problem, Series, er
 from ee_dist.discrepancy.slow_noise import slow_noise, without_motion
 from ee_dist.discrepancy.starting import speeds_off
 from ee_dist.discrepancy.ways.free_run.pieces import Piece, pieces
-from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.effects.catalogue import Hypothesis, applied, apply
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
@@ -153,7 +153,7 @@ class FreeRun(Problem):
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
         chosen = [i for i, p in enumerate(self.pieces) if trials is None or p.trial in set(trials)]
-        models = {k: [self._simulated(k, h) for h in hypotheses] for k in {self.pieces[i].trial for i in chosen}}
+        models = self._models(hypotheses, {self.pieces[i].trial for i in chosen})
         # Rollouts of one length with the same inputs share a batch, so all run as long as the longest.
         steps, switched = max(len(p.log) for p in self.pieces), any(p.enabled is not None for p in self.pieces)
         jobs = [
@@ -194,6 +194,16 @@ class FreeRun(Problem):
         """(M,) standard deviations of the joint positions that a simulation starts from."""
         joints = {s.target: n for s, n in zip((self.robot.sensors[k] for k in self.columns), self.noise, strict=True)}
         return np.array([joints.get(m, 0.0) / MEAN_ABSOLUTE for m in self.robot.motor_names])
+
+    def _models(self, hypotheses: Sequence[Hypothesis], trials: Iterable[int]) -> dict[int, list[Robot]]:
+        """What is simulated for each hypothesis, by trial; trials in which the robot was held alike share them."""
+        alike: dict[tuple[Hypothesis, bool | None], list[Robot]] = {}
+        for k in trials:
+            t = self.measured[k]
+            how = t.setup, t.commands_held
+            if how not in alike:
+                alike[how] = [t.simulated(m) for m in applied(self.setups[k], hypotheses)]
+        return {k: alike[self.measured[k].setup, self.measured[k].commands_held] for k in trials}
 
     def _simulated(self, trial: int, hypothesis: Hypothesis) -> Robot:
         return self.measured[trial].simulated(apply(self.setups[trial], hypothesis))
