@@ -7,24 +7,27 @@ them where twenty small ones would be right, and is caught there. This goes the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ee_dist.discrepancy.assumed import beside, puts_right
-from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit
+from ee_dist.discrepancy.evidence.by_joint import gains_of
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, cross_fit, held_by_slopes
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment
 from ee_dist.discrepancy.pruning import AGAIN, pruned
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, possible
+from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import WIDTHS as SLOPES
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.discrepancy.search.trials import calm_trials, telling, telling_values
 from ee_dist.discrepancy.search.valley import follow_valley
@@ -43,6 +46,9 @@ TRIED = 20
 """Effects that are tried one by one beside all that may be a little wrong,"""
 HEATS = ((3, 5), (4, 2))
 """in a race: how many of them go on after how many steps."""
+BEGINNING_S, BUSY = 8.0, 0.5
+"""How much of each trial all values are fitted to first, and what it must have to explain for its length, as a share of what
+the whole has."""
 MOST_OF_IT = 0.5
 """Share of what is above the noise that must be left at one joint for an effect to stand out there."""
 
@@ -76,7 +82,8 @@ def everywhere(
         model = Model(current.parts)
         without = [cross_fit(search, [(model, current.u)], cut)[0].residual for cut in cuts]
     calm = search.among(calm_trials(search.problem, as_it_is))
-    look = _Look(search, calm, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
+    brief = _brief(calm, as_it_is, current)
+    look = _Look(search, calm, brief, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
     robot, places = search.problem.robot, Model(current.parts).places
     begun = list(instead(robot, current, own))
     # From neutral, which the model as it is may be, small values take in least of what is not theirs.
@@ -123,6 +130,19 @@ def stands_out(robot: Robot, c: Candidate) -> bool:
     return not c.effect.everywhere and not puts_right(robot, c)
 
 
+def _brief(search: Search, residual: Array, current: Current) -> Search:
+    """The search on the beginning of its trials; itself where that is no shorter, or has less to explain than the rest."""
+    whole = search.problem
+    brief = replace(search, problem=whole.beginning(BEGINNING_S))
+    if brief.problem is whole:
+        return search
+    first, mine, own = brief.on(current.hypothesis).base(), brief.everything, search.everything
+    above, usual = (
+        float(np.mean(r[at] ** 2 - p.floor[at])) for r, at, p in ((first, mine, brief.problem), (residual, own, whole))
+    )
+    return brief if above >= BUSY * usual else search
+
+
 @dataclass(frozen=True, eq=False)
 class _Kept:
     """A model that is worth its terms. ``held``: its energy on held-out data, under the cut that is the hardest for it;
@@ -137,10 +157,11 @@ class _Kept:
 @dataclass(frozen=True, eq=False)
 class _Look:
     """``cuts``: what is held out, each with the held-out residual (n,) of the ``current`` model; ``calm``: the search on
-    predictable trials."""
+    predictable trials, ``brief``: on the beginning of these."""
 
     search: Search
     calm: Search
+    brief: Search
     own: int
     pool: tuple[Candidate, ...]
     current: Current
@@ -196,8 +217,13 @@ class _Look:
             (first,) = follow_valley(self.calm, [(model, u)], one, PRIOR, widths=widths)
             if first.energy > share * held:
                 return None
-        (fit,) = follow_valley(self.calm, [(model, u)], self.calm.everything, PRIOR, widths=widths)
-        return over_ridges(self.calm, fit, PRIOR)
+        (fit,) = follow_valley(self.brief, [(model, u)], self.brief.everything, PRIOR, widths=widths)
+        fit = over_ridges(self.brief, fit, PRIOR)
+        if self.brief is self.calm:
+            return fit
+        # Of long trials the beginning tells in which valley to look.
+        (fit,) = follow_valley(self.calm, [(model, fit.u)], self.calm.everything, PRIOR, widths=(AGAIN,))
+        return fit
 
     def _one_sided(self, fit: Fit) -> bool:
         """Whether much more than noise is left, and most of it at one joint."""
@@ -210,22 +236,46 @@ class _Look:
         return bool(at.max() > MOST_OF_IT * above.sum())
 
     def _worth(self, fit: Fit, ties: Mapping[str, list[str]]) -> _Kept | None:
-        """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data."""
-        kept = pruned(self.calm, fit, self.own, len(self.pool))
+        """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data; without
+        what is at joints that are better off without it, if that is better."""
+        kept = pruned(self.calm, fit, self.own, len(self.pool), self.cuts[0][0])
+        cut, without = self.cuts[0]
+        (held,) = cross_fit(self.search, [(Model(kept.parts), kept.u)], cut)
+        less = self._where_it_pays(kept, without, held.residual)
+        if less is None:
+            return self._judged(kept, held, ties)
+        (other,) = cross_fit(self.search, [(Model(less.parts), less.u)], cut)
+        kept, held = (less, other) if other.energy < held.energy else (kept, held)
+        return self._judged(kept, held, ties)
+
+    def _where_it_pays(self, kept: Current, without: Array, held: Array) -> Current | None:
+        """The model without what was added at joints whose held-out data are worse for it by more than luck, fitted anew; None
+        where there is no such joint, or nothing else."""
+        problem, names = self.search.problem, {c.name for c in self.current.parts}
+        gains = gains_of(problem, kept.parts, without, held)
+        stay = [
+            k
+            for k, c in enumerate(kept.parts)
+            if k < self.own or c.name in names or gains[k] >= -self.luck(float(held @ held))
+        ]
+        if len(stay) == len(kept.parts) or {kept.parts[k].name for k in stay} <= names:
+            return None
+        model = Model(tuple(kept.parts[k] for k in stay))
+        start = _values(kept.u, Model(kept.parts).places, stay)
+        (fit,) = follow_valley(self.calm, [(model, start)], self.calm.everything, PRIOR, widths=(AGAIN,))
+        return Current(fit.model.parts, fit.u)
+
+    def _judged(self, kept: Current, first: HeldOut, ties: Mapping[str, list[str]]) -> _Kept | None:
+        """A model by what it leaves of what is held out, ``first`` under the first cut; None where it is not worth its terms."""
         names = {c.name for c in self.current.parts}
         added = tuple(c for c in kept.parts if c.name not in names)
         if not added:
             return None
-        model = Model(kept.parts)
         # Many small effects may each be below the resolution, and not all together.
-        problem, noise, worst, energy = (
-            self.search.problem,
-            float(self.search.problem.floor.mean()),
-            self.cuts[0][0],
-            0.0,
-        )
+        problem, noise, model = self.search.problem, float(self.search.problem.floor.mean()), Model(kept.parts)
+        worst, energy = self.cuts[0][0], 0.0
         for cut, without in self.cuts:
-            (held,) = cross_fit(self.search, [(model, kept.u)], cut)
+            held = first if cut is first.cut else cross_fit(self.search, [(model, kept.u)], cut)[0]
             judged = judge(problem, without, held, Proposal(added), model, len(self.pool), noise)
             if not judged.earned:
                 return None
@@ -258,8 +308,7 @@ class _Look:
         return self._worth(best, {best.model.parts[-1].name: ties})
 
     def _others(self, model: Model) -> list[Candidate]:
-        names = {c.name for c in model.parts}
-        return [c for c in self.pool if c.name not in names]
+        return not_said(self.search.problem.robot, model.parts, self.pool)
 
     def steps(self, found: _Kept) -> Everywhere:
         """One step a kind of effect, those that matter most first; kinds that help only together, or are better than the model
@@ -278,8 +327,9 @@ class _Look:
             chosen = sorted({*chosen, *(k for k, c in enumerate(kept.parts) if c.effect.name == kind)})
             taken.append(chosen)
         starts = [(Model(tuple(kept.parts[k] for k in some)), _values(kept.u, places, some)) for some in taken]
-        fitted = cross_fit(search, starts, found.cut)
-        energies = [float(held.residual @ held.residual) for held in fitted]
+        # Shown is how far each step comes, and most have many values: they are fitted once.
+        fitted = held_by_slopes(search, fit_all(search, starts, None, SLOPES[2:], PRIOR), found.cut)
+        energies = [held.energy for held in fitted]
         last, model, held_energy = self._as_far(found, starts, energies)
         for k in range(last + 1):
             chosen, (part_of_it, start), held = taken[k], starts[k], fitted[k]

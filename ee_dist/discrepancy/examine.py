@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from ee_dist.discrepancy.assumed import assumed_drives
+from ee_dist.discrepancy.evidence.by_joint import gains_of
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, no_more_than_noise, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
@@ -39,6 +40,8 @@ WORTH_JUDGING = 0.4
 AT_LEAST."""
 AT_LEAST = 4
 Looked = TypeVar("Looked", Screened, Scanned)
+MANY_JOINTS = 3
+"""Joints from which an effect at each of them is judged joint by joint too."""
 FAMILIES_TRIED = 4
 """Effects whose members at all joints, each with a value of its own, are tried together."""
 
@@ -187,8 +190,10 @@ def under(
     base: Array,
     tried: int,
     leading: Array | None = None,
+    whole: bool = True,
 ) -> list[Judged]:
-    """Proposals fitted together with the current model and judged under one cut, ranked."""
+    """Proposals fitted together with the current model and judged under one cut, ranked. ``whole``: effects at many joints also
+    at those alone where they pay."""
     models = [(Model((*current.parts, *p.parts)), np.concatenate([current.u, u])) for p, u in starts]
     without = base
     if len(current.u):
@@ -197,19 +202,44 @@ def under(
         same = leading if len(current.u) >= LARGE else None
         without = cross_fit(search, [(Model(current.parts), current.u)], cut, leading=same)[0].residual
     outcomes = cross_fit(search, models, cut, leading=leading)
-    return ranked(
-        [
-            judge(search.problem, without, outcome, p, model, tried)
-            for outcome, (p, _), (model, _) in zip(outcomes, starts, models, strict=True)
-        ]
-    )
+    found = [
+        judge(search.problem, without, outcome, p, model, tried)
+        for outcome, (p, _), (model, _) in zip(outcomes, starts, models, strict=True)
+    ]
+    fewer = _where_they_pay(search.problem, without, found) if whole else []
+    if fewer:
+        found += under(search, current, fewer, cut, base, tried, leading, whole=False)
+    return ranked(found)
+
+
+def _where_they_pay(problem: Problem, without: Array, found: Sequence[Judged]) -> list[tuple[Proposal, Array]]:
+    """Effects at many joints, each with a value of its own, without the joints at which held-out data do not want them, where
+    that may be better than all that was judged: and values to start from."""
+    best = max((j.gain for j in found if j.earned), default=0.0)
+    total, out = float(without @ without), []
+    for j in found:
+        if len(j.proposal.parts) < MANY_JOINTS or not np.isfinite(j.gain):
+            continue
+        gains = gains_of(problem, j.proposal.parts, without, j.residual)
+        pays = gains > 0
+        if pays.sum() < 2 or pays.all() or float(gains[pays].sum()) <= best * total:
+            continue
+        parts = tuple(c for c, p in zip(j.proposal.parts, pays, strict=True) if p)
+        places = Model(j.proposal.parts).places
+        values = np.concatenate([j.own[place] for place, p in zip(places, pays, strict=True) if p])
+        kinds = {c.effect.name for c in parts}
+        out.append((Proposal(parts, f"{kinds.pop()}@each of {len(parts)} joints" if len(kinds) == 1 else ""), values))
+    return out
 
 
 def strictest(first: Sequence[Judged], second: Sequence[Judged]) -> list[Judged]:
-    """Under two cuts an effect must earn its place under both; the one under which it did worse speaks for it."""
+    """Under two cuts an effect must earn its place under both; the one under which it did worse speaks for it. What only one of
+    them asked for, at the joints where it pays there, has not."""
     other = {j.name: j for j in second}
     out = []
     for j in first:
+        if j.name not in other:
+            continue
         k = other[j.name]
         out.append(k if (not k.earned and j.earned) or (k.earned == j.earned and k.explained < j.explained) else j)
     return ranked(out)

@@ -26,7 +26,7 @@ from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was,
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung, Twin
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import told_only, without_neutral, without_useless
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal, on_top_of, values_of
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.scan import scan
@@ -35,6 +35,7 @@ from ee_dist.discrepancy.search.search import Progress, Search, quiet
 from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 FEW = 1
@@ -101,7 +102,7 @@ def improve(
         while sum(bool(r.added) for r in ladder) < most:
             has = (*search.fixed, *current.hypothesis)
             no_better = {c.name for p in worse for c in p.parts}
-            others = [c for c in _offered(pool, current, ladder) if c.name not in no_better]
+            others = [c for c in _offered(problem.robot, pool, current, ladder) if c.name not in no_better]
             others = on_top_of(problem.robot, has, others)
             last = examine(search, current, others, effort)
             if own and len(current.parts) == own:
@@ -114,14 +115,17 @@ def improve(
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
                 found = everywhere(search, current, own, pool, travelling(problem), spread > 0, alike)
-                looked, anew, beside = len(current.parts), anew + (spread > 0), special
-                # Where a single one does more than all of them, it goes first.
-                if found is not None and (best is None or found.held < float(best.held.sum())):
+                looked = len(current.parts)
+                # Where a single one does more than all of them, it goes first, and they are looked for beside it.
+                first = found is not None and best is not None and found.held >= float(best.held.sum())
+                if not first:
+                    anew, beside = anew + (spread > 0), special
+                if found is not None and not first:
                     current, looked, spread = found.current, len(found.current.parts), spread + 1
                     for rung in found.rungs:
                         climb(rung)
                     continue
-                refused += 1
+                refused += found is None
             if best is None:
                 other = None
                 if exchanges < EXCHANGES and len(current.u) < LARGE and leftovers(problem, last.base):
@@ -190,12 +194,11 @@ def _with_room(search: Search, fit: Fit) -> Fit:
     return fit
 
 
-def _offered(pool: Sequence[Candidate], current: Current, ladder: Sequence[Rung]) -> list[Candidate]:
+def _offered(robot: Robot, pool: Sequence[Candidate], current: Current, ladder: Sequence[Rung]) -> list[Candidate]:
     """What may be added: what is not there yet, and was not dropped as often as that. Two that stand in for one another would
     take turns to the end."""
-    names = {c.name for c in current.parts}
     dropped = Counter(name for rung in ladder for name in rung.dropped)
-    return [c for c in pool if c.name not in names and dropped[c.name] < RETURNS]
+    return [c for c in not_said(robot, current.parts, pool) if dropped[c.name] < RETURNS]
 
 
 def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:

@@ -17,7 +17,7 @@ from ee_dist.discrepancy.everywhere import FEWEST, stands_out
 from ee_dist.discrepancy.evidence.holdout import PRIOR
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY
 from ee_dist.discrepancy.examine import Current
-from ee_dist.discrepancy.search.candidates import Candidate, on_top_of, possible
+from ee_dist.discrepancy.search.candidates import Candidate, not_said, on_top_of, possible
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.screen import SHOWS
 from ee_dist.discrepancy.search.search import Search
@@ -216,6 +216,6 @@ def _special(robot: Robot, current: Current, c: Candidate) -> bool:
 def _others(robot: Robot, search: Search, current: Current, pool: Sequence[Candidate]) -> list[Candidate]:
     """What has values, is not in the model, and for which it has room; not what the model has already, shared otherwise."""
     has, kinds = (*search.fixed, *current.hypothesis), {c.effect.name for c in current.parts}
-    names = {c.name for c in current.parts}
-    new = [c for c in pool if c.size and c.name not in names and not (c.effect.name in kinds and c.members(robot))]
+    others = not_said(robot, current.parts, pool)
+    new = [c for c in others if c.size and not (c.effect.name in kinds and c.members(robot))]
     return possible(robot, has, on_top_of(robot, has, new))

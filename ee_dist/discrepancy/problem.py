@@ -198,6 +198,11 @@ class Problem(ABC):
         """How predictable each trial is, by any scale; equal where the way does not know."""
         return (1.0,) * len(self.measured)
 
+    def beginning(self, seconds: float) -> Problem:
+        """The same problem with the first ``seconds`` of each trial alone, for what only looks where to go; itself where that
+        would save little, or where a way cannot cut its trials."""
+        return self
+
     # -- names of the layout, which everything reads -------------------------------------------------------------------
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, cross_fit
+from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, cross_fit, held_by_slopes
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.evidence.judge import WORTH, least_energy
 from ee_dist.discrepancy.examine import Current
@@ -28,28 +28,28 @@ ROUNDS = 3
 """How often terms are left out and the rest is fitted anew."""
 
 
-def pruned(search: Search, fit: Fit, own: int, tried: int, newest: int = 0) -> Current:
+def pruned(search: Search, fit: Fit, own: int, tried: int, cut: Cut, newest: int = 0) -> Current:
     """The model without the terms whose values these data do not tell from neutral, fitted anew: one after the other the term
-    that would cost least, by its value and what the others can make up for (Wald's test). The first ``own`` and the
-    ``newest`` parts stay."""
+    that would cost least, by its value and what the others can make up for (Wald's test), as many of them as held-out data
+    allow. The first ``own`` and the ``newest`` parts stay."""
     for _ in range(ROUNDS):
-        keep, u = _to_keep(search, fit, own, tried, newest)
-        if len(keep) == len(fit.model.parts):
+        gone = _useless(search, fit, own, tried, newest)
+        after = [_without(fit, [k for unit in gone[:n] for k in unit]) for n in _halves(len(gone))]
+        count = _as_many(search.among(None), fit, dict(zip(_halves(len(gone)), after, strict=True)), cut, tried, True)
+        if not count:
             break
-        places = fit.model.places
-        model = Model(tuple(fit.model.parts[k] for k in keep))
-        start = np.concatenate([u[places[k]] for k in keep] or [np.zeros(0)])
-        (fit,) = follow_valley(search, [(model, start)], fit.mask, PRIOR, widths=(AGAIN,))
+        less = after[_halves(len(gone)).index(count)]
+        (fit,) = follow_valley(search, [(less.model, less.u)], fit.mask, PRIOR, widths=(AGAIN,))
     return Current(fit.model.parts, fit.u)
 
 
-def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> tuple[list[int], Array]:
-    """Numbers of the parts to keep, and values (P,) of all to start from, into which went what the others make up for."""
+def _useless(search: Search, fit: Fit, own: int, tried: int, newest: int) -> list[list[int]]:
+    """Numbers of the parts that may go, in the order in which they go; what goes together is one entry."""
     places, luck = fit.model.places, _luck(search.problem, fit)
     slopes = fit.slopes / np.sqrt(luck)[:, None]
     prior = PRIOR / max(float(luck.mean()), 1e-12)
     kept, units = list(range(len(fit.model.parts))), _units(fit.model, own, len(fit.model.parts) - newest)
-    values = fit.u.copy()
+    values, out = fit.u.copy(), []
     while units:
         at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
         normal = slopes[:, at].T @ slopes[:, at] + prior * np.eye(len(at))
@@ -67,9 +67,28 @@ def _to_keep(search: Search, fit: Fit, own: int, tried: int, newest: int) -> tup
         # What the others make up for goes into them, as far as slopes tell.
         mine = where[cheapest]
         values[at] = u - _made_up_for(inverse, mine, u)
-        gone = units.pop(cheapest)
-        kept = [k for k in kept if k not in gone]
-    return kept, values
+        out.append(units.pop(cheapest))
+        kept = [k for k in kept if k not in out[-1]]
+    return out
+
+
+def _halves(count: int) -> list[int]:
+    """All, half, a quarter and so on, to one."""
+    return [count >> k for k in range(count.bit_length())]
+
+
+def _as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: int, each: bool = False) -> int:
+    """How many terms may go, of the numbers in ``fewer`` with the models that are left then, most first: without so many held-out
+    data are foretold as well as by the whole model, give or take luck once, or for ``each`` of them. Slopes may mislead where a
+    joint sticks; and where much is left at one joint, luck is taken to be large at all that moves it. 0: none."""
+    todo = list(fewer)
+    for some in (todo[:1], todo[1:]):
+        if some:
+            known, *others = held_by_slopes(search, [whole, *(fewer[n] for n in some)], cut)
+            for n, held in zip(some, others, strict=True):
+                if _as_good(search, known.energy, held.energy, cut, tried, n if each else 1):
+                    return n
+    return 0
 
 
 def _made_up_for(inverse: Array, gone: Array, u: Array) -> Array:
@@ -123,9 +142,8 @@ def without_useless(
         keep = np.delete(np.arange(len(current.u)), places[k])
         models.append((Model((*current.parts[:k], *current.parts[k + 1 :])), current.u[keep]))
     whole, *without = cross_fit(search, models, cut)
-    energy = float((whole.residual**2).sum())
-    allowed = _allowed(problem, energy, cut, tried)
-    costs = [float((h.residual**2).sum()) - energy for h in without]
+    allowed = _allowed(problem, whole.energy, cut, tried)
+    costs = [h.energy - whole.energy for h in without]
     cheapest = int(np.argmin(costs))
     if costs[cheapest] > allowed * 0.5:
         return current, ()
@@ -141,30 +159,22 @@ def _by_slopes(
     """The same where trying each term by itself would take long: all those that slopes call useless at once, unless held-out
     data say otherwise."""
     (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 1, WIDTHS[-1:])
-    kept = pruned(search, fit, own, tried, added)
+    kept = pruned(search, fit, own, tried, cut, added)
     names = {c.name for c in kept.parts}
-    gone = tuple(c.name for c in current.parts if c.name not in names)
-    if gone and not _as_good(search, _held_energy(search, current, cut), kept, cut, tried):
-        return Current(fit.model.parts, fit.u), ()
-    return kept, gone
+    return kept, tuple(c.name for c in current.parts if c.name not in names)
 
 
-def _held_energy(search: Search, current: Current, cut: Cut) -> float:
-    """Energy of a model on what its fits had not seen."""
-    (held,) = cross_fit(search, [(Model(current.parts), current.u)], cut)
-    return float((held.residual**2).sum())
-
-
-def _as_good(search: Search, energy: float, less: Current, cut: Cut, tried: int) -> bool:
-    """Whether held-out data do without what a model has less than another, of that ``energy`` on them."""
+def _as_good(search: Search, energy: float, with_fewer: float, cut: Cut, tried: int, count: int) -> bool:
+    """Whether held-out data, on which a model has that ``energy`` and the same with fewer terms ``with_fewer``, do without the
+    others. What noise makes of one of them is what it may make of each of ``count``."""
     # Many small effects may each be below the resolution at which channels are compared, and not all together.
-    allowed = _allowed(search.problem, energy, cut, tried, float(search.problem.floor.mean()))
-    return _held_energy(search, less, cut) - energy <= allowed
+    allowed = _allowed(search.problem, energy, cut, tried, float(search.problem.floor.mean()), count)
+    return with_fewer - energy <= allowed
 
 
-def _allowed(problem: Problem, energy: float, cut: Cut, tried: int, least: float = 1.0) -> float:
-    """Held-out energy that leaving a term out may cost; ``least``: the variance that counts in a value."""
-    luck = least_energy(tried) * max(least, energy / len(problem.floor))
+def _allowed(problem: Problem, energy: float, cut: Cut, tried: int, least: float = 1.0, count: int = 1) -> float:
+    """Held-out energy that leaving ``count`` terms out may cost; ``least``: the variance that counts in a value."""
+    luck = count * least_energy(tried) * max(least, energy / len(problem.floor))
     if cut.name == WINDOWS:
         return luck
     return max(luck, 0.5 * WORTH * max(energy - float(problem.floor.sum()), 0.0))
@@ -177,23 +187,21 @@ def told_only(
     names: one after the other, the least told first, for what one of two alike leaves makes the other plain; as many of them
     as held-out data allow. The first ``own`` parts stay."""
     gone: list[tuple[str, ...]] = []
-    models: list[Current] = []
+    fits: list[Fit] = []
     while True:
         (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 2, (AGAIN,))
-        models, found = [*models[:-1], Current(fit.model.parts, fit.u)], len(gone)
+        fits, found = [*fits[:-1], fit], len(gone)
         # As far as slopes tell what goes is made up for by the rest; then all that stays is fitted anew.
         while least := _least_told(search.problem, fit, own, open_only):
             gone.append(tuple(fit.model.parts[k].name for k in least))
             fit = _without(fit, least)
-            models.append(Current(fit.model.parts, fit.u))
+            fits.append(fit)
+        current = Current(fit.model.parts, fit.u)
         if len(gone) == found:
             break
-        current = models[-1]
-    # Slopes may mislead where a joint sticks.
-    energy = _held_energy(search, models[0], cut) if gone else 0.0
-    while gone and not _as_good(search, energy, models[len(gone)], cut, tried):
-        gone = gone[: len(gone) // 2]
-    return models[len(gone)], tuple(name for names in gone for name in names)
+    gone = gone[: _as_many(search, fits[0], {n: fits[n] for n in _halves(len(gone))}, cut, tried)]
+    kept = fits[len(gone)]
+    return Current(kept.model.parts, kept.u), tuple(name for names in gone for name in names)
 
 
 def _least_told(problem: Problem, fit: Fit, own: int, open_only: bool) -> list[int]:

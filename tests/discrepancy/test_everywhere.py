@@ -111,12 +111,37 @@ def test_all_that_is_a_little_wrong_is_found_and_nothing_else(robot):
     assert {t.effect for r in found.rungs for t in r.added} == set(truth)
 
 
+@pytest.mark.parametrize("rests", [False, True])
+def test_of_long_trials_the_beginning_tells_where_to_look_unless_nothing_moves_there(robot, rests):
+    truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2, "zero_offset": -0.15, "part_mass": 0.12}
+
+    class Long(Curved):
+        asked = 0
+
+        def residuals(self, hypotheses, trials=None):
+            self.asked += len(hypotheses)
+            return super().residuals(hypotheses, trials)
+
+    def looked_at(**more) -> tuple[Long, object]:
+        problem = type("Long", (Long,), more)(robot, truth)
+        return problem, look(problem, pool_of(robot))
+
+    brief = Long(robot, {} if rests else truth, seed=1)
+    plain, first = looked_at()
+    problem, found = looked_at(beginning=lambda _self, _seconds: brief)
+    assert names(found) == set(truth) and names(first) == set(truth)
+    assert brief.asked > 0
+    assert (problem.asked == plain.asked) == rests
+    if not rests:
+        assert problem.asked < plain.asked
+
+
 def test_kinds_that_make_what_is_held_out_worse_are_left_out_again(robot):
     truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2}
     problem, pool = Curved(robot, truth), pool_of(robot)[:2]
     search, cut = Search(problem), travelling(problem)[0]
     model = Current(tuple(pool), np.array([0.1, 0.2]))
-    looked = _Look(search, search, 0, tuple(pool), Current(), ((cut, search.base()),))
+    looked = _Look(search, search, search, 0, tuple(pool), Current(), ((cut, search.base()),))
     kept = _Kept(model, 5.0, cut, {})
     starts = [(Model(tuple(pool[:k])), model.u[:k]) for k in (1, 2)]
     assert looked._as_far(kept, starts, [9.0, 5.0]) == (1, model, 5.0)
@@ -162,7 +187,7 @@ def test_the_models_own_terms_stay_and_useless_ones_go(robot):
     search = Search(problem)
     few = [c for c in pool_of(robot) if c.effect.name in PLAIN[:3]]
     (fit,) = follow_valley(search, [(Model(tuple(few)), np.zeros(3))], search.everything, 1.0)
-    kept = pruned(search, fit, 1, 20)
+    kept = pruned(search, fit, 1, 20, travelling(problem)[0])
     assert [c.effect.name for c in kept.parts] == ["coulomb_friction", "viscous_friction"]
 
 

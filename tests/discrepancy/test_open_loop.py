@@ -166,3 +166,21 @@ def test_errors_are_told_in_the_units_of_the_channels_too() -> None:
             worst = max(worst, float(np.sqrt(np.mean((series.measured - series.predicted) ** 2))))
     before, after = (float(word) for word in re.findall(r"([\d.e+-]+) mrad", line))
     assert 0 < after < 0.2 * before and before <= 1001 * worst
+
+
+def test_the_beginning_of_trials_is_the_same_problem_cut_short() -> None:
+    sample = samples()["pendulum"]
+    whole = problem_by("open_loop", measure(sample, sample.hidden), sample.robot)
+    seconds = min(float(t.log.times_s[-1]) for t in whole.measured)
+    brief = whole.beginning(0.4 * seconds)
+    assert isinstance(brief, OpenLoop) and isinstance(whole, OpenLoop)
+    assert brief.trials == whole.trials and brief.channels == whole.channels
+    for short, full in zip(brief.measured, whole.measured, strict=True):
+        assert short.log.times_s[-1] < 0.4 * seconds
+        np.testing.assert_array_equal(short.log.sensors, full.log.sensors[: len(short.log)])
+    for hypothesis in ((), sample.hidden):
+        (found,), (there,) = brief.residuals([hypothesis]), whole.residuals([hypothesis])
+        for k in range(len(whole.trials)):
+            first = brief.raw_blocks(k, found)
+            np.testing.assert_allclose(first, whole.raw_blocks(k, there)[: len(first)], atol=1e-6)
+    assert whole.beginning(0.8 * seconds) is whole, "to save a fifth is not worth another look"

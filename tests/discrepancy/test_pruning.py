@@ -31,7 +31,7 @@ def test_a_fit_stays_as_it_was_when_a_model_is_pruned_from_it() -> None:
     search = Search(Linear((term("coulomb_friction", JOINTS[0], torque_nm=0.3),), motions=4))
     fit = fitted(search)
     before = fit.u.copy()
-    kept = pruned(search, fit, 0, 50)
+    kept = pruned(search, fit, 0, 50, travelling(search.problem)[0])
     assert 0 < len(kept.parts) < len(JOINTS)
     assert np.array_equal(fit.u, before)
 

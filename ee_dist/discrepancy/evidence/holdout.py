@@ -15,7 +15,8 @@ from ee_dist.discrepancy.problem import Index, Mask, Problem
 from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.discrepancy.search.slopes import WIDTHS, Leading
+from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.fixture import STAND
 from ee_dist.trials.log import Array
 
@@ -74,6 +75,10 @@ class HeldOut:
     residual: Array
     seen: float
     fits: tuple[Fit, ...]
+
+    @property
+    def energy(self) -> float:
+        return float(self.residual @ self.residual)
 
 
 def windows(problem: Problem) -> Cut:
@@ -146,10 +151,10 @@ def cross_fit(
     starts: Sequence[tuple[Model, Array]],
     cut: Cut,
     widths: Sequence[float] = WIDTHS[2:],
-    leading: Array | None = None,
+    leading: Leading = None,
 ) -> list[HeldOut]:
-    """Each (model, start) fitted in every turn on what is not held out, and judged on the rest. ``leading`` (n, P0): slopes of
-    the first values, where all models have these in common."""
+    """Each (model, start) fitted in every turn on what is not held out, and judged on the rest. ``leading``: slopes that are
+    known (see slopes.py)."""
     problem = search.problem
     residuals = [np.zeros(len(problem.segment_of)) for _ in starts]
     seen, count = np.zeros(len(starts)), 0
@@ -165,6 +170,19 @@ def cross_fit(
             seen[i] += fit.energy
             fits[i].append(fit)
     return [HeldOut(cut, r, float(s) / max(count, 1), tuple(f)) for r, s, f in zip(residuals, seen, fits, strict=True)]
+
+
+def held_by_slopes(search: Search, fits: Sequence[Fit], cut: Cut) -> list[HeldOut]:
+    """Models that were fitted to all data, judged on what is held out: many values follow in each turn by the slopes that are
+    known, few are fitted anew. What the values do is simulated all the same."""
+    known = [i for i, f in enumerate(fits) if len(f.u) >= LARGE and f.mask.all()]
+    others = [i for i in range(len(fits)) if i not in known]
+    found: dict[int, HeldOut] = {}
+    for some, leading in ((known, [fits[i].slopes for i in known]), (others, None)):
+        if some:
+            held = cross_fit(search, [(fits[i].model, fits[i].u) for i in some], cut, leading=leading)
+            found |= dict(zip(some, held, strict=True))
+    return [found[i] for i in range(len(fits))]
 
 
 def _unsure(search: Search, starts: Sequence[tuple[Model, Array]]) -> float:

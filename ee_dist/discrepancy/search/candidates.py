@@ -194,6 +194,18 @@ def on_top_of(robot: Robot, terms: Hypothesis, pool: Iterable[Candidate]) -> lis
     ]
 
 
+def not_said(robot: Robot, parts: Iterable[Candidate], pool: Iterable[Candidate]) -> list[Candidate]:
+    """Those of the pool that a model of these ``parts`` does not have yet: nor what all members of a group share where each has a
+    value of its own, for then only sums would tell."""
+    names = {c.name for c in parts}
+
+    def said(c: Candidate) -> bool:
+        members = c.members(robot)
+        return c.name in names or (bool(members) and all(f"{c.effect.name}@{m}" in names for m in members))
+
+    return [c for c in pool if not said(c)]
+
+
 def possible(robot: Robot, terms: Hypothesis, pool: Iterable[Candidate]) -> list[Candidate]:
     """Those of the pool for which a model of these ``terms`` has room, and as far as it has: friction can differ by direction
     by as much as there is."""

@@ -9,7 +9,7 @@ import numpy as np
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import WIDTHS, follow_slopes
+from ee_dist.discrepancy.search.slopes import WIDTHS, Leading, follow_slopes
 from ee_dist.discrepancy.search.valley import ITERATIONS, LARGE, follow_valley
 from ee_dist.trials.log import Array
 
@@ -23,10 +23,10 @@ def fit_all(
     mask: Mask | None = None,
     widths: Sequence[float] = WIDTHS,
     prior: float = 0.0,
-    leading: Array | None = None,
+    leading: Leading = None,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given. ``leading``: known
-    slopes of the first values (see slopes.py). Models of many values are fitted by valley.py."""
+    slopes (see slopes.py). Models of many values are fitted by valley.py."""
     chosen = search.everything if mask is None else mask
     large = [i for i, (_, u) in enumerate(starts) if leading is None and len(u) >= LARGE]
     if large:

@@ -58,12 +58,16 @@ class _Run:
     """Whether the last step came to what slopes foretold: the next would lead nowhere that data tell from there,"""
     flat: bool = False
     """or slopes foretold nothing."""
+    known: Array | None = None
+    """(n, P0) slopes of the first values that are not taken anew."""
 
     def __post_init__(self) -> None:
         self.side = np.ones(len(self.u))
         """(P,) to which side of each value slopes are taken next."""
 
 
+Leading = Array | list[Array] | None
+"""(n, P0) slopes of the first P0 values of all models alike, or those of each: where they are known they are not taken anew."""
 Evaluate = Callable[[Sequence[tuple[_Run, Array]]], list[tuple[float, Array]]]
 
 
@@ -73,17 +77,19 @@ def follow_slopes(
     mask: Mask,
     widths: Sequence[float] = WIDTHS,
     prior: float = 0.0,
-    leading: Array | None = None,
+    leading: Leading = None,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given.
 
     ``prior``: energy that a value at its bound costs beside one at neutral, so that a value which these data do not
-    determine says nothing about others. ``leading`` (n, P0): slopes of the first P0 values, where they are known for all
-    models alike. Only trials with values in the mask are simulated on the way.
+    determine says nothing about others. Only trials with values in the mask are simulated on the way.
     """
     whole, search = search, search.within(mask)
-    known = None if leading is None else leading[mask]
-    runs = [_Run(m, np.clip(np.asarray(u, float), m.lower, m.upper)) for m, u in starts]
+    known = leading if isinstance(leading, list) else [leading] * len(starts)
+    runs = [
+        _Run(m, np.clip(np.asarray(u, float), m.lower, m.upper), known=None if k is None else k[mask])
+        for (m, u), k in zip(starts, known, strict=True)
+    ]
 
     def evaluate(points: Sequence[tuple[_Run, Array]]) -> list[tuple[float, Array]]:
         if not points:
@@ -101,10 +107,10 @@ def follow_slopes(
         going = [run for run in moving if not (run.straight or run.flat)]
         for run in going:
             run.width = width
-        _iterate(going, mask, evaluate, whole.problem, known, prior)
+        _iterate(going, mask, evaluate, whole.problem, prior)
         search.progress("fitting", (step + 1) / len(widths))
     if len(widths) > 1:
-        _finer(moving, mask, evaluate, whole.problem, known, prior)
+        _finer(moving, mask, evaluate, whole.problem, prior)
     out = []
     if search is not whole:
         for run, r in zip(runs, whole.residuals([run.model.hypothesis(run.u) for run in runs]), strict=True):
@@ -122,7 +128,6 @@ def _finer(
     mask: Mask,
     evaluate: Evaluate,
     problem: Problem,
-    known: Array | None,
     prior: float,
 ) -> None:
     """Finer steps for those that still come nearer by them: where sensors are precise and one effect is all that is missing,
@@ -134,15 +139,13 @@ def _finer(
             break
         for run in runs:
             run.width /= max(NARROWER, run.moved) if run.misses else NARROWER
-        _iterate(runs, mask, evaluate, problem, known, prior)
+        _iterate(runs, mask, evaluate, problem, prior)
 
 
-def _iterate(
-    runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Problem, known: Array | None, prior: float
-) -> None:
+def _iterate(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Problem, prior: float) -> None:
     """Slopes over each run's width, and steps along them."""
     before, floor = [run.energy for run in runs], float(problem.floor[mask].sum())
-    _slopes(runs, mask, evaluate, problem, known)
+    _slopes(runs, mask, evaluate, problem)
     _steps(runs, mask, evaluate, floor, prior)
     for run, energy in zip(runs, before, strict=True):
         paid = run.energy < (energy - SAME if energy <= NEAR * floor else STILL * energy)
@@ -156,18 +159,12 @@ def weighed(problem: Problem, residual: Array) -> tuple[Array, Array]:
     return smooth, np.minimum(np.abs(residual) / np.maximum(np.abs(smooth), 1e-12), 1.0)
 
 
-def _slopes(
-    runs: Sequence[_Run],
-    mask: Mask,
-    evaluate: Evaluate,
-    problem: Problem,
-    leading: Array | None = None,
-) -> None:
+def _slopes(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Problem) -> None:
     """Derivatives over the run's width (narrower for a small value), towards the inside; a better point found is taken. Those of
-    the first values may be known (``leading``)."""
+    the first values may be known."""
     points = []
-    first = 0 if leading is None else leading.shape[1]
-    for run in runs:
+    firsts = [0 if run.known is None else run.known.shape[1] for run in runs]
+    for run, first in zip(runs, firsts, strict=True):
         for k in range(first, len(run.u)):
             h = min(run.width, 0.3 * abs(run.u[k]) + 0.2 * run.width)
             u = run.u.copy()
@@ -176,9 +173,9 @@ def _slopes(
             points.append((run, np.clip(u, run.model.lower, run.model.upper)))
     found = evaluate(points)
     at = 0
-    for run in runs:
+    for run, first in zip(runs, firsts, strict=True):
         assert run.residual is not None
-        columns = [] if leading is None else list(leading.T)
+        columns = [] if run.known is None else list(run.known.T)
         best = (run.energy, run.u, run.residual)
         smooth, weights = weighed(problem, run.residual)
         moved = 0.0

@@ -27,10 +27,10 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
     report,
     rollout_of,
 )
-from ee_dist.discrepancy.ways.open_loop.scale import channel_scale
+from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale
 from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, frozen, repeating
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
-from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.effects.catalogue import Hypothesis, applied, apply
 from ee_dist.effects.groups import members_of
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
@@ -44,6 +44,8 @@ SOFT = 6.0
 """Residuals beyond this many standard deviations count by their logarithm."""
 TOGETHER = 4_000_000
 """Residual values that are computed together: of long logs those of a few hypotheses."""
+SAVED = 0.6
+"""Share of the rows that the beginning of trials may have, to be worth a look by itself."""
 COMMAND_SHARE = 0.005
 """Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
 TINY = 0.25
@@ -74,7 +76,7 @@ class OpenLoop(Problem):
     are a segment. Rows that an import filled in are simulated and not compared. ``unmodelled`` widens the scales by what a
     calibrated model is known to leave; ``gained``: energy that an effect took off an untouched robot.
     ``before``: what the model is believed to have; the spread of ``members`` neighbours of that model weighs the
-    residuals.
+    residuals. ``scale``: of the channels, where it is known.
     """
 
     way = "open_loop"
@@ -90,6 +92,7 @@ class OpenLoop(Problem):
         gained: float = 0.0,
         before: Hypothesis = (),
         members: int = MEMBERS,
+        scale: Scale | None = None,
     ) -> None:
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
         spacing = reading_s(trials)
@@ -99,9 +102,9 @@ class OpenLoop(Problem):
         window = min(window, sum(self._rows) // 2)
         self.window = max(1, window // self.block) * self.block
         block, window = self.block, self.window
-        self._members = members
+        self._members, self._before = members, before
         self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}
-        self.scale = channel_scale(robot, trials)
+        self.scale = scale or channel_scale(robot, trials)
         self._unmodelled, self.gained, self.calibrated = unmodelled or {}, gained, unmodelled is not None
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self._looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
@@ -121,6 +124,24 @@ class OpenLoop(Problem):
     @property
     def trust(self) -> tuple[float, ...]:
         return self._trust
+
+    def beginning(self, seconds: float) -> Problem:
+        rows = [int(np.searchsorted(t.log.times_s, t.log.times_s[0] + seconds)) for t in self.measured]
+        if self.looped or sum(rows) > SAVED * sum(len(t.log) for t in self.measured):
+            return self
+        # What a stretch at rest says of the noise of a channel is not what the whole log says.
+        return OpenLoop(
+            [replace(t, log=t.log.head(n)) for t, n in zip(self.measured, rows, strict=True)],
+            self.robot,
+            self.evaluator,
+            self.block,
+            self.window,
+            self._unmodelled or None,
+            self.gained,
+            self._before,
+            self._members,
+            self.scale,
+        )
 
     def _weigh(self, before: Hypothesis) -> None:
         """Standard deviations of block means (blocks, S) and of the log of roughness (windows, S), trial by trial."""
@@ -266,7 +287,7 @@ class OpenLoop(Problem):
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
-        models = [apply(self.robot, h) for h in hypotheses]
+        models = applied(self.robot, hypotheses)
         chosen = list(range(len(self.measured))) if trials is None else list(trials)
         out = np.zeros((len(models), len(self.segment_of)))
         size = max(1, TOGETHER // max(1, len(self.segment_of)))
