@@ -36,6 +36,15 @@ def test_a_fit_stays_as_it_was_when_a_model_is_pruned_from_it() -> None:
     assert np.array_equal(fit.u, before)
 
 
+def test_what_held_out_data_want_stays_however_large_luck_is_taken_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where much is left at one joint, what it leaves counts as doubt about all that moves it."""
+    monkeypatch.setattr("ee_dist.discrepancy.pruning._luck", lambda _, fit: np.full(int(fit.mask.sum()), 1e9))
+    hidden = tuple(term("coulomb_friction", j, torque_nm=0.3) for j in JOINTS[:2])
+    search = Search(Linear(hidden, motions=4))
+    kept = pruned(search, fitted(search), 0, 50, travelling(search.problem)[0])
+    assert {c.target for c in kept.parts} >= set(JOINTS[:2])
+
+
 def test_trials_that_are_not_searched_are_no_evidence() -> None:
     problem = Linear((term("coulomb_friction", JOINTS[0], torque_nm=0.3),), motions=3)
     first = Search(problem, trials=(0,))
