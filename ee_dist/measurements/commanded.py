@@ -8,7 +8,7 @@ import numpy as np
 
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.robot_channels import command_kind
-from ee_dist.measurements.standing import reach_of, stands_still
+from ee_dist.measurements.standing import REST, reach_of, stands_still
 from ee_dist.measurements.suspicious import command_suspicion
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -30,6 +30,8 @@ def command_flaws(
     for joint, (asked, seen) in led.items():
         found = command_suspicion(joint, asked, seen, step_s)
         another_unit = found is not None and found[1]
+        if not another_unit and np.ptp(seen) < REST * reach_of(robot.joint(joint)):
+            found = None  # a joint that hardly moves says nothing of its commands
         follow = (other for other in led if other not in still and _alike(robot, mapping, joint, other))
         if joint in still and (not another_unit or any(follow)):
             unit = "rad" if robot.joint(joint).kind == "hinge" else "m"

@@ -51,6 +51,13 @@ def test_settings_beside_the_series_are_the_header(tmp_path: Path, format_name: 
         assert recorded.tables[0].clock == "seconds"
 
 
+@pytest.mark.parametrize("wrapped", [lambda n: [n], lambda n: {"motors": n}, lambda n: {"motors": [n]}])
+def test_names_may_stand_in_a_list_or_a_mapping_of_one(tmp_path: Path, wrapped: Callable[[list[str]], object]) -> None:
+    names = [f"k{j.title()}" for j in written.JOINTS]
+    (recorded,) = read(written.lerobot(tmp_path, names=wrapped(names)))
+    assert {f"observation.state[{n}]" for n in names} <= set(recorded.tables[0].addresses())
+
+
 def test_topics_of_a_bag_are_tables_on_one_clock(tmp_path: Path) -> None:
     (recorded,) = read(written.rosbag2_mcap(tmp_path))
     names = [t.name for t in recorded.tables]

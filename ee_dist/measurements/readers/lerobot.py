@@ -77,10 +77,10 @@ def _is_series(feature: Mapping[str, Any]) -> bool:
 
 
 def _names(feature: Mapping[str, Any]) -> tuple[str, ...]:
-    """The names of a list's numbers: a list, or a list inside a mapping."""
+    """The names of a list's numbers: a list, or a list inside a mapping or another list."""
     names = feature.get("names")
-    while isinstance(names, Mapping) and len(names) == 1:
-        names = next(iter(names.values()))
+    while isinstance(names, (Mapping, list)) and len(names) == 1:
+        names = next(iter(names.values() if isinstance(names, Mapping) else names))
     width = (feature.get("shape") or [1])[0]
     if isinstance(names, list) and len(names) == width and all(isinstance(n, str) for n in names) and width > 1:
         return tuple(names)
