@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.assumed import beside, puts_right
-from ee_dist.discrepancy.evidence.by_joint import gains_of
-from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, cross_fit, held_by_slopes
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, held_by_slopes
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.ladder import Rung
@@ -236,46 +235,22 @@ class _Look:
         return bool(at.max() > MOST_OF_IT * above.sum())
 
     def _worth(self, fit: Fit, ties: Mapping[str, list[str]]) -> _Kept | None:
-        """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data; without
-        what is at joints that are better off without it, if that is better."""
-        kept = pruned(self.calm, fit, self.own, len(self.pool), self.cuts[0][0])
-        cut, without = self.cuts[0]
-        (held,) = cross_fit(self.search, [(Model(kept.parts), kept.u)], cut)
-        less = self._where_it_pays(kept, without, held.residual)
-        if less is None:
-            return self._judged(kept, held, ties)
-        (other,) = cross_fit(self.search, [(Model(less.parts), less.u)], cut)
-        kept, held = (less, other) if other.energy < held.energy else (kept, held)
-        return self._judged(kept, held, ties)
-
-    def _where_it_pays(self, kept: Current, without: Array, held: Array) -> Current | None:
-        """The model without what was added at joints whose held-out data are worse for it by more than luck, fitted anew; None
-        where there is no such joint, or nothing else."""
-        problem, names = self.search.problem, {c.name for c in self.current.parts}
-        gains = gains_of(problem, kept.parts, without, held)
-        stay = [
-            k
-            for k, c in enumerate(kept.parts)
-            if k < self.own or c.name in names or gains[k] >= -self.luck(float(held @ held))
-        ]
-        if len(stay) == len(kept.parts) or {kept.parts[k].name for k in stay} <= names:
-            return None
-        model = Model(tuple(kept.parts[k] for k in stay))
-        start = _values(kept.u, Model(kept.parts).places, stay)
-        (fit,) = follow_valley(self.calm, [(model, start)], self.calm.everything, PRIOR, widths=(AGAIN,))
-        return Current(fit.model.parts, fit.u)
-
-    def _judged(self, kept: Current, first: HeldOut, ties: Mapping[str, list[str]]) -> _Kept | None:
-        """A model by what it leaves of what is held out, ``first`` under the first cut; None where it is not worth its terms."""
+        """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data."""
+        problem, noise, worst, energy = (
+            self.search.problem,
+            float(self.search.problem.floor.mean()),
+            self.cuts[0][0],
+            0.0,
+        )
+        kept = pruned(self.calm, fit, self.own, len(self.pool), worst)
         names = {c.name for c in self.current.parts}
         added = tuple(c for c in kept.parts if c.name not in names)
         if not added:
             return None
+        model = Model(kept.parts)
         # Many small effects may each be below the resolution, and not all together.
-        problem, noise, model = self.search.problem, float(self.search.problem.floor.mean()), Model(kept.parts)
-        worst, energy = self.cuts[0][0], 0.0
         for cut, without in self.cuts:
-            held = first if cut is first.cut else cross_fit(self.search, [(model, kept.u)], cut)[0]
+            (held,) = cross_fit(self.search, [(model, kept.u)], cut)
             judged = judge(problem, without, held, Proposal(added), model, len(self.pool), noise)
             if not judged.earned:
                 return None
