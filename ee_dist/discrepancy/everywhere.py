@@ -236,19 +236,19 @@ class _Look:
 
     def _worth(self, fit: Fit, ties: Mapping[str, list[str]]) -> _Kept | None:
         """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data."""
-        problem, noise, worst, energy = (
-            self.search.problem,
-            float(self.search.problem.floor.mean()),
-            self.cuts[0][0],
-            0.0,
-        )
-        kept = pruned(self.calm, fit, self.own, len(self.pool), worst)
+        kept = pruned(self.calm, fit, self.own, len(self.pool), self.cuts[0][0])
         names = {c.name for c in self.current.parts}
         added = tuple(c for c in kept.parts if c.name not in names)
         if not added:
             return None
         model = Model(kept.parts)
         # Many small effects may each be below the resolution, and not all together.
+        problem, noise, worst, energy = (
+            self.search.problem,
+            float(self.search.problem.floor.mean()),
+            self.cuts[0][0],
+            0.0,
+        )
         for cut, without in self.cuts:
             (held,) = cross_fit(self.search, [(model, kept.u)], cut)
             judged = judge(problem, without, held, Proposal(added), model, len(self.pool), noise)

@@ -190,26 +190,27 @@ def under(
     base: Array,
     tried: int,
     leading: Array | None = None,
-    whole: bool = True,
 ) -> list[Judged]:
-    """Proposals fitted together with the current model and judged under one cut, ranked. ``whole``: effects at many joints also
-    at those alone where they pay."""
-    models = [(Model((*current.parts, *p.parts)), np.concatenate([current.u, u])) for p, u in starts]
+    """Proposals fitted together with the current model and judged under one cut, ranked; effects at many joints also at those
+    alone where they pay."""
     without = base
     if len(current.u):
         # Of many values, fits that know the slopes stay nearer to where all data put them than fits that do not: a useless
         # effect would look right for that alone.
         same = leading if len(current.u) >= LARGE else None
         without = cross_fit(search, [(Model(current.parts), current.u)], cut, leading=same)[0].residual
-    outcomes = cross_fit(search, models, cut, leading=leading)
-    found = [
-        judge(search.problem, without, outcome, p, model, tried)
-        for outcome, (p, _), (model, _) in zip(outcomes, starts, models, strict=True)
-    ]
-    fewer = _where_they_pay(search.problem, without, found) if whole else []
-    if fewer:
-        found += under(search, current, fewer, cut, base, tried, leading, whole=False)
-    return ranked(found)
+
+    def judged(some: Sequence[tuple[Proposal, Array]]) -> list[Judged]:
+        models = [(Model((*current.parts, *p.parts)), np.concatenate([current.u, u])) for p, u in some]
+        outcomes = cross_fit(search, models, cut, leading=leading)
+        return [
+            judge(search.problem, without, outcome, p, model, tried)
+            for outcome, (p, _), (model, _) in zip(outcomes, some, models, strict=True)
+        ]
+
+    found = judged(starts)
+    fewer = _where_they_pay(search.problem, without, found)
+    return ranked([*found, *judged(fewer)] if fewer else found)
 
 
 def _where_they_pay(problem: Problem, without: Array, found: Sequence[Judged]) -> list[tuple[Proposal, Array]]:

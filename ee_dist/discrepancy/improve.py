@@ -117,15 +117,14 @@ def improve(
                 found = everywhere(search, current, own, pool, travelling(problem), spread > 0, alike)
                 looked = len(current.parts)
                 # Where a single one does more than all of them, it goes first, and they are looked for beside it.
-                first = found is not None and best is not None and found.held >= float(best.held.sum())
-                if not first:
+                if found is None or best is None or found.held < float(best.held.sum()):
                     anew, beside = anew + (spread > 0), special
-                if found is not None and not first:
-                    current, looked, spread = found.current, len(found.current.parts), spread + 1
-                    for rung in found.rungs:
-                        climb(rung)
-                    continue
-                refused += found is None
+                    if found is not None:
+                        current, looked, spread = found.current, len(found.current.parts), spread + 1
+                        for rung in found.rungs:
+                            climb(rung)
+                        continue
+                    refused += 1
             if best is None:
                 other = None
                 if exchanges < EXCHANGES and len(current.u) < LARGE and leftovers(problem, last.base):

@@ -239,6 +239,12 @@ class Problem(ABC):
         """(n,) the trial of each residual value."""
         return np.asarray(self.layout.trial_of_segment[self.layout.segment_of])
 
+    @cached_property
+    def joint_of(self) -> Index:
+        """(n,) the motor that the channel of each residual value belongs to; -1 for none."""
+        joints = np.array([-1 if j is None else j for j in self.layout.joint_of_channel], dtype=np.int64)
+        return np.asarray(joints[self.layout.channel_of])
+
 
 def error(residuals: Array) -> float:
     """Root mean square of residual values: the one error number. Infinite where a model cannot be simulated."""

@@ -34,12 +34,11 @@ def pruned(search: Search, fit: Fit, own: int, tried: int, cut: Cut, newest: int
     allow. The first ``own`` and the ``newest`` parts stay."""
     for _ in range(ROUNDS):
         gone = _useless(search, fit, own, tried, newest)
-        after = [_without(fit, [k for unit in gone[:n] for k in unit]) for n in _halves(len(gone))]
-        count = _as_many(search.among(None), fit, dict(zip(_halves(len(gone)), after, strict=True)), cut, tried, True)
+        after = {n: _without(fit, [k for unit in gone[:n] for k in unit]) for n in _halves(len(gone))}
+        count = _as_many(search.among(None), fit, after, cut, tried, each=True)
         if not count:
             break
-        less = after[_halves(len(gone)).index(count)]
-        (fit,) = follow_valley(search, [(less.model, less.u)], fit.mask, PRIOR, widths=(AGAIN,))
+        (fit,) = follow_valley(search, [(after[count].model, after[count].u)], fit.mask, PRIOR, widths=(AGAIN,))
     return Current(fit.model.parts, fit.u)
 
 

@@ -9,7 +9,7 @@ import pytest
 from linear_problem import PER, ROBOT, SEGMENTS, Linear
 
 from ee_dist.discrepancy.everywhere import everywhere
-from ee_dist.discrepancy.evidence.by_joint import gains_of, joint_of
+from ee_dist.discrepancy.evidence.by_joint import gains_of
 from ee_dist.discrepancy.evidence.holdout import travelling
 from ee_dist.discrepancy.examine import Current, under
 from ee_dist.discrepancy.search.candidates import Proposal, candidate, not_said
@@ -69,11 +69,17 @@ def test_of_all_that_is_a_little_wrong_it_stays_out_too() -> None:
 
 
 def test_an_effect_is_of_the_joint_that_it_acts_on_or_whose_sensor_it_changes() -> None:
-    problem = Linear(())
+    problem = JointByJoint(())
+    own = np.bincount(problem.channel_of).astype(float)
+    before, after = np.sqrt(1.0 + problem.channel_of), np.zeros(len(problem.channel_of))
     sensor = next(s for s in ROBOT.sensors if s.target in JOINTS)
-    assert joint_of(problem, FRICTION[2]) == 2
-    assert joint_of(problem, candidate(ROBOT, "sensor_delay", sensor.name)) == JOINTS.index(sensor.target)
-    assert joint_of(problem, candidate(ROBOT, "coulomb_friction", ALL_JOINTS)) is None
+    parts = [
+        FRICTION[2],
+        candidate(ROBOT, "sensor_delay", sensor.name),
+        candidate(ROBOT, "coulomb_friction", ALL_JOINTS),
+    ]
+    joint = JOINTS.index(sensor.target)
+    assert gains_of(problem, parts, before, after) == pytest.approx([3 * own[2], (1 + joint) * own[joint], 0.0])
 
 
 def test_what_all_joints_share_says_nothing_new_where_each_has_a_value_of_its_own() -> None:

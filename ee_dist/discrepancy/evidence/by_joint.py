@@ -10,27 +10,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.problem import Problem, joints_of
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.trials.log import Array
 
 
 def gains_of(problem: Problem, parts: Sequence[Candidate], before: Array, after: Array) -> Array:
-    """(K,) energy that held-out data lose at the joint of each part, between two residuals (n,); 0 for a part that is of no
-    single joint."""
-    joint = np.array([-1 if j is None else j for j in problem.layout.joint_of_channel])[problem.channel_of]
-    size = len(problem.robot.motor_names)
-    own = joint >= 0
-    gains = np.bincount(joint[own], weights=(before**2 - after**2)[own], minlength=size)
-    places = [joint_of(problem, c) for c in parts]
-    return np.array([0.0 if k is None else gains[k] for k in places])
-
-
-def joint_of(problem: Problem, c: Candidate) -> int | None:
-    """The number of the joint that an effect acts on, or of that which its sensor reads; None for any other place."""
-    names = list(problem.robot.motor_names)
-    if c.target in names:
-        return names.index(c.target)
-    return next(
-        (names.index(s.target) for s in problem.robot.sensors if s.name == c.target and s.target in names), None
+    """(K,) energy that held-out data lose at the joint of each part, between two residuals (n,): that which it acts on, or which
+    its sensor reads; 0 for a part that is of no single joint."""
+    own = problem.joint_of >= 0
+    gains = np.bincount(
+        problem.joint_of[own], weights=(before**2 - after**2)[own], minlength=len(problem.robot.motor_names)
     )
+    read_by = {s.name: s.target for s in problem.robot.sensors}
+    places = joints_of(problem.robot, [read_by.get(c.target, c.target) for c in parts])
+    return np.array([0.0 if k is None else gains[k] for k in places])

@@ -50,7 +50,6 @@ def over_rows(search: Search, fit: Fit, wanted: float, prior: float = 0.0) -> Fi
 def _other_sides(search: Search, fit: Fit) -> Iterator[tuple[int, Array]]:
     """Numbers of the parts that are delays of joints at which more than noise is left, and values (P,) beyond the row."""
     problem = search.problem
-    joint = np.array([-1 if j is None else j for j in problem.layout.joint_of_channel])[problem.channel_of]
     try:
         robot = apply(problem.robot, (*search.fixed, *fit.hypothesis))
     except EffectError:
@@ -60,7 +59,7 @@ def _other_sides(search: Search, fit: Fit) -> Iterator[tuple[int, Array]]:
     for k, (c, place) in enumerate(zip(fit.model.parts, fit.model.places, strict=True)):
         if c.effect.name != DELAY or c.target not in names:
             continue
-        own = fit.mask & (joint == names.index(c.target))
+        own = fit.mask & (problem.joint_of == names.index(c.target))
         if float((fit.residual[own] ** 2).sum()) <= NOISE * float(problem.floor[own].sum()):
             continue
         late = drive_of(robot, c.target).delay_s

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -195,7 +195,7 @@ class FreeRun(Problem):
         joints = {s.target: n for s, n in zip((self.robot.sensors[k] for k in self.columns), self.noise, strict=True)}
         return np.array([joints.get(m, 0.0) / MEAN_ABSOLUTE for m in self.robot.motor_names])
 
-    def _models(self, hypotheses: Sequence[Hypothesis], trials: Iterable[int]) -> dict[int, list[Robot]]:
+    def _models(self, hypotheses: Sequence[Hypothesis], trials: Collection[int]) -> dict[int, list[Robot]]:
         """What is simulated for each hypothesis, by trial; trials in which the robot was held alike share them."""
         alike: dict[tuple[Hypothesis, bool | None], list[Robot]] = {}
         for k in trials:
@@ -206,7 +206,7 @@ class FreeRun(Problem):
         return {k: alike[self.measured[k].setup, self.measured[k].commands_held] for k in trials}
 
     def _simulated(self, trial: int, hypothesis: Hypothesis) -> Robot:
-        return self.measured[trial].simulated(apply(self.setups[trial], hypothesis))
+        return self._models([hypothesis], (trial,))[trial][0]
 
     def noise_floor(self) -> tuple[float, str]:
         seldom = any(p.log.filled is not None for p in self.pieces)
