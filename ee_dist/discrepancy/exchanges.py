@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
@@ -107,11 +108,11 @@ def exchanged(
 
 
 def nearest(
-    search: Search, current: Current, own: int, pool: Sequence[Candidate]
+    search: Search, current: Current, own: int, pool: Sequence[Candidate], asked: AbstractSet[str] = frozenset()
 ) -> tuple[Current, list[Twin], Rung | None]:
     """The model, or, where another is surely better or does as well and is nearer to the description, that one and the step to
-    it; and what does as well as an effect of the model in its place."""
-    found = instead_of(search, current, own, pool)
+    it; and what does as well as an effect of the model in its place. ``asked``: names of what is told in any case if it does."""
+    found = instead_of(search, current, own, pool, asked)
     best = next((i for i in found if i.better), None)
     if best is not None and _surely(search, current, best.then, len(pool)):
         return best.then, [], _step(search, best)
@@ -120,7 +121,7 @@ def nearest(
     twins = [
         Twin(i.gone.name, i.then.hypothesis[-1], (*fixed, *i.then.hypothesis))
         for i in found
-        if nearer is None or (not i.nearer and i.gone.name != nearer.gone.name)
+        if nearer is None or (i.gone.name != nearer.gone.name and i.comes.name != nearer.comes.name)
     ]
     if nearer is None:
         return current, twins, None

@@ -25,7 +25,7 @@ from ee_dist.discrepancy.exchanges import exchanged, nearest, refitted, strictes
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung, Twin
 from ee_dist.discrepancy.problem import Problem, error, per_segment
-from ee_dist.discrepancy.pruning import told_only, without_neutral, without_useless
+from ee_dist.discrepancy.pruning import without_neutral, without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -34,6 +34,7 @@ from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
 from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.discrepancy.search.valley import LARGE
+from ee_dist.discrepancy.told import told_only
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -87,7 +88,7 @@ def improve(
     if current.parts:
         climb(refitted(search, current))
     last: Examined | None = None
-    own = len(current.parts)
+    own, asked = len(current.parts), frozenset[str]()
     if wanted is not None:
         stopped = ASKED if wanted else REFITTED
         for c in wanted:
@@ -165,13 +166,16 @@ def improve(
             climb(rung)
         if spread or len(current.parts) - own > 1:
             # Of two that leave the same mark the values may be anything, and one of them says it all.
-            current, gone = told_only(search, current, own, strictest(problem), len(pool), not spread)
-            current, none = without_neutral(current, own)
-            if gone or none:
-                climb(refitted(search, current, "without what these data do not tell from neutral", (*gone, *none)))
+            told = told_only(search, current, own, strictest(problem), len(pool), not spread)
+            current, none = without_neutral(told.then, own)
+            asked = told.instead
+            if told.gone or none:
+                climb(
+                    refitted(search, current, "without what these data do not tell from neutral", (*told.gone, *none))
+                )
     twins: list[Twin] = []
     if wanted is None and len(current.parts) > own + 1:
-        current, twins, step = nearest(search, current, own, pool)
+        current, twins, step = nearest(search, current, own, pool, asked)
         if step is not None:
             climb(step)
     return _finish(search, current, ladder, as_it_is, stopped, last, twins)

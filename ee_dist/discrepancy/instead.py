@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +22,10 @@ from ee_dist.discrepancy.search.candidates import Candidate, not_said, on_top_of
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.screen import SHOWS
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import slopes_at
+from ee_dist.discrepancy.search.slopes import gauss_newton, slopes_at
 from ee_dist.discrepancy.search.trials import calm_trials, telling
 from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.discrepancy.told import FEW
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -31,9 +33,10 @@ ALIKE = 0.3
 """Share of what an effect leaves that its model cannot make up for without it, that may be left with another in its place."""
 PROBE = 0.02
 """Finite differences of these marks: a ridge is straight for a short way only."""
-LOOKED_AT, BACK, NEARLY, TRIED, WIDTH = 24, 2.0, 0.04, 3, 0.03
-"""Exchanges that are simulated once; up to which energy, as a share of that of the model as it is, or of what is left there,
-slopes must lead back from there for one to be fitted; how many are; and their finite differences."""
+LOOKED_AT, STEPS, BACK, NEARLY, TRIED, WIDTH = 24, 2, 2.0, 0.04, 3, 0.03
+"""Exchanges that are simulated, and how many steps along slopes that are known; up to which energy, as a share of that of
+the model as it is, or of what is left there, slopes must lead back from there for one to be fitted, unless the values are
+few; how many are; and their finite differences."""
 FAR_MORE = 4.0
 """Times the median of an effect's values at its places, from which one of them is looked at by itself."""
 ASIDE = 0.6
@@ -42,6 +45,8 @@ NEARER, REST = 0.05, 0.5
 """By how much less the squares of all values, as shares of their ranges, must add up to, for a model to be nearer to the
 description than one that does as well; and share of it that those of the rest may keep, for one effect to say most of what they
 said together."""
+FOLLOWS, FOLLOWS_LEAST = 0.3, 0.02
+"""Share of itself, and of its range, by which a value changes that follows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +65,13 @@ class Instead:
         return self.then.parts[-1]
 
 
-def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candidate]) -> list[Instead]:
+def instead_of(
+    search: Search, current: Current, own: int, pool: Sequence[Candidate], asked: AbstractSet[str] = frozenset()
+) -> list[Instead]:
     """What of ``pool`` could be in the place of an effect beyond the first ``own``, the best for each: the residual is larger by
     no more than two explanations may differ that are not told apart. Effects of which a little is in every robot, and that the
     model has at many joints, are asked for only if the rest is much nearer to the description then: else nobody needs to know
-    which of two it is."""
+    which of two it is; but all ``asked`` for (names) are."""
     model = Model(current.parts)
     (base,) = search.residuals([model.hypothesis(current.u)])
     search = search.among(calm_trials(search.problem, base))
@@ -72,7 +79,7 @@ def instead_of(search: Search, current: Current, own: int, pool: Sequence[Candid
     # What is alike in one trial is tried on all.
     one = telling(search.problem, base, search.trials or range(len(search.problem.trials)))
     looked = search if one is None else search.among([one])
-    starts = _promising(looked, np.where(looked.everything, base, 0.0), current, own, pool)
+    starts = _promising(looked, np.where(looked.everything, base, 0.0), current, own, pool, asked)
     if not starts:
         return []
     now, *fits = follow_valley(search, [(model, current.u), *starts], mine, PRIOR, widths=(WIDTH,))
@@ -100,7 +107,7 @@ class _Exchange:
 
 
 def _promising(
-    search: Search, base: Array, current: Current, own: int, pool: Sequence[Candidate]
+    search: Search, base: Array, current: Current, own: int, pool: Sequence[Candidate], asked: AbstractSet[str]
 ) -> list[tuple[Model, Array]]:
     """Exchanges in a model that leaves ``base`` (n,), from whose starts slopes lead back to about that energy, and where to, the
     best first: a ridge bends, and how high a straight step along it ends says little of what is on it."""
@@ -113,26 +120,33 @@ def _promising(
     some: list[_Exchange] = []
     others = _others(search.problem.robot, search, current, pool)
     for few in search.batches(len(others)):
-        found = _exchanges(search, marks, current, may_go, others[few])
+        found = _exchanges(search, marks, current, may_go, others[few], asked)
         some = heapq.nsmallest(LOOKED_AT, (*some, *found), key=lambda e: e.rise)
     models = [Model((*have.parts[: e.at], *have.parts[e.at + 1 :], e.comes)) for e in some]
-    rows = search.residuals([m.hypothesis(e.u) for m, e in zip(models, some, strict=True)])
+    around = [np.concatenate([np.delete(slopes, have.places[e.at], axis=1), e.marks], axis=1) for e in some]
     wanted = BACK * max(float(base @ base), float(search.problem.floor[mine].sum()))
-    starts = []
-    for model, e, row in zip(models, some, rows, strict=True):
-        if not np.isfinite(row).all():
-            continue
-        around = np.concatenate([np.delete(slopes, have.places[e.at], axis=1), e.marks], axis=1)
-        normal = around.T @ around + PRIOR * np.eye(len(e.u))
-        step = -np.linalg.solve(normal, around.T @ row + PRIOR * e.u)
-        left = row + around @ step
-        if float(left @ left) <= max(wanted, NEARLY * float(row @ row)):
-            starts.append((float(left @ left), model, np.clip(e.u + step, model.lower, model.upper)))
+    at, each = {k: e.u for k, e in enumerate(some)}, len(current.u) <= FEW
+    for _ in range(STEPS):
+        rows = search.residuals([models[k].hypothesis(u) for k, u in at.items()])
+        starts, before, at = [], at, {}
+        for (k, u), row in zip(before.items(), rows, strict=True):
+            if not np.isfinite(row).all():
+                continue
+            step = gauss_newton(around[k], row, u, PRIOR)
+            left = row + around[k] @ step
+            at[k] = np.clip(u + step, models[k].lower, models[k].upper)
+            if each or float(left @ left) <= max(wanted, NEARLY * float(row @ row)):
+                starts.append((float(left @ left), models[k], at[k]))
     return [(model, u) for _, model, u in sorted(starts, key=lambda f: f[0])[:TRIED]]
 
 
 def _exchanges(
-    search: Search, marks: _Marks, current: Current, may_go: Mapping[int, float], others: Sequence[Candidate]
+    search: Search,
+    marks: _Marks,
+    current: Current,
+    may_go: Mapping[int, float],
+    others: Sequence[Candidate],
+    asked: AbstractSet[str],
 ) -> Iterator[_Exchange]:
     """The model with one part of those that ``may_go`` (number: rise of the energy without it) exchanged for one of ``others``,
     from where slopes say that this would lead."""
@@ -151,7 +165,8 @@ def _exchanges(
             if rise > ALIKE * without:
                 continue
             stay = np.delete(u, where)
-            if not _special(robot, current, current.parts[at]) and values @ values > REST * float(stay @ stay):
+            known = c.name in asked or _special(robot, current, current.parts[at])
+            if not known and not _says_most(c, robot, stay, values):
                 continue
             new = rest.copy()
             new[moves] += much
@@ -211,6 +226,15 @@ def _special(robot: Robot, current: Current, c: Candidate) -> bool:
     places = zip(current.parts, Model(current.parts).places, strict=True)
     much = {other.target: float(np.abs(current.u[where]).max()) for other, where in places if other.effect is c.effect}
     return len(much) == 1 or much[c.target] >= FAR_MORE * float(np.median(list(much.values())))
+
+
+def _says_most(c: Candidate, robot: Robot, stay: Array, values: Array) -> bool:
+    """Whether one effect says most of what the other values of a model (P,) say together without it: of all of them what is
+    in every robot to a degree, and a fault of those that follow."""
+    if stands_out(robot, c):
+        follow = np.abs(values - stay) > np.maximum(FOLLOWS * np.abs(stay), FOLLOWS_LEAST)
+        stay, values = stay[follow], values[follow]
+    return bool(len(stay)) and float(values @ values) <= REST * float(stay @ stay)
 
 
 def _others(robot: Robot, search: Search, current: Current, pool: Sequence[Candidate]) -> list[Candidate]:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, cross_fit, held_by_slopes
-from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.evidence.judge import WORTH, least_energy
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
@@ -34,8 +33,8 @@ def pruned(search: Search, fit: Fit, own: int, tried: int, cut: Cut, newest: int
     allow. The first ``own`` and the ``newest`` parts stay."""
     for _ in range(ROUNDS):
         gone = _useless(search, fit, own, tried, newest)
-        after = {n: _without(fit, [k for unit in gone[:n] for k in unit]) for n in _halves(len(gone))}
-        count = _as_many(search.among(None), fit, after, cut, tried, each=True)
+        after = {n: without_these(fit, [k for unit in gone[:n] for k in unit]) for n in halves(len(gone))}
+        count = as_many(search.among(None), fit, after, cut, tried, each=True)
         if not count:
             break
         (fit,) = follow_valley(search, [(after[count].model, after[count].u)], fit.mask, PRIOR, widths=(AGAIN,))
@@ -47,7 +46,7 @@ def _useless(search: Search, fit: Fit, own: int, tried: int, newest: int) -> lis
     places, luck = fit.model.places, _luck(search.problem, fit)
     slopes = fit.slopes / np.sqrt(luck)[:, None]
     prior = PRIOR / max(float(luck.mean()), 1e-12)
-    kept, units = list(range(len(fit.model.parts))), _units(fit.model, own, len(fit.model.parts) - newest)
+    kept, units = list(range(len(fit.model.parts))), units_of(fit.model, own, len(fit.model.parts) - newest)
     values, out = fit.u.copy(), []
     while units:
         at = np.concatenate([np.arange(places[k].start, places[k].stop) for k in kept])
@@ -71,12 +70,12 @@ def _useless(search: Search, fit: Fit, own: int, tried: int, newest: int) -> lis
     return out
 
 
-def _halves(count: int) -> list[int]:
+def halves(count: int) -> list[int]:
     """All, half, a quarter and so on, to one."""
     return [count >> k for k in range(count.bit_length())]
 
 
-def _as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: int, each: bool = False) -> int:
+def as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: int, each: bool = False) -> int:
     """How many terms may go, of the numbers in ``fewer`` with the models that are left then, most first: without so many held-out
     data are foretold as well as by the whole model, give or take luck once, or for ``each`` of them. Slopes may mislead where a
     joint sticks; and where much is left at one joint, luck is taken to be large at all that moves it. 0: none."""
@@ -112,7 +111,7 @@ def _luck(problem: Problem, fit: Fit) -> Array:
     return np.asarray(np.maximum(luck, max(SURE * float(luck.max()), 1e-12))[group])
 
 
-def _units(model: Model, first: int, end: int) -> list[list[int]]:
+def units_of(model: Model, first: int, end: int) -> list[list[int]]:
     """Numbers of the parts from ``first`` to ``end`` that have values, by what stays or goes together: masses of a body's parts
     share their marks, and some of them without the others would have to stand in for these."""
     units: dict[str, list[int]] = {}
@@ -179,42 +178,7 @@ def _allowed(problem: Problem, energy: float, cut: Cut, tried: int, least: float
     return max(luck, 0.5 * WORTH * max(energy - float(problem.floor.sum()), 0.0))
 
 
-def told_only(
-    search: Search, current: Current, own: int, cut: Cut, tried: int, open_only: bool = False
-) -> tuple[Current, tuple[str, ...]]:
-    """The model without the terms whose intervals hold neutral (``open_only``: of which some value may be anything), and their
-    names: one after the other, the least told first, for what one of two alike leaves makes the other plain; as many of them
-    as held-out data allow. The first ``own`` parts stay."""
-    gone: list[tuple[str, ...]] = []
-    fits: list[Fit] = []
-    while True:
-        (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 2, (AGAIN,))
-        fits, found = [*fits[:-1], fit], len(gone)
-        # As far as slopes tell what goes is made up for by the rest; then all that stays is fitted anew.
-        while least := _least_told(search.problem, fit, own, open_only):
-            gone.append(tuple(fit.model.parts[k].name for k in least))
-            fit = _without(fit, least)
-            fits.append(fit)
-        current = Current(fit.model.parts, fit.u)
-        if len(gone) == found:
-            break
-    gone = gone[: _as_many(search, fits[0], {n: fits[n] for n in _halves(len(gone))}, cut, tried)]
-    kept = fits[len(gone)]
-    return Current(kept.model.parts, kept.u), tuple(name for names in gone for name in names)
-
-
-def _least_told(problem: Problem, fit: Fit, own: int, open_only: bool) -> list[int]:
-    """Numbers of the parts, from ``own`` on, that are told least, if their intervals hold neutral."""
-    half, places = half_widths(problem, fit), fit.model.places
-    told = [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in places]
-    units = _units(fit.model, own, len(told))
-    if open_only:
-        units = [unit for unit in units if any(np.max(half[places[k]], initial=0.0) > 1.0 for k in unit)]
-    least = min(units, key=lambda unit: max(told[k] for k in unit), default=[])
-    return least if least and max(told[k] for k in least) < 1.0 else []
-
-
-def _without(fit: Fit, gone: Sequence[int]) -> Fit:
+def without_these(fit: Fit, gone: Sequence[int]) -> Fit:
     """The fit without some parts, as slopes foretell it."""
     places, kept = fit.model.places, [k for k in range(len(fit.model.parts)) if k not in gone]
     at, stay = (

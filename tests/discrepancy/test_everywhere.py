@@ -10,12 +10,13 @@ from ee_dist.discrepancy.evidence.holdout import travelling, windows
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.problem import Layout, Problem, error
-from ee_dist.discrepancy.pruning import pruned, told_only
+from ee_dist.discrepancy.pruning import pruned
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.discrepancy.told import told_only
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.describe import load_robot
 
@@ -210,10 +211,11 @@ def test_what_is_not_told_from_neutral_goes_in_the_end(robot):
     problem = Curved(robot, truth)
     parts = tuple(c for c in pool_of(robot) if c.effect.name in PLAIN)
     start = Current(parts, np.array([truth.get(c.effect.name, 0.001) for c in parts]))
-    kept, gone = told_only(Search(problem), start, 0, travelling(problem)[0], 20)
+    told = told_only(Search(problem), start, 0, travelling(problem)[0], 20)
+    kept, gone = told.then, told.gone
     assert {c.effect.name for c in kept.parts} == set(truth)
     assert {n.split("@")[0] for n in gone} == set(PLAIN) - set(truth)
-    assert told_only(Search(problem), start, len(parts), travelling(problem)[0], 20)[1] == (), (
+    assert told_only(Search(problem), start, len(parts), travelling(problem)[0], 20).gone == (), (
         "the model's own terms stay"
     )
 

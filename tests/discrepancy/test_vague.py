@@ -15,11 +15,11 @@ from ee_dist.discrepancy.evidence.holdout import HeldOut, windows
 from ee_dist.discrepancy.evidence.judge import VAGUE, judge, ranked
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.pruning import told_only
 from ee_dist.discrepancy.search.candidates import Proposal, candidate
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.told import told_only
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.results.tables import TIED_STANDING, kind_of, standing
@@ -128,7 +128,8 @@ def test_of_two_with_the_same_mark_one_stays_and_says_it_all() -> None:
     torque = replace(torque, bounds=tuple((0.2 * low, 0.2 * high) for low, high in torque.bounds))
     search, parts = Search(problem), (zero, torque, friction)
     fit = fit_one(search, Model(parts), [np.array([0.15, 0.5, 0.01])])
-    left, gone = told_only(search, Current(parts, fit.u), 0, windows(problem), 100, open_only=True)
+    told = told_only(search, Current(parts, fit.u), 0, windows(problem), 100, open_only=True)
+    left, gone = told.then, told.gone
     assert gone == ("offset_torque@elbow",)
     assert zero.values(left.u[:1])["offset_rad"] == pytest.approx(0.1, abs=0.01), "it says it all"
-    assert told_only(search, left, 0, windows(problem), 100, open_only=True)[1] == ()
+    assert told_only(search, left, 0, windows(problem), 100, open_only=True).gone == ()

@@ -216,7 +216,7 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
             # No slope where nothing can be simulated: nearer to neutral.
             full.append((run, run.u * 0.5))
             continue
-        step = _step(run.slopes, residual[mask], origin, prior)
+        step = gauss_newton(run.slopes, residual[mask], origin, prior)
         aim = origin + step
         step = np.clip(step, -0.5, 0.5)
         first, *others = (np.clip(origin + length * step, run.model.lower, run.model.upper) for length in LENGTHS)
@@ -237,10 +237,10 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
     better([(run, u) for run, enough, u in shorter if not run.energy <= enough])
 
 
-def _step(slopes: Array, residual: Array, u: Array, prior: float) -> Array:
-    """(P,) the Gauss-Newton step from values u."""
+def gauss_newton(slopes: Array, residual: Array, u: Array, prior: float) -> Array:
+    """(P,) the Gauss-Newton step from values u (P,), where ``slopes`` (n, P) of the residual (n,) are known."""
     normal = slopes.T @ slopes + prior * np.eye(len(u))
-    damp = 1e-6 * np.trace(normal) / len(u) + 1e-12
+    damp = 1e-6 * np.trace(normal) / max(1, len(u)) + 1e-12
     return np.asarray(np.linalg.solve(normal + damp * np.eye(len(u)), -slopes.T @ residual - prior * u))
 
 
@@ -256,7 +256,7 @@ def _unweighed(run: _Run, mask: Mask, prior: float) -> Array:
     assert run.origin is not None and run.slopes is not None and run.weights is not None
     origin, residual = run.origin
     shares = np.maximum(run.weights, 1e-12)
-    step = _step(run.slopes / shares[:, None], residual[mask] / shares, origin, prior)
+    step = gauss_newton(run.slopes / shares[:, None], residual[mask] / shares, origin, prior)
     return np.asarray(np.clip(origin + np.clip(step, -0.5, 0.5), run.model.lower, run.model.upper))
 
 

@@ -1,0 +1,133 @@
+"""Leaving out, in the end, what these data do not tell from neutral."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut
+from ee_dist.discrepancy.evidence.intervals import half_widths
+from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.pruning import AGAIN, as_many, halves, units_of, without_these
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import gauss_newton, weighed
+from ee_dist.discrepancy.search.valley import follow_valley
+
+NOT_FAR, CHORDS = 5.0, 3
+"""How far from neutral, in halves of its interval, a value is without which it is simulated, and in how many steps the others
+follow;"""
+FEW, REFITS = 16, 3
+"""how many values are few, all of which are tried, and in how many descents the others are fitted then."""
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """The model ``then`` without what is not told from neutral; ``gone``: the names of that, and ``instead`` those among them in
+    whose place something else stayed that was missed as little."""
+
+    then: Current
+    gone: tuple[str, ...] = ()
+    instead: frozenset[str] = frozenset()
+
+
+def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int, open_only: bool = False) -> Told:
+    """The model without the terms whose intervals hold neutral (``open_only``: of which some value may be anything), one
+    after the other, the least told first, for what one of two alike leaves makes the other plain; then without those that
+    are not missed. As many of them leave as held-out data allow; the first ``own`` parts stay."""
+    gone: list[tuple[str, ...]] = []
+    alike: dict[str, frozenset[str]] = {}
+    fits: list[Fit] = []
+    while True:
+        (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 2, (AGAIN,))
+        fits, found = [*fits[:-1], fit], len(gone)
+        # As far as slopes tell what goes is made up for by the rest; then all that stays is fitted anew.
+        while least := _least_told(search.problem, fit, own, open_only):
+            gone.append(tuple(fit.model.parts[k].name for k in least))
+            fit = without_these(fit, least)
+            fits.append(fit)
+        while not open_only and (less := _not_missed(search, fit, own)) is not None:
+            gone.append(less.names)
+            alike |= dict.fromkeys(less.names, less.others)
+            fit = less.fit
+            fits.append(fit)
+        current = Current(fit.model.parts, fit.u)
+        if len(gone) == found:
+            break
+    gone = gone[: as_many(search, fits[0], {n: fits[n] for n in halves(len(gone))}, cut, tried)]
+    kept, names = fits[len(gone)], tuple(name for names in gone for name in names)
+    stay = {c.name for c in kept.model.parts}
+    return Told(
+        Current(kept.model.parts, kept.u), names, frozenset(n for n in names if alike.get(n, frozenset()) & stay)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Without:
+    """A fit without the parts of some ``names``, which are not missed; ``others``: what is not either, if these stay."""
+
+    names: tuple[str, ...]
+    fit: Fit
+    others: frozenset[str]
+
+
+def _not_missed(search: Search, fit: Fit, own: int) -> _Without | None:
+    """Of parts, from ``own`` on, that slopes tell from neutral, and which are not missed when it is simulated without them,
+    those without which the model is nearest to the description. None where each is missed. Along a ridge slopes over finite
+    steps rise where the residual does not, and their intervals are too narrow. How far a value is told goes with the root
+    of what it costs to go without it (the likelihood ratio beside Wald's test). Of few values all are tried, by fits."""
+    told, few = _told(search.problem, fit), len(fit.u) <= FEW
+    units = [unit for unit in units_of(fit.model, own, len(told)) if few or max(told[k] for k in unit) < NOT_FAR]
+    if not units:
+        return None
+    foretold = [without_these(fit, unit) for unit in units]
+    simulated = _followed(search, foretold)
+    if few:
+        starts = [(f.model, f.u) for f in simulated]
+        simulated = follow_valley(search, starts, search.everything, PRIOR, REFITS, (AGAIN,))
+    found: list[tuple[tuple[str, ...], Fit]] = []
+    for unit, by_slopes, without in zip(units, foretold, simulated, strict=True):
+        rises = [max(f.energy - fit.energy, 0.0) for f in (without, by_slopes)]
+        if max(told[k] for k in unit) * np.sqrt(rises[0] / max(rises[1], 1e-12)) < 1.0:
+            found.append((tuple(fit.model.parts[k].name for k in unit), without))
+    if not found:
+        return None
+    names, nearest = min(found, key=lambda f: float(f[1].u @ f[1].u))
+    return _Without(names, nearest, frozenset(n for some, _ in found for n in some if n not in names))
+
+
+def _followed(search: Search, starts: Sequence[Fit]) -> list[Fit]:
+    """Of each fit that slopes foretold the best that is simulated on the way that the same slopes lead from there (the chord
+    method, Newton's with slopes that stay); one with infinite energy where none can be simulated."""
+    now, best = [f.u for f in starts], [replace(f, energy=np.inf) for f in starts]
+    for _ in range(CHORDS):
+        rows = search.residuals([f.model.hypothesis(u) for f, u in zip(starts, now, strict=True)])
+        for k, (f, r) in enumerate(zip(starts, rows, strict=True)):
+            energy = float(r[f.mask] @ r[f.mask])
+            if not np.isfinite(energy):
+                continue
+            if energy < best[k].energy:
+                best[k] = replace(f, u=now[k], energy=energy, residual=r)
+            smooth, weights = weighed(search.problem, r)
+            step = gauss_newton(f.slopes, (weights * smooth)[f.mask], now[k], PRIOR)
+            now[k] = np.clip(now[k] + step, f.model.lower, f.model.upper)
+    return best
+
+
+def _told(problem: Problem, fit: Fit) -> list[float]:
+    """How far each part is told from neutral, as a multiple of half its interval."""
+    half = half_widths(problem, fit)
+    return [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in fit.model.places]
+
+
+def _least_told(problem: Problem, fit: Fit, own: int, open_only: bool) -> list[int]:
+    """Numbers of the parts, from ``own`` on, that are told least, if their intervals hold neutral."""
+    half, places, told = half_widths(problem, fit), fit.model.places, _told(problem, fit)
+    units = units_of(fit.model, own, len(told))
+    if open_only:
+        units = [unit for unit in units if any(np.max(half[places[k]], initial=0.0) > 1.0 for k in unit)]
+    least = min(units, key=lambda unit: max(told[k] for k in unit), default=[])
+    return least if least and max(told[k] for k in least) < 1.0 else []
