@@ -1,0 +1,112 @@
+"""What leaves a model in the end: what is not told from neutral, and what is told by slopes alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from way_samples import Sample, measure, problem_by
+
+from ee_dist.discrepancy.evidence.holdout import PRIOR, travelling
+from ee_dist.discrepancy.evidence.intervals import parameters
+from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.exchanges import nearest
+from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.discrepancy.told import Told, told_only
+from ee_dist.effects.catalogue import Term, term
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.noise import with_noise
+
+PENDULUM = with_noise(servo_pendulum(), 1e-3)
+SERVO, ARM = PENDULUM.motor_names[0], PENDULUM.parts[1].name
+PLAN = tuple(Excitation(k, 3.0, a, n) for k, a, n in (("multisine", 0.5, 1), ("steps", 0.4, 2), ("slow_sines", 0.5, 3)))
+FRICTION = (
+    term("coulomb_friction", SERVO, torque_nm=0.019),
+    term("viscous_friction", SERVO, damping_nm_s_rad=0.0074),
+)
+
+
+def model_of(*terms: Term, more: tuple[tuple[str, str], ...]) -> Model:
+    names = [*((t.effect, t.target) for t in terms), *more]
+    return Model(tuple(candidate(PENDULUM, effect, target) for effect, target in names))
+
+
+def search_of(*hidden: Term) -> Search:
+    return Search(problem_by("open_loop", measure(Sample(PENDULUM, PLAN, hidden, ()), hidden), PENDULUM))
+
+
+def settled(search: Search, model: Model) -> Fit:
+    """The fit from values away from neutral: on a ridge it ends near where it began along it."""
+    start = np.full(sum(c.size for c in model.parts), 0.1)
+    (fit,) = follow_valley(search, [(model, start)], search.everything, PRIOR, widths=(0.03,))
+    return fit
+
+
+def ridge() -> tuple[Search, Fit]:
+    """One of mass, rotor and spring."""
+    mass, spring = (
+        term("part_mass", ARM, change=0.021),
+        term("parallel_spring", SERVO, stiffness_nm_rad=0.56, rest_rad=-0.17),
+    )
+    search = search_of(mass, *FRICTION, spring)
+    return search, settled(search, model_of(mass, *FRICTION, spring, more=(("rotor_inertia", SERVO),)))
+
+
+def told(search: Search, fit: Fit) -> Told:
+    return told_only(search, Current(fit.model.parts, fit.u), 0, travelling(search.problem)[0], 100)
+
+
+def test_what_is_not_missed_by_simulation_leaves_though_slopes_tell_it() -> None:
+    search, fit = ridge()
+    left = told(search, fit)
+    assert left.gone == (f"rotor_inertia@{SERVO}",)
+    (anew,) = follow_valley(search, [(Model(left.then.parts), left.then.u)], search.everything, PRIOR, widths=(0.03,))
+    found = {p.name: p for p in parameters(search.problem, anew)}
+    assert found["change"].low <= 0.021 <= found["change"].high
+
+
+def test_slopes_alone_tell_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Why it is simulated without."""
+    monkeypatch.setattr("ee_dist.discrepancy.told._not_missed", lambda *_: None)
+    search, fit = ridge()
+    assert told(search, fit).gone == ()
+
+
+def test_what_is_missed_stays() -> None:
+    rotor = term("rotor_inertia", SERVO, added_kg_m2=0.004)
+    mass = term("part_mass", ARM, change=0.1)
+    search = search_of(mass, rotor, *FRICTION)
+    fit = settled(search, model_of(mass, rotor, *FRICTION, more=()))
+    left = told(search, fit)
+    assert left.gone == () and left.instead == frozenset()
+
+
+def test_what_could_be_in_the_place_of_what_stayed_is_told() -> None:
+    """Mass, rotor and centre of a pendulum are three where its motion has two."""
+    shifted = term("com_shifted", ARM, along_x_m=-0.034, along_y_m=0.0, along_z_m=0.057)
+    mass = term("part_mass", ARM, change=0.065)
+    search = search_of(mass, shifted, *FRICTION)
+    fit = settled(search, model_of(mass, shifted, *FRICTION, more=(("rotor_inertia", SERVO),)))
+    left = told(search, fit)
+    assert len(left.gone) == 1 and left.gone[0] in {f"part_mass@{ARM}", f"rotor_inertia@{SERVO}"}
+    assert left.instead == frozenset(left.gone)
+    pool = [*fit.model.parts]
+    _, unasked, _ = nearest(search, left.then, 0, pool)
+    then, twins, _ = nearest(search, left.then, 0, pool, left.instead)
+    assert unasked == [] and [t.term.name for t in twins] + [c.name for c in then.parts if c.name in left.gone]
+
+
+def test_a_weak_motor_is_told_where_small_values_say_it_together() -> None:
+    """Mass, rotor and friction larger by one factor are a motor that is weaker by it, if nothing else of it is off."""
+    weak, offset = term("motor_weak", SERVO, loss=0.5), term("zero_offset", SERVO, offset_rad=-0.02)
+    search = search_of(weak, offset, *FRICTION)
+    heavy = (("part_mass", ARM), ("rotor_inertia", SERVO))
+    fit = settled(search, model_of(offset, *FRICTION, more=heavy))
+    current = Current(fit.model.parts, fit.u)
+    then, twins, _ = nearest(search, current, 0, [*fit.model.parts, candidate(PENDULUM, "motor_weak", SERVO)])
+    terms = [*(t.term for t in twins), *then.hypothesis]
+    (loss,) = {round(t.values[0][1], 2) for t in terms if t.effect == "motor_weak"}
+    assert loss == pytest.approx(0.5, abs=0.03)
