@@ -137,6 +137,40 @@ def command_delay(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
     return with_more(robot, target, "delay_s", values["delay_s"])
 
 
+SLOWEST = 5.0
+"""Times slower than the motor by itself, down to which a controller may hold a joint back."""
+
+
+def _slowness(robot: Robot, target: str) -> dict[str, Range]:
+    return {"slowness_s_rad": (0.0, SLOWEST / scales.speed(robot, target))}
+
+
+@effect(
+    "command_speed",
+    family="drive",
+    targets=position_drives,
+    parameters=(
+        Parameter(
+            "slowness_s_rad",
+            "s/rad",
+            0.0,
+            math.inf,
+            0.0,
+            "least time that the controller takes for a commanded rad, on top of nominal: 0.2 s/rad is no faster than 5 rad/s",
+            0.01,
+        ),
+    ),
+    physics="The controller leads the joint to its goal no faster than a set speed: a velocity limit or profile of the firmware.",
+    signature="Steps become ramps of one slope, whatever their size and the load; slow motions show nothing.",
+    ranges=_slowness,
+)
+def command_speed(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    def slower(drive: Drive) -> Drive:
+        return altered(drive, command_speed=1.0 / (1.0 / drive.command_speed + values["slowness_s_rad"]))
+
+    return robot.map_drive(target, slower) if values["slowness_s_rad"] > 0 else robot
+
+
 def _zeros(robot: Robot, target: str) -> dict[str, Range]:
     most = 0.4 * scales.travel(robot, target)
     return {"offset_rad": (-most, most)}

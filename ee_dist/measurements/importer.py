@@ -19,7 +19,7 @@ from ee_dist.measurements.clocks import Clocked, check_grid
 from ee_dist.measurements.commanded import command_flaws
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
-from ee_dist.measurements.need import beside_need, torques_needed
+from ee_dist.measurements.need import torques_beside_need
 from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
@@ -30,6 +30,7 @@ from ee_dist.measurements.suspicious import (
     suspicions,
     time_suspicion,
     torque_suspicion,
+    torques_suspicion,
     unit_suspicion,
 )
 from ee_dist.measurements.table import LARGEST, Recorded
@@ -385,14 +386,15 @@ class _Import:
 
     def _look_at_torques(self, torques: Array | None, joints: Array) -> None:
         """Torques beside what the motion needs. Raises MeasurementError for a unit that cannot be."""
-        needed = None if torques is None else torques_needed(self.robot, joints, self.step_s)
-        if torques is None or needed is None:
+        beside = None if torques is None else torques_beside_need(self.robot, torques, joints, self.step_s)
+        if beside is None:
             return
-        units, known = torque_units(self.robot), [m in self.mapping.torques for m in self.robot.motor_names]
-        need, speed = (of_all[:, known] for of_all in needed)
-        judged = beside_need(torques[:, known], (need, speed), self.step_s)
-        for m, beside in zip(np.array(self.robot.motor_names)[known], judged, strict=True):
-            self._judge(torque_suspicion(f"{TORQUE} {m}", beside, units[m]), self.mapping.torques[m])
+        units, names = torque_units(self.robot), [m for m in self.robot.motor_names if m in self.mapping.torques]
+        judged = [beside[k] for k, m in enumerate(self.robot.motor_names) if m in names]
+        for m, relation in zip(names, judged, strict=True):
+            self._judge(torque_suspicion(f"{TORQUE} {m}", relation, units[m]), self.mapping.torques[m])
+        if note := torques_suspicion(names, judged):
+            self.report.suspicious.append(note)
 
     def _judge(self, found: tuple[str, bool] | None, column: Column | Estimated | None) -> None:
         if found is None:

@@ -23,6 +23,8 @@ RATIOS = tuple(r**k for r in (180 / np.pi, 1000.0, 30 / np.pi, 2 * np.pi) for k 
 
 POSITION_RATIOS = tuple(r**k for r in (180 / np.pi, 1000.0) for k in (1, -1))
 """Between units of position that are taken for one another: degrees and radians, milli and one."""
+AGAINST = 0.7
+"""Correlation from which torques run against what a motion needs, or go with it."""
 OTHER_UNIT, OTHER_SIZE = 4.0, 20.0
 """A soft drive goes only part of the way to its command, and a model may be off by a lot: beyond these it is another unit."""
 
@@ -197,10 +199,10 @@ def torque_suspicion(name: str, beside: signals.Relation, unit: str) -> tuple[st
     """Whether a torque or force in ``unit`` is one, by how it goes with what the motion needs: a sentence, and whether it is
     certain (a thousand times too much or too little) enough to stop. A model may be off by a lot."""
     size = abs(beside.slope)
-    if beside.correlation < -0.7 and 0.5 < size < 2:
+    if beside.correlation < -AGAINST and 1 / OTHER_UNIT < size < OTHER_UNIT:
         return (
             f"{name}: runs against what the motion needs (correlation {beside.correlation:.2f}): a swapped sign? "
-            "set 'sign: -1' wherever the column is named"
+            "set 'sign: -1' wherever the column is named, that of the torque or that of the joint's position"
         ), False
     if abs(beside.correlation) > 0.9 and not 1 / OTHER_SIZE < size < OTHER_SIZE:
         certain = any(0.5 < size / r < 2 for r in (1e3, 1e-3))
@@ -210,6 +212,19 @@ def torque_suspicion(name: str, beside: signals.Relation, unit: str) -> tuple[st
             certain,
         )
     return None
+
+
+def torques_suspicion(names: Sequence[str], found: Sequence[signals.Relation]) -> str | None:
+    """Whether more torques of a robot than run clearly against what the motion needs are likely to have the other sign:
+    where several do, and none goes clearly with it. ``names``: of all joints, ``found``: how theirs goes with that."""
+    clear = [k for k, r in enumerate(found) if r.correlation < -AGAINST]
+    others = [n for n, r in zip(names, found, strict=True) if -AGAINST <= r.correlation < 0]
+    if len(clear) < 2 or not others or max(r.correlation for r in found) > AGAINST:
+        return None
+    return (
+        f"torques: {len(clear)} run against what the motion needs, and none goes with it: likely those of "
+        f"{', '.join(others)} too, of which the motion tells less"
+    )
 
 
 def _between_units(ratio: float, ratios: Sequence[float]) -> bool:

@@ -25,6 +25,7 @@ CONTROLLERS = {
     "command_delay",
     "zero_offset",
     "deadband",
+    "command_speed",
 }
 
 

@@ -204,6 +204,7 @@ def test_effects_act_where_the_kind_of_command_has_them() -> None:
     for name, targets in (
         ("zero_offset", ()),
         ("deadband", ()),
+        ("command_speed", ()),
         ("speed_gain", ()),
         ("motor_weak", ("elbow",)),
         ("command_gain", ("elbow",)),

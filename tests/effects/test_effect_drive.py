@@ -115,6 +115,19 @@ def test_command_delay_of_half_a_step_is_half_way(bench: Bench) -> None:
     assert behind == pytest.approx(0.0205, rel=0.01), "a ramp of 1 m/s is as far behind as it is late"
 
 
+def test_command_speed_makes_a_ramp_of_a_step(bench: Bench) -> None:
+    capped = bench.run(slider(**SERVO), term("command_speed", "joint", slowness_s_rad=4.0), steps=2000, command=0.4)
+    ramp = bench.run(slider(**SERVO), steps=2000, command=np.minimum(0.25 * 0.001 * np.arange(1, 2001), 0.4))
+    np.testing.assert_allclose(capped.channel("position"), ramp.channel("position"), atol=1e-9)
+
+
+def test_command_speed_adds_to_a_limit_that_is_described() -> None:
+    robot = slider(**SERVO, command_speed=0.5)
+    slower = apply(robot, [term("command_speed", "joint", slowness_s_rad=2.0)])
+    assert slower.drives[0].command_speed == pytest.approx(0.25)
+    assert apply(robot, [term("command_speed", "joint", slowness_s_rad=0.0)]) == robot
+
+
 def test_zero_offset_shifts_the_joint(bench: Bench) -> None:
     assert settled(bench, slider(**SERVO), term("zero_offset", "joint", offset_rad=0.05), command=0.2) == pytest.approx(
         0.15

@@ -13,6 +13,7 @@ from ee_dist.measurements.suspicious import (
     suspicions,
     time_suspicion,
     torque_suspicion,
+    torques_suspicion,
     unit_suspicion,
 )
 
@@ -73,6 +74,7 @@ def test_a_soft_drive_is_in_the_same_unit() -> None:
         (0.99, 0.001, "another unit than N.m", True),
         (0.99, 50.0, "50 times what the motion needs", False),
         (-0.95, -1.1, "sign: -1", False),
+        (-0.87, -0.48, "that of the joint's position", False),
     ],
 )
 def test_torques_that_cannot_be(correlation: float, slope: float, word: str, certain: bool) -> None:
@@ -84,6 +86,14 @@ def test_torques_that_cannot_be(correlation: float, slope: float, word: str, cer
 @pytest.mark.parametrize(("correlation", "slope"), [(0.95, 1.2), (0.95, 4.0), (0.3, 900.0), (-0.9, -6.0), (0.0, 0.0)])
 def test_a_model_that_is_off_makes_no_torque_suspicious(correlation: float, slope: float) -> None:
     assert torque_suspicion("torque of j", Relation(correlation, slope), "N.m") is None
+
+
+def test_torques_of_which_several_run_against_the_motion_are_likely_all_reversed() -> None:
+    several = [Relation(r, r) for r in (-0.95, -0.6, -0.9, 0.1)]
+    note = torques_suspicion(["a", "b", "c", "d"], several)
+    assert note is not None and "those of b too" in note
+    assert torques_suspicion(["a", "b", "c", "d"], [*several[:3], Relation(0.9, 1.0)]) is None, "one is as it should be"
+    assert torques_suspicion(["a", "b"], [Relation(-0.9, -1.0), Relation(-0.4, -1.0)]) is None, "one is told by itself"
 
 
 def moving(rows: int = 300) -> np.ndarray:

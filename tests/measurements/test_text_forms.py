@@ -62,6 +62,21 @@ def test_blank_lines_and_remarks_keep_the_numbers_of_lines(tmp_path: Path) -> No
         found.numbers("x")
 
 
+def test_what_stands_above_a_table_is_left_out_and_said(tmp_path: Path) -> None:
+    above = "Robot log v1.2\nDate: 2025-03-17, operator: me\nserial;1234\n"
+    found = table(tmp_path, above + "t,x,y,z\n0.0,1,2,3\n0.1,4,oops,6\n0.2,7,8,9\n")
+    assert len(found) == 3
+    assert any("above the table: 'Robot log v1.2' and more" in n for n in found.notes)
+    with pytest.raises(MeasurementError, match=r"row 6, column 'y': 'oops'"):
+        found.numbers("y")
+
+
+@pytest.mark.parametrize("content", ["t,x\n0.0,1,2\n0.1,4,5\n0.2,7,8\n", "t\n0.0,1,2\n0.1\n0.2,7,8\n"])
+def test_a_table_of_rows_that_differ_is_no_table_with_something_above(tmp_path: Path, content: str) -> None:
+    with pytest.raises(MeasurementError, match=r"row 2: 3 cells; the rows above have"):
+        table(tmp_path, content)
+
+
 def test_a_header_in_a_remark_as_savetxt_writes_it(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "b.csv", np.stack([T, X], axis=1), header="t x")
     found = read(tmp_path / "b.csv")[0].tables[0]

@@ -17,6 +17,9 @@ from ee_dist.measurements.table import Recorded, Table
 
 BLOCK = 20_000
 """Rows that are turned into numbers at once, so that a long file never stands in memory as texts."""
+SHAPE, TABLE, SAID = 30, 3, 60
+"""Lines that are looked at to see what a table looks like; how many of them at least are one below what stands above it, and how
+much of that is said."""
 _NUMBER = re.compile(r"^\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?\s*$|^\s*[-+]?(nan|inf)\s*$", re.IGNORECASE)
 _PLAIN = re.compile(r"^([-+]?\d*[.,]?\d+([eE][-+]?\d+)?)?$")
 _QUOTED = re.compile(r'"[^"]*"|\[[^\]]*\]|\([^)]*\)|\{[^}]*\}')
@@ -28,7 +31,13 @@ def read_text(file: Path, options: Options) -> tuple[Recorded, ...]:
     bounded(file, file.stat().st_size, "convert it to Parquet")
     text, notes = _decoded(file)
     lines = text.splitlines()
-    shape = [s for s in lines if s.strip() and s.lstrip()[0] not in "#%"][:30]
+    above = _preamble(lines, options.separator)
+    if above:
+        notes.append(f"left out above the table: {lines[above[0]].strip()[:SAID]!r}{' and more' if above[1:] else ''}")
+        # Blank, so that the others keep their numbers.
+        lines = ["" if k in above else line for k, line in enumerate(lines)]
+        text = "\n".join(lines)
+    shape = [s for s in lines if s.strip() and s.lstrip()[0] not in "#%"][:SHAPE]
     remarks = [s.lstrip("#% \t") for s in lines[:50] if s.lstrip()[:1] in ("#", "%")]
     if not shape:
         raise MeasurementError(f"{file}: no rows in it (zero length)")
@@ -58,6 +67,22 @@ def read_text(file: Path, options: Options) -> tuple[Recorded, ...]:
         units=dict(zip(labels, units, strict=True)) if units else {},
     )
     return (Recorded("", (table,)),)
+
+
+def _preamble(lines: list[str], separator: str | None) -> list[int]:
+    """Numbers of the lines above a table that say what it is: each with at most half as many cells as all that come after."""
+    shown = [k for k, s in enumerate(lines) if s.strip() and s.lstrip()[0] not in "#%"][:SHAPE]
+    if not shown:
+        return []
+    sign = separator or _separator([lines[shown[-1]]])
+    counts = [len(lines[k].split() if sign == " " else _QUOTED.sub("", lines[k]).split(sign)) for k in shown]
+    width = counts[-1]
+    first = next((k for k in range(len(counts)) if set(counts[k:]) == {width}), 0)
+    if width <= 2 or len(counts) - first < TABLE or any(2 * c > width for c in counts[:first]):
+        return []
+    # Several names above rows of numbers alone are a header with names missing.
+    headed = not all(_NUMBER.match(c) for c in lines[shown[first]].split(sign))
+    return shown[:first] if headed or max(counts[:first], default=0) == 1 else []
 
 
 def _decoded(file: Path) -> tuple[str, list[str]]:
