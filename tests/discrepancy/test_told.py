@@ -110,3 +110,17 @@ def test_a_weak_motor_is_told_where_small_values_say_it_together() -> None:
     terms = [*(t.term for t in twins), *then.hypothesis]
     (loss,) = {round(t.values[0][1], 2) for t in terms if t.effect == "motor_weak"}
     assert loss == pytest.approx(0.5, abs=0.03)
+
+
+def test_torques_that_are_all_larger_are_told_where_masses_seem_far_too_small() -> None:
+    """Nobody looks for them unasked: hardly any model would not be a little better for some."""
+    strong = term("motor_gain", SERVO, change=1.2)
+    search = search_of(strong, *FRICTION)
+    light = (("part_mass", ARM), ("rotor_inertia", SERVO), ("position_gain", SERVO))
+    fit = settled(search, model_of(*FRICTION, more=light))
+    mass = next(t for t in fit.hypothesis if t.effect == "part_mass")
+    assert mass.values[0][1] < -0.3
+    then, _, step = nearest(search, Current(fit.model.parts, fit.u), 0, fit.model.parts)
+    assert step is not None and step.dropped == (f"part_mass@{ARM}",)
+    (change,) = (t.values[0][1] for t in then.hypothesis if t.effect == "motor_gain")
+    assert change == pytest.approx(1.2, abs=0.05)

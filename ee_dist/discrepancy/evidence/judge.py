@@ -27,6 +27,8 @@ CAUTION = 2.0
 like an effect, and on the next robot noise adds to it."""
 TIE_ENERGY = 9.0
 """Two explanations closer than this (3 standard deviations, squared) on held-out data are not told apart."""
+APART = 6.0
+"""Held-out energy of an explanation, over that of another, from which it is no other explanation of the same."""
 WORTH = 0.1
 """Share of the squared error above the noise floor that an effect must take off where more than noise is left with it.
 Where a model is wrong in ways that no effect describes (another simulator, resampled records), some effect always takes a
@@ -305,7 +307,11 @@ def _plainer(one: Judged, vague: Judged) -> bool:
 
 
 def tied(one: Judged, other: Judged) -> bool:
-    """Whether held-out data cannot tell which is better: the difference is small, or its interval holds zero."""
+    """Whether held-out data cannot tell which is better: the difference is small, or its interval holds zero. Of few pieces an
+    interval holds nearly anything, but not that what leaves many times as much is as good."""
+    less, more = sorted(float(j.held.sum()) for j in (one, other))
+    if more > APART * max(less, float(one.sure)):
+        return False
     gap = one.outcome.cut.by_unit(other.held - one.held)
     if not np.isfinite(gap).all():
         return False
