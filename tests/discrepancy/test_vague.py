@@ -12,7 +12,7 @@ from linear_problem import ROBOT, Linear
 from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.evidence.holdout import HeldOut, windows
-from ee_dist.discrepancy.evidence.judge import VAGUE, judge, ranked
+from ee_dist.discrepancy.evidence.judge import VAGUE, judge, ranked, tied
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import Proposal, candidate
@@ -31,7 +31,7 @@ def judged(explained: float, vague: bool) -> object:
     one = SimpleNamespace(
         name=f"{explained}", explained=explained, vague=vague, why_not="", held=np.full(20, 1000.0 * (1 - explained)),
         outcome=SimpleNamespace(cut=cut), dispersion=1.0, proposal=SimpleNamespace(size=4 if vague else 1, guess=False, parts=()),
-        tied_with=[], rank=0,
+        tied_with=[], rank=0, sure=0.0,
     )  # fmt: skip
     return Following(one)
 
@@ -133,3 +133,13 @@ def test_of_two_with_the_same_mark_one_stays_and_says_it_all() -> None:
     assert gone == ("offset_torque@elbow",)
     assert zero.values(left.u[:1])["offset_rad"] == pytest.approx(0.1, abs=0.01), "it says it all"
     assert told_only(search, left, 0, windows(problem), 100, open_only=True).gone == ()
+
+
+def test_what_leaves_many_times_as_much_is_no_tie_however_few_the_pieces() -> None:
+    """Of two pieces an interval of the difference holds nearly anything."""
+    better, worse = judged(0.9, vague=False), judged(0.3, vague=False)
+    worse.held = np.array([90.0, 20000.0])  # type: ignore[attr-defined]
+    better.held = np.array([100.0, 1900.0])  # type: ignore[attr-defined]
+    assert not tied(better, worse)  # type: ignore[arg-type]
+    worse.held = np.array([90.0, 6000.0])  # type: ignore[attr-defined]
+    assert tied(better, worse)  # type: ignore[arg-type]

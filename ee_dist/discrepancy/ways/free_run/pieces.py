@@ -40,6 +40,12 @@ class Piece:
         return np.unique(found, return_inverse=True)[1].astype(np.int64)
 
     @property
+    def stretches(self) -> list[slice]:
+        """Which of the compared rows are in each of those windows."""
+        edges = np.flatnonzero(np.diff(self.window)) + 1
+        return [slice(a, b) for a, b in zip((0, *edges), (*edges, len(self.rows)), strict=True)]
+
+    @property
     def times_s(self) -> Array:
         """(R,) of the rows that are compared, since its start."""
         return np.asarray(self.log.times_s[list(self.rows)] - self.log.times_s[0])
@@ -102,8 +108,9 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
     run_up = round(longest_delay(robot) / robot.time_step_s)
     commands, enabled = released(trial.obeyed(log.commands))
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
-    # An integral is what a controller made of all that came before.
-    remembers = any(d.ki > 0 for d in robot.drives)
+    # An integral is what a controller made of all that came before; and so is a goal that moves no faster than a limit lets it,
+    # which a robot may have without a word in its description.
+    remembers = any(d.ki > 0 or d.command == "position" for d in robot.drives)
     found = []
     for first in range(0, len(log), len(log) if remembers else length):
         last = len(log) if remembers else min(first + length, len(log))

@@ -241,14 +241,16 @@ class FreeRun(Problem):
         return np.asarray(np.sign(residual) * residual**2 * self.noise[self.channel_of] / self.weight)
 
     def series(self, hypothesis: Hypothesis) -> list[Series]:
-        """Every stretch, as far as residuals were taken."""
+        """Every stretch from one start to the next, as far as residuals were taken."""
         gap = self.raw(self.residuals([hypothesis])[0])
         out = []
         for i, p in enumerate(self.pieces):
             off = gap[self.slices[i]].reshape(-1, len(self.columns))
             measured, times = p.measured(self.columns), p.start_s + p.times_s
-            for c in range(len(self.columns)):
-                out.append(Series(p.trial, c, self.layout.units[c], times, measured[:, c], measured[:, c] - off[:, c]))
+            for own in p.stretches:
+                for c, unit in enumerate(self.layout.units):
+                    read = measured[own, c]
+                    out.append(Series(p.trial, c, unit, times[own], read, read - off[own, c]))
         return out
 
     @cached_property
