@@ -51,6 +51,8 @@ class Rollout:
         parts = [self.model.digest, self.driver.key, str(self.steps), str(seed), str(self.pose)]
         for a in (self.supply_v, self.enabled, self.external, *_arrays(self.start)):
             parts.append("-" if a is None else hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest())
+        if self.start is not None and self.start.goals is not None:
+            parts.append("goals:" + hashlib.sha256(np.ascontiguousarray(self.start.goals).tobytes()).hexdigest())
         for row, state in self.again:
             values = np.concatenate([state.joints, state.speeds])
             parts.append(f"{row}:{hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()}")

@@ -197,7 +197,7 @@ class DrivePath:
         """Commands under the velocity limits of their controllers. A goal sets out from where the joint stands, and stays with
         it while the drive is released."""
         top, led = self.p["command_speed"], self.kind == POSITION
-        goal = q if self.goal is None else self.goal
+        goal = q if self.goal is None else np.where(np.isnan(self.goal), q, self.goal)
         if enabled is not None:
             goal = np.where(enabled > 0, goal, q)
         self.goal = np.where(

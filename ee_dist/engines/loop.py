@@ -51,6 +51,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     dt = first.time_step_s
     kinds = {s.kind for s in first.sensors}
     drive = DrivePath(robots, dt, bodies.gives)
+    drive.goal = _goals(rollouts)
     sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
     scales = per_robot(robots, scaling)
     control = Controllers(robots, [r.driver for r in rollouts], per_robot(robots, command_scaling), steps)
@@ -166,6 +167,16 @@ def by_shape(
             part = [members[k] for k in chosen]
             logs.update(zip(part, run_batch([rollouts[i] for i in part]), strict=True))
     return [logs[i] for i in range(len(rollouts))]
+
+
+def _goals(rollouts: Sequence[Rollout]) -> Array | None:
+    """(B, M) how far controllers with a velocity limit have led their goals; not a number where they begin at their joints."""
+    known = [None if r.start is None else r.start.goals for r in rollouts]
+    if all(g is None for g in known):
+        return None
+    return np.stack(
+        [np.full(len(r.model.drives), np.nan) if g is None else g for r, g in zip(rollouts, known, strict=True)]
+    )
 
 
 def _started(rollout: Rollout) -> Rollout:

@@ -115,12 +115,14 @@ class SensorLog:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where a rollout starts. joints, speeds: (M,) in the order of the robot's drives; base: pose (7,), twist (6,)."""
+    """Where a rollout starts. joints, speeds: (M,) in the order of the robot's drives; base: pose (7,), twist (6,); goals
+    (M,): how far controllers with a velocity limit have led their goals, where they stand if None."""
 
     joints: Array
     speeds: Array
     base_pose: Array | None = None
     base_twist: Array | None = None
+    goals: Array | None = None
 
 
 def start_of(robot: Robot) -> Array:

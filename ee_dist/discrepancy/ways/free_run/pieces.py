@@ -10,6 +10,7 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
 from ee_dist.discrepancy.problem import Index
 from ee_dist.discrepancy.starting import starting_speeds
+from ee_dist.discrepancy.ways.free_run.past import Past
 from ee_dist.effects.scales import longest_delay
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -32,6 +33,8 @@ class Piece:
     start: State
     again: tuple[tuple[int, State], ...] = ()
     """Rows at which it starts anew from the measured state."""
+    past: Past | None = None
+    """What came before, of which controllers with a velocity limit know how far they have led their goals."""
 
     @property
     def window(self) -> Index:
@@ -71,11 +74,14 @@ class Piece:
     def rollout(self, model: Robot, steps: int, switched: bool) -> Rollout:
         """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
         enabled = np.ones(len(self.log)) if self.enabled is None and switched else self.enabled
+        start = self.start
+        if self.past is not None and any(np.isfinite(d.command_speed) for d in model.drives):
+            start = replace(start, goals=self.past.goals(model))
         return Rollout(
             model,
             Commands(self.commands),
             steps,
-            start=self.start,
+            start=start,
             supply_v=self.log.supply_v,
             enabled=enabled,
             external=self.log.external,
@@ -108,9 +114,8 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
     run_up = round(longest_delay(robot) / robot.time_step_s)
     commands, enabled = released(trial.obeyed(log.commands))
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
-    # An integral is what a controller made of all that came before; and so is a goal that moves no faster than a limit lets it,
-    # which a robot may have without a word in its description.
-    remembers = any(d.ki > 0 or d.command == "position" for d in robot.drives)
+    # An integral is what a controller made of all that came before.
+    remembers = any(d.ki > 0 for d in robot.drives)
     found = []
     for first in range(0, len(log), len(log) if remembers else length):
         last = len(log) if remembers else min(first + length, len(log))
@@ -133,6 +138,7 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
                 None if enabled is None else enabled[begin:last],
                 State(log.joints[begin].copy(), speeds[begin].copy()),
                 tuple((k - begin, State(log.joints[k].copy(), speeds[k].copy())) for k in anew),
+                Past(commands, enabled, log.joints, dt, begin) if begin else None,
             )
         )
     return found
