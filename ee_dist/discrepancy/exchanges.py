@@ -22,7 +22,7 @@ from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.effects.catalogue import find
 from ee_dist.trials.log import Array
 
-MASS, STRENGTH = "part_mass", "motor_gain"
+MASS, STRENGTH, WEAK = "part_mass", "motor_gain", "motor_weak"
 SELDOM_OFF = 0.3
 """Share by which masses off a scale or a drawing seldom are."""
 LOOKED_AT = 2
@@ -117,7 +117,7 @@ def nearest(
 ) -> tuple[Current, list[Twin], Rung | None]:
     """The model, or, where another is surely better or does as well and is nearer to the description, that one and the step to
     it; and what does as well as an effect of the model in its place. ``asked``: names of what is told in any case if it does."""
-    scale = torque_scale(search.problem, current, own)
+    scale = torque_scale(search.problem, current, own, pool)
     found = instead_of(search, current, own, [*pool, *scale], asked | {c.name for c in scale})
     best = next((i for i in found if i.better), None)
     if best is not None and _surely(search, current, best.then, len(pool)):
@@ -136,9 +136,12 @@ def nearest(
     return nearer.then, [Twin(nearer.comes.name, gone, (*fixed, *was)), *twins], _step(search, nearer)
 
 
-def torque_scale(problem: Problem, current: Current, own: int) -> list[Candidate]:
-    """What makes the torques of all motors larger by one factor, where the model has masses that nobody would get so wrong: where
-    only motion was measured, masses, rotors and friction that are all smaller by it move alike."""
+def torque_scale(problem: Problem, current: Current, own: int, pool: Sequence[Candidate]) -> list[Candidate]:
+    """What makes the torques of all motors larger by one factor, where the model has masses that nobody would get so wrong:
+    where only motion was measured, masses, rotors and friction that are all smaller by it move alike. Nothing where
+    ``pool`` does not ask how strong motors are."""
+    if not any(c.effect.name == WEAK for c in pool):
+        return []
     masses = [t.values[0][1] for t in current.hypothesis[own:] if t.effect == MASS]
     if not any(abs(change) > SELDOM_OFF for change in masses) or STRENGTH in {c.effect.name for c in current.parts}:
         return []

@@ -9,7 +9,7 @@ from way_samples import Sample, measure, problem_by
 from ee_dist.discrepancy.evidence.holdout import PRIOR, travelling
 from ee_dist.discrepancy.evidence.intervals import parameters
 from ee_dist.discrepancy.examine import Current
-from ee_dist.discrepancy.exchanges import nearest
+from ee_dist.discrepancy.exchanges import STRENGTH, nearest
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
@@ -120,7 +120,9 @@ def test_torques_that_are_all_larger_are_told_where_masses_seem_far_too_small() 
     fit = settled(search, model_of(*FRICTION, more=light))
     mass = next(t for t in fit.hypothesis if t.effect == "part_mass")
     assert mass.values[0][1] < -0.3
-    then, _, step = nearest(search, Current(fit.model.parts, fit.u), 0, fit.model.parts)
+    current, weak = Current(fit.model.parts, fit.u), candidate(PENDULUM, "motor_weak", SERVO)
+    then, _, step = nearest(search, current, 0, [*fit.model.parts, weak])
     assert step is not None and step.dropped == (f"part_mass@{ARM}",)
     (change,) = (t.values[0][1] for t in then.hypothesis if t.effect == "motor_gain")
     assert change == pytest.approx(1.2, abs=0.05)
+    assert STRENGTH not in {c.effect.name for c in nearest(search, current, 0, fit.model.parts)[0].parts}, "not asked"
