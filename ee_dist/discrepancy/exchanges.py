@@ -22,7 +22,7 @@ from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.effects.catalogue import find
 from ee_dist.trials.log import Array
 
-MASS, STRENGTH, WEAK = "part_mass", "motor_gain", "motor_weak"
+MASS, STRENGTH = "part_mass", "motor_strength"
 SELDOM_OFF = 0.3
 """Share by which masses off a scale or a drawing seldom are."""
 LOOKED_AT = 2
@@ -139,8 +139,8 @@ def nearest(
 def torque_scale(problem: Problem, current: Current, own: int, pool: Sequence[Candidate]) -> list[Candidate]:
     """What makes the torques of all motors larger by one factor, where the model has masses that nobody would get so wrong:
     where only motion was measured, masses, rotors and friction that are all smaller by it move alike. Nothing where
-    ``pool`` does not ask how strong motors are."""
-    if not any(c.effect.name == WEAK for c in pool):
+    ``pool`` is of less than half of the kinds of effects that there are: who asks for some wants these."""
+    if 2 * len({c.effect for c in pool}) < len({c.effect for c in pool_of(problem)}):
         return []
     masses = [t.values[0][1] for t in current.hypothesis[own:] if t.effect == MASS]
     if not any(abs(change) > SELDOM_OFF for change in masses) or STRENGTH in {c.effect.name for c in current.parts}:

@@ -60,6 +60,23 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 
 
 @effect(
+    "motor_strength",
+    family="drive",
+    targets=powered,
+    parameters=(
+        Parameter("change", "1", -0.9, 9.0, 0.0, "change of all torque that the motor makes, as a share", 0.01),
+    ),
+    ranges=scales.always(change=(-0.7, 4.0)),
+    physics="The motor is stronger or weaker than described, by one factor at any speed: stall torque and gains of its controller "
+    "alike, as where a data sheet is of another voltage.",
+    signature="Where only motion is measured, all masses, rotors and friction off by the inverse factor look the same.",
+    searchable=False,
+)
+def motor_strength(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    return robot.map_drive(target, lambda d: altered(d, strength=d.strength * (1.0 + values["change"])))
+
+
+@effect(
     "current_gain",
     family="drive",
     targets=bolted_motors,

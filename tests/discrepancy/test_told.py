@@ -12,6 +12,7 @@ from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.exchanges import STRENGTH, nearest
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.discrepancy.told import Told, told_only
@@ -114,15 +115,15 @@ def test_a_weak_motor_is_told_where_small_values_say_it_together() -> None:
 
 def test_torques_that_are_all_larger_are_told_where_masses_seem_far_too_small() -> None:
     """Nobody looks for them unasked: hardly any model would not be a little better for some."""
-    strong = term("motor_gain", SERVO, change=1.2)
+    strong = term("motor_strength", SERVO, change=1.2)
     search = search_of(strong, *FRICTION)
     light = (("part_mass", ARM), ("rotor_inertia", SERVO), ("position_gain", SERVO))
     fit = settled(search, model_of(*FRICTION, more=light))
     mass = next(t for t in fit.hypothesis if t.effect == "part_mass")
     assert mass.values[0][1] < -0.3
-    current, weak = Current(fit.model.parts, fit.u), candidate(PENDULUM, "motor_weak", SERVO)
-    then, _, step = nearest(search, current, 0, [*fit.model.parts, weak])
+    current = Current(fit.model.parts, fit.u)
+    then, _, step = nearest(search, current, 0, pool_of(search.problem))
     assert step is not None and step.dropped == (f"part_mass@{ARM}",)
-    (change,) = (t.values[0][1] for t in then.hypothesis if t.effect == "motor_gain")
+    (change,) = (t.values[0][1] for t in then.hypothesis if t.effect == STRENGTH)
     assert change == pytest.approx(1.2, abs=0.05)
     assert STRENGTH not in {c.effect.name for c in nearest(search, current, 0, fit.model.parts)[0].parts}, "not asked"

@@ -25,6 +25,14 @@ def test_motor_gain_scales_the_torque_and_leaves_the_back_emf(bench: Bench, chan
     assert log.channel("velocity")[-1] == pytest.approx(1 + change, rel=0.01)
 
 
+def test_motor_strength_scales_the_torque_at_any_speed(bench: Bench) -> None:
+    robot = slider(kp=1e4, torque_limit=10.0, speed_limit=1.0)
+    log = bench.run(robot, term("motor_strength", "joint", change=1.0), command=9.0, steps=2000)
+    assert log.torques is not None
+    assert log.torques[0, 0] == pytest.approx(20.0)
+    assert log.channel("velocity")[-1] == pytest.approx(1.0, rel=0.01)
+
+
 def test_motor_gain_scales_a_commanded_torque_and_its_limit(bench: Bench) -> None:
     robot, gain = slider(command="torque", torque_limit=10.0), term("motor_gain", "joint", change=0.5)
     for command, expected in ((4.0, 6.0), (30.0, 15.0)):
