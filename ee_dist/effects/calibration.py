@@ -67,8 +67,8 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
         Parameter("change", "1", -0.9, 9.0, 0.0, "change of all torque that the motor makes, as a share", 0.01),
     ),
     ranges=scales.always(change=(-0.7, 4.0)),
-    physics="The motor is stronger or weaker than described, by one factor at any speed: stall torque and gains of its controller "
-    "alike, as where a data sheet is of another voltage.",
+    physics="The motor is stronger or weaker than described, by one factor at any speed: stall torque and gains of the controller"
+    " alike, as where a data sheet is of another voltage.",
     signature="Where only motion is measured, all masses, rotors and friction off by the inverse factor look the same.",
     searchable=False,
 )
