@@ -16,15 +16,11 @@ from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Model
-from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS
-from ee_dist.effects.catalogue import find
+from ee_dist.discrepancy.torque_scale import other_scale
 from ee_dist.trials.log import Array
 
-MASS, STRENGTH = "part_mass", "motor_strength"
-SELDOM_OFF = 0.3
-"""Share by which masses off a scale or a drawing seldom are."""
 LOOKED_AT = 2
 """How many of those that were tied are looked at, the best first."""
 
@@ -117,8 +113,8 @@ def nearest(
 ) -> tuple[Current, list[Twin], Rung | None]:
     """The model, or, where another is surely better or does as well and is nearer to the description, that one and the step to
     it; and what does as well as an effect of the model in its place. ``asked``: names of what is told in any case if it does."""
-    scale = torque_scale(search.problem, current, own, pool)
-    found = instead_of(search, current, own, [*pool, *scale], asked | {c.name for c in scale})
+    more = tuple(other_scale(search.problem, current, own, pool))
+    found = instead_of(search, current, own, pool, asked, more)
     best = next((i for i in found if i.better), None)
     if best is not None and _surely(search, current, best.then, len(pool)):
         return best.then, [], _step(search, best)
@@ -134,19 +130,6 @@ def nearest(
     names, was = [c.name for c in current.parts], current.hypothesis
     gone = was[names.index(nearer.gone.name)]
     return nearer.then, [Twin(nearer.comes.name, gone, (*fixed, *was)), *twins], _step(search, nearer)
-
-
-def torque_scale(problem: Problem, current: Current, own: int, pool: Sequence[Candidate]) -> list[Candidate]:
-    """What makes the torques of all motors larger by one factor, where the model has masses that nobody would get so wrong:
-    where only motion was measured, masses, rotors and friction that are all smaller by it move alike. Nothing where
-    ``pool`` is of less than half of the kinds of effects that there are: who asks for some wants these."""
-    if 2 * len({c.effect for c in pool}) < len({c.effect for c in pool_of(problem)}):
-        return []
-    masses = [t.values[0][1] for t in current.hypothesis[own:] if t.effect == MASS]
-    if not any(abs(change) > SELDOM_OFF for change in masses) or STRENGTH in {c.effect.name for c in current.parts}:
-        return []
-    found, joints = pool_of(problem, only=[STRENGTH]), find(STRENGTH).targets(problem.robot)
-    return [c for c in found if len(c.members(problem.robot) or (c.target,)) == len(joints)][:1]
 
 
 def _surely(search: Search, current: Current, then: Current, tried: int) -> bool:

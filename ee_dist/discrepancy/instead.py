@@ -66,12 +66,17 @@ class Instead:
 
 
 def instead_of(
-    search: Search, current: Current, own: int, pool: Sequence[Candidate], asked: AbstractSet[str] = frozenset()
+    search: Search,
+    current: Current,
+    own: int,
+    pool: Sequence[Candidate],
+    asked: AbstractSet[str] = frozenset(),
+    more: Sequence[tuple[Model, Array]] = (),
 ) -> list[Instead]:
     """What of ``pool`` could be in the place of an effect beyond the first ``own``, the best for each: the residual is larger by
     no more than two explanations may differ that are not told apart. Effects of which a little is in every robot, and that the
     model has at many joints, are asked for only if the rest is much nearer to the description then: else nobody needs to know
-    which of two it is; but all ``asked`` for (names) are."""
+    which of two it is; but all ``asked`` for (names) are. ``more``: exchanges to try beside, and where from."""
     model = Model(current.parts)
     (base,) = search.residuals([model.hypothesis(current.u)])
     search = search.among(calm_trials(search.problem, base))
@@ -79,7 +84,7 @@ def instead_of(
     # What is alike in one trial is tried on all.
     one = telling(search.problem, base, search.trials or range(len(search.problem.trials)))
     looked = search if one is None else search.among([one])
-    starts = _promising(looked, np.where(looked.everything, base, 0.0), current, own, pool, asked)
+    starts = [*more, *_promising(looked, np.where(looked.everything, base, 0.0), current, own, pool, asked)]
     if not starts:
         return []
     now, *fits = follow_valley(search, [(model, current.u), *starts], mine, PRIOR, widths=(WIDTH,))

@@ -386,11 +386,11 @@ class _Import:
 
     def _look_at_torques(self, torques: Array | None, joints: Array) -> None:
         """Torques beside what the motion needs. Raises MeasurementError for a unit that cannot be."""
-        beside = None if torques is None else torques_beside_need(self.robot, torques, joints, self.step_s)
-        if beside is None:
+        known = [m in self.mapping.torques for m in self.robot.motor_names]
+        judged = None if torques is None else torques_beside_need(self.robot, torques, joints, self.step_s, known)
+        if judged is None:
             return
         units, names = torque_units(self.robot), [m for m in self.robot.motor_names if m in self.mapping.torques]
-        judged = [beside[k] for k, m in enumerate(self.robot.motor_names) if m in names]
         for m, relation in zip(names, judged, strict=True):
             self._judge(torque_suspicion(f"{TORQUE} {m}", relation, units[m]), self.mapping.torques[m])
         if note := torques_suspicion(names, judged):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ee_dist.basics.altered import altered
@@ -45,15 +47,18 @@ def beside_need(values: Array, needed: tuple[Array, Array], step_s: float) -> li
     return found
 
 
-def torques_beside_need(robot: Robot, torques: Array, position: Array, step_s: float) -> list[signals.Relation] | None:
-    """How the torques (T, J) of all joints go with what their motion (T, J) needs: by the robot as described, or without
-    the rotors that somebody guessed at, whichever tells more. Rotors that are an order of magnitude off hide what links
-    need."""
+def torques_beside_need(
+    robot: Robot, torques: Array, position: Array, step_s: float, known: Sequence[bool]
+) -> list[signals.Relation] | None:
+    """How the torques (T, J) of the joints at which they are ``known`` go with what their motion (T, J) needs: by the robot
+    as described, or without the rotors that somebody guessed at, whichever tells more. Rotors that are an order of
+    magnitude off hide what links need."""
     found = []
     guessed = {joint for joint, field in robot.assumed if field == "rotor_inertia"}
     bare = tuple(altered(d, rotor_inertia=0.0) if d.joint in guessed else d for d in robot.drives)
     for model in (robot, altered(robot, drives=bare)) if guessed else (robot,):
         needed = torques_needed(model, position, step_s)
         if needed is not None:
-            found.append(beside_need(torques, needed, step_s))
+            need, speed = (of_all[:, known] for of_all in needed)
+            found.append(beside_need(torques[:, known], (need, speed), step_s))
     return [max(of_one, key=lambda r: abs(r.correlation)) for of_one in zip(*found, strict=True)] if found else None

@@ -9,13 +9,14 @@ from way_samples import Sample, measure, problem_by
 from ee_dist.discrepancy.evidence.holdout import PRIOR, travelling
 from ee_dist.discrepancy.evidence.intervals import parameters
 from ee_dist.discrepancy.examine import Current
-from ee_dist.discrepancy.exchanges import STRENGTH, nearest
+from ee_dist.discrepancy.exchanges import nearest
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.discrepancy.told import Told, told_only
+from ee_dist.discrepancy.torque_scale import STRENGTH
 from ee_dist.effects.catalogue import Term, term
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.excitation import Excitation

@@ -1,0 +1,70 @@
+"""The strength of all motors: where only motion was measured, masses, rotors, friction and torques that are all larger by
+one factor move alike.
+
+A mass that nobody would get so wrong may be a torque that is: of motors whose data sheet is of another voltage, say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import Candidate
+from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.effects.catalogue import Term, find, term
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+MASS, STRENGTH = "part_mass", "motor_strength"
+SELDOM_OFF = 0.3
+"""Share by which masses off a scale or a drawing seldom are."""
+SCALED = ("N.m", "N.m.s/rad", "N.m/rad", "kg.m^2", "kg")
+"""Units of what is larger with the torques."""
+
+
+def other_scale(
+    problem: Problem, current: Current, own: int, pool: Sequence[Candidate]
+) -> Iterator[tuple[Model, Array]]:
+    """The model with the strength of all motors in the place of each mass, of those beyond its first ``own`` parts, that is
+    far off, and where this leads if all follow by one factor. Nothing where ``pool`` is of less than half of the kinds of
+    effects that there are: who asks for some wants these."""
+    terms, parts = current.hypothesis, current.parts
+    far = [k for k in range(own, len(parts)) if terms[k].effect == MASS and abs(_change(terms[k])) > SELDOM_OFF]
+    if not far or STRENGTH in {t.effect for t in terms}:
+        return
+    if 2 * len({c.effect for c in pool}) < len({c.effect for c in pool_of(problem)}):
+        return
+    joints = find(STRENGTH).targets(problem.robot)
+    for c in pool_of(problem, only=[STRENGTH]):
+        if len(c.members(problem.robot) or (c.target,)) != len(joints):
+            continue
+        for k in far:
+            factor = 1.0 / (1.0 + _change(terms[k]))
+            stay = [i for i in range(len(parts)) if i != k]
+            new = [_scaled(problem.robot, terms[i], factor) if i >= own else terms[i] for i in stay]
+            model = Model((*(parts[i] for i in stay), c))
+            u = [
+                *(parts[i].shares(dict(t.values)) for i, t in zip(stay, new, strict=True)),
+                c.shares({"change": factor - 1.0}),
+            ]
+            yield model, np.clip(np.concatenate(u), model.lower, model.upper)
+        return
+
+
+def _change(t: Term) -> float:
+    return float(t.values[0][1])
+
+
+def _scaled(robot: Robot, t: Term, factor: float) -> Term:
+    """A term with all of what it is on top of larger by a factor, where that goes with torques."""
+    if t.effect == MASS:
+        return term(MASS, t.target, change=(1.0 + _change(t)) * factor - 1.0)
+    drive = next((d for d in robot.drives if d.joint == t.target), None)
+    values = {}
+    for p, (name, value) in zip(find(t.effect).parameters, t.values, strict=True):
+        described = float(getattr(drive, p.on_top, 0.0)) if p.on_top and drive is not None else 0.0
+        values[name] = (described + value) * factor - described if p.unit in SCALED else value
+    return term(t.effect, t.target, **values)
