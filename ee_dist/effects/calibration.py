@@ -59,6 +59,22 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, stronger)
 
 
+STRONGEST, STRONGER_AT_LEAST = 5.0, 1.2
+"""Times as strong as described that a motor may be, where its controller stays slow enough for the time step; and in any case."""
+
+
+def _strengths(robot: Robot, target: str) -> dict[str, Range]:
+    drive = scales.drive_of(robot, target)
+    own, most = _steepest(robot, drive)
+    damping = own + (drive.kp if drive.command == "speed" else drive.kd)
+    stiff = drive.kp if drive.command == "position" else 0.0
+    spare = (
+        scales.firmest(robot, target) / stiff if stiff > 0 else STRONGEST,
+        most / damping if damping > 0 else STRONGEST,
+    )
+    return {"change": (-0.7, min(STRONGEST, max(STRONGER_AT_LEAST, min(spare))) - 1.0)}
+
+
 @effect(
     "motor_strength",
     family="drive",
@@ -66,7 +82,7 @@ def motor_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     parameters=(
         Parameter("change", "1", -0.9, 9.0, 0.0, "change of all torque that the motor makes, as a share", 0.01),
     ),
-    ranges=scales.always(change=(-0.7, 4.0)),
+    ranges=_strengths,
     physics="The motor is stronger or weaker than described, by one factor at any speed: stall torque and gains of the controller"
     " alike, as where a data sheet is of another voltage.",
     signature="Where only motion is measured, all masses, rotors and friction off by the inverse factor look the same.",
