@@ -16,6 +16,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import gauss_newton, weighed
 from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.trials.log import Array
 
 NOT_FAR, CHORDS = 5.0, 3
 """How far from neutral, in halves of its interval, a value is without which it is simulated, and in how many steps the others
@@ -79,7 +80,7 @@ def _not_missed(search: Search, fit: Fit, own: int) -> _Without | None:
     those without which the model is nearest to the description. None where each is missed. Along a ridge slopes over finite
     steps rise where the residual does not, and their intervals are too narrow. How far a value is told goes with the root
     of what it costs to go without it (the likelihood ratio beside Wald's test). Of few values all are tried, by fits."""
-    told, few = _told(search.problem, fit), len(fit.u) <= FEW
+    told, few = _told(fit, half_widths(search.problem, fit)), len(fit.u) <= FEW
     units = [unit for unit in units_of(fit.model, own, len(told)) if few or max(told[k] for k in unit) < NOT_FAR]
     if not units:
         return None
@@ -117,15 +118,15 @@ def _followed(search: Search, starts: Sequence[Fit]) -> list[Fit]:
     return best
 
 
-def _told(problem: Problem, fit: Fit) -> list[float]:
-    """How far each part is told from neutral, as a multiple of half its interval."""
-    half = half_widths(problem, fit)
+def _told(fit: Fit, half: Array) -> list[float]:
+    """How far each part is told from neutral, as a multiple of ``half`` (P,) its intervals."""
     return [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in fit.model.places]
 
 
 def _least_told(problem: Problem, fit: Fit, own: int, open_only: bool) -> list[int]:
     """Numbers of the parts, from ``own`` on, that are told least, if their intervals hold neutral."""
-    half, places, told = half_widths(problem, fit), fit.model.places, _told(problem, fit)
+    half, places = half_widths(problem, fit), fit.model.places
+    told = _told(fit, half)
     units = units_of(fit.model, own, len(told))
     if open_only:
         units = [unit for unit in units if any(np.max(half[places[k]], initial=0.0) > 1.0 for k in unit)]

@@ -65,14 +65,10 @@ STRONGEST, STRONGER_AT_LEAST = 5.0, 1.2
 
 def _strengths(robot: Robot, target: str) -> dict[str, Range]:
     drive = scales.drive_of(robot, target)
-    own, most = _steepest(robot, drive)
-    damping = own + (drive.kp if drive.command == "speed" else drive.kd)
     stiff = drive.kp if drive.command == "position" else 0.0
-    spare = (
-        scales.firmest(robot, target) / stiff if stiff > 0 else STRONGEST,
-        most / damping if damping > 0 else STRONGEST,
-    )
-    return {"change": (-0.7, min(STRONGEST, max(STRONGER_AT_LEAST, min(spare))) - 1.0)}
+    stiffer = scales.firmest(robot, target) / stiff if stiff > 0 else math.inf
+    most = min(stiffer, _times_steeper(robot, drive))
+    return {"change": (-0.7, min(STRONGEST, max(STRONGER_AT_LEAST, most)) - 1.0)}
 
 
 @effect(
@@ -171,6 +167,13 @@ def _steepest(robot: Robot, drive: Drive) -> tuple[float, float]:
     return own, STABLE * scales.steady(robot, drive.joint) / robot.time_step_s
 
 
+def _times_steeper(robot: Robot, drive: Drive) -> float:
+    """By how many times all damping of the drive, its motor's and its controller's, may grow; endless where it has none."""
+    own, most = _steepest(robot, drive)
+    damping = own + (drive.kp if drive.command == "speed" else drive.kd)
+    return most / damping if damping > 0 else math.inf
+
+
 NEXT_TO_NONE = 0.01
 """Of a gain on speed: with none at all the drive would be none that has such a gain, and no other factor could act on it."""
 
@@ -229,10 +232,8 @@ def rotor_factor(robot: Robot, target: str, values: Mapping[str, float]) -> Robo
 
 def _gears(robot: Robot, target: str) -> dict[str, Range]:
     # Damping at the joint grows with the square of the ratio.
-    drive = scales.drive_of(robot, target)
-    own, most = _steepest(robot, drive)
-    damping = own + (drive.kp if drive.command == "speed" else drive.kd)
-    return {"change": (-0.4, min(0.6, max(0.02, math.sqrt(most / damping) - 1.0)) if damping > 0 else 0.6)}
+    steeper = _times_steeper(robot, scales.drive_of(robot, target))
+    return {"change": (-0.4, min(0.6, max(0.02, math.sqrt(steeper) - 1.0)))}
 
 
 @effect(

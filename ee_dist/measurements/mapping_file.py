@@ -232,7 +232,7 @@ def _column(value: Any, where: str, unit: str = "1") -> Column:
         value = {"column": value, "unit": unit}
     column: Column = _made(Column, value, where)
     if UNKNOWN in (column.column, column.unit):
-        more = "; where none were recorded, take 'commands' out" if "commands" in where else ""
+        more = "; where none were recorded, take 'commands' out" if ": commands" in where else ""
         raise MeasurementError(f"{where}: still {quoted(UNKNOWN)}: fill in what only you can know{more}")
     if column.unit not in UNITS:
         raise MeasurementError(f"{where}: no unit {quoted(column.unit)}; {nearest(column.unit, UNITS)}")
