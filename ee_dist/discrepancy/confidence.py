@@ -11,7 +11,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
 
-from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, contains, least_energy
+from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, contains
+from ee_dist.discrepancy.evidence.rule import least_energy
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, Explanation
 
 COUNTED_WAY = "open_loop"

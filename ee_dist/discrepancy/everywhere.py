@@ -13,7 +13,8 @@ import numpy as np
 
 from ee_dist.discrepancy.assumed import beside, puts_right
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, held_by_slopes
-from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge, least_energy
+from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge
+from ee_dist.discrepancy.evidence.rule import least_energy
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import error, per_segment

@@ -17,8 +17,9 @@ import numpy as np
 from ee_dist.discrepancy.assumed import assumed_drives
 from ee_dist.discrepancy.evidence.by_joint import gains_of
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
-from ee_dist.discrepancy.evidence.judge import Judged, judge, least_energy, no_more_than_noise, ranked
+from ee_dist.discrepancy.evidence.judge import FEW_SHOW, Judged, judge, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
+from ee_dist.discrepancy.evidence.rule import least_energy, no_more_than_noise
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -169,7 +170,10 @@ def _judged(
     for cut in cuts:
         again = under(search, current, starts, cut, base, tried, leading)
         found = strictest(found, again) if found else again
-    return found
+    alone = [j for j in found if j.partly and j.earned]
+    for j in alone:
+        j.why_not = FEW_SHOW.format(kinds=j.held_out.split()[0])
+    return ranked(found) if alone else found
 
 
 def _first(found: Sequence[Looked], count: int) -> list[Looked]:
@@ -193,23 +197,25 @@ def under(
 ) -> list[Judged]:
     """Proposals fitted together with the current model and judged under one cut, ranked; effects at many joints also at those
     alone where they pay."""
-    without = base
+    problem, without = search.problem, base
+    fitted = [float((base[seen] ** 2).sum()) for k in range(cut.folds) if not (seen := cut.seen(problem, k)).all()]
     if len(current.u):
         # Of many values, fits that know the slopes stay nearer to where all data put them than fits that do not: a useless
         # effect would look right for that alone.
         same = leading if len(current.u) >= LARGE else None
-        without = cross_fit(search, [(Model(current.parts), current.u)], cut, leading=same)[0].residual
+        before = cross_fit(search, [(Model(current.parts), current.u)], cut, leading=same)[0]
+        without, fitted = before.residual, [f.energy for f in before.fits]
 
     def judged(some: Sequence[tuple[Proposal, Array]]) -> list[Judged]:
         models = [(Model((*current.parts, *p.parts)), np.concatenate([current.u, u])) for p, u in some]
         outcomes = cross_fit(search, models, cut, leading=leading)
         return [
-            judge(search.problem, without, outcome, p, model, tried)
+            judge(problem, without, outcome, p, model, tried, fitted=fitted)
             for outcome, (p, _), (model, _) in zip(outcomes, some, models, strict=True)
         ]
 
     found = judged(starts)
-    fewer = _where_they_pay(search.problem, without, found)
+    fewer = _where_they_pay(problem, without, found)
     return ranked([*found, *judged(fewer)] if fewer else found)
 
 
@@ -234,15 +240,18 @@ def _where_they_pay(problem: Problem, without: Array, found: Sequence[Judged]) -
 
 
 def strictest(first: Sequence[Judged], second: Sequence[Judged]) -> list[Judged]:
-    """Under two cuts an effect must earn its place under both; the one under which it did worse speaks for it. What only one of
-    them asked for, at the joints where it pays there, has not."""
+    """Under two cuts an effect must earn its place under both; the one under which it did worse speaks for it, or that of which
+    every turn tells its value. What only one of them asked for, at the joints where it pays there, has not."""
     other = {j.name: j for j in second}
     out = []
     for j in first:
         if j.name not in other:
             continue
         k = other[j.name]
-        out.append(k if (not k.earned and j.earned) or (k.earned == j.earned and k.explained < j.explained) else j)
+        if j.earned and k.earned and j.partly != k.partly:
+            out.append(k if j.partly else j)
+        else:
+            out.append(k if (not k.earned and j.earned) or (k.earned == j.earned and k.explained < j.explained) else j)
     return ranked(out)
 
 

@@ -17,8 +17,9 @@ from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import everywhere, stands_out
 from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
-from ee_dist.discrepancy.evidence.judge import LUCK, NEAR, Judged, judge, no_more_than_noise
+from ee_dist.discrepancy.evidence.judge import Judged, judge
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_be_noise
+from ee_dist.discrepancy.evidence.rule import LUCK, NEAR, no_more_than_noise
 from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.exchanges import exchanged, nearest, refitted, strictest, twins_of

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, cross_fit, held_by_slopes
-from ee_dist.discrepancy.evidence.judge import WORTH, least_energy
+from ee_dist.discrepancy.evidence.rule import WORTH, least_energy
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.fit import fit_all

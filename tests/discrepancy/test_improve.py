@@ -10,7 +10,7 @@ from linear_problem import ROBOT, Linear
 
 import ee_dist.discrepancy.improve as improving
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
-from ee_dist.discrepancy.evidence.judge import TOO_LITTLE
+from ee_dist.discrepancy.evidence.rule import TOO_LITTLE
 from ee_dist.discrepancy.examine import STANDARD_EFFORT
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED, NOTHING_LEFT, improve

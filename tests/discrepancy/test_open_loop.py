@@ -13,8 +13,8 @@ from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import compare
-from ee_dist.discrepancy.evidence.judge import LUCK
 from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.evidence.rule import LUCK
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of

@@ -32,8 +32,9 @@ from ee_dist.discrepancy.accounts.account import (
 )
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
 from ee_dist.discrepancy.evidence.intervals import at_bound
-from ee_dist.discrepancy.evidence.judge import LUCK, Judged, contains
+from ee_dist.discrepancy.evidence.judge import Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
+from ee_dist.discrepancy.evidence.rule import LUCK
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem

@@ -1,5 +1,4 @@
-"""The rule of evidence, the same for every way of comparing: what an effect is worth on data it was not fitted to, and
-which effects cannot be told apart there."""
+"""What an effect is worth on data it was not fitted to, and which effects cannot be told apart there."""
 
 from __future__ import annotations
 
@@ -9,45 +8,23 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.holdout import WINDOWS, Cut, HeldOut, bootstrap, travelling
+from ee_dist.discrepancy.evidence.holdout import WINDOWS, HeldOut, bootstrap
 from ee_dist.discrepancy.evidence.intervals import half_widths
+from ee_dist.discrepancy.evidence.rule import NEAR, WORTH, least_energy, may_be_zero, told_in, why_not
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
-LEAST_SHARE = 0.002
-"""Share of the starting energy that an effect must take off held-out data to be worth a term."""
-LOST_SHARE = 0.3
-"""An interval that reaches zero counts against an effect only where it makes some pieces of evidence worse by this share of
-its gain: an effect that shows in one window of twenty, and harms none, is no less true for that."""
-CAUTION = 2.0
-"""By how much more an effect must gain than one did on an untouched robot: there the model's own error happened to look
-like an effect, and on the next robot noise adds to it."""
 TIE_ENERGY = 9.0
 """Two explanations closer than this (3 standard deviations, squared) on held-out data are not told apart."""
 APART = 6.0
 """Held-out energy of an explanation, over that of another, from which it is no other explanation of the same."""
-WORTH = 0.1
-"""Share of the squared error above the noise floor that an effect must take off where more than noise is left with it.
-Where a model is wrong in ways that no effect describes (another simulator, resampled records), some effect always takes a
-little of it, surely and wrongly."""
-NEAR = 1.1
-"""Error, over what is noise beyond doubt, up to which windows of the same motions are evidence enough: no more than noise is
-left. A floor that is only an upper bound makes no evidence weaker."""
-ALONE = 0.3
-"""The same where a single motion is all the evidence, but for what a robot's description leaves open (friction, rotors and gains
-of the drives). Windows of one motion share what a model gets wrong in it, and something always takes part of that: on a real arm
-without a load (UR10e) a payload takes 21 %, and a heavier last link as much."""
 FULLER = 0.8
 """Share of what a law leaves above the noise that the same with a further term must leave at most, to go before it in a tie."""
-STARTS = 3.0
-"""Standard deviations of what starts that are off do to a residual, beyond which it is not theirs."""
-LUCK = "its gain on held-out data is no more than luck"
-MAY_BE_ZERO = "its gain on held-out data may be zero"
-TOO_LITTLE = "it takes too little of what is above the noise"
 VAGUE = "none of its numbers is told from neutral; a plainer effect explains as much for each of its own"
+FEW_SHOW = "only some of the {kinds} tell its value: record more that show it"
 
 
 @dataclass(eq=False)
@@ -73,6 +50,8 @@ class Judged:
     why_not: str = ""
     vague: bool = False
     """Whether it has several numbers of which these data tell none from neutral: it patches what others say plainly."""
+    partly: bool = False
+    """Whether it earned its place in some turns alone, since nothing that was fitted in the others shows it."""
     rank: int = 0
     tied_with: list[str] = field(default_factory=list)
 
@@ -114,12 +93,6 @@ class Judged:
         return self.proposal.name
 
 
-def least_energy(tried: int, parameters: int = 1) -> float:
-    """Energy that the best of ``tried`` useless candidates may take off by luck, with a margin: the largest of that many
-    chi-squared values with one degree of freedom is about 2 ln(tried), and every further parameter adds to it."""
-    return 2.0 * math.log(max(tried, 2)) + 8.0 + 2.0 * parameters
-
-
 def judge(
     problem: Problem,
     base: Array,
@@ -128,27 +101,26 @@ def judge(
     model: Model,
     tried: int,
     least: float = 1.0,
+    fitted: Sequence[float] = (),
 ) -> Judged:
     """``base`` (n,): held-out residual of the model without the proposal, under the same cut. ``least``: mean square of a
-    residual value from which it counts: 1, the resolution at which channels are compared, or less where noise is less."""
+    residual value from which it counts: 1, the resolution at which channels are compared, or less where noise is less.
+    ``fitted`` (fits,): energy that the model without the proposal leaves, in each turn, of what is fitted there."""
     cut = found.cut
     before, held = per_segment(problem, base), per_segment(problem, found.residual)
     gained = cut.by_unit(before - held)
     low, high = bootstrap(gained, groups=cut.groups)
     total, gain = float(before.sum()), float(gained.sum())
     floor = float(problem.floor.sum())
-    dispersion = max(least, float(held.sum()) / len(base))
-    # Where a model is wrong all over, useless effects take more off it by luck, in proportion.
-    enough = least_energy(tried, max(1, proposal.size)) * dispersion + CAUTION * problem.gained
     above = max(total - floor, 1e-12)
-    counts = min(gain, total - floor - _of_starts(problem)) if problem.layout.by_segment else gain
-    why = ""
-    if not np.isfinite(gain) or counts < enough:
-        why = LUCK
-    elif _may_be_zero(gained, low):
-        why = MAY_BE_ZERO
-    elif gain < LEAST_SHARE * total or gain < _worth(problem, cut, proposal, held) * above:
-        why = TOO_LITTLE
+    why = why_not(problem, cut, proposal, before, held, tried, least)
+    partly = False
+    if why and fitted:
+        told = told_in(problem, found, fitted, proposal, tried)
+        if told.any() and not told.all():
+            partly = not why_not(problem, cut, proposal, before, held, tried, least, told)
+            why = "" if partly else why
+    dispersion = max(least, float(held.sum()) / len(base))
     values = np.mean([f.u for f in found.fits], axis=0) if _agree(found) else _best(found)
     share = total if total > 0 else 1.0
     return Judged(
@@ -167,14 +139,8 @@ def judge(
         sure=float(problem.sure.sum()),
         why_not=why,
         vague=_vague(problem, found, proposal),
+        partly=partly,
     )
-
-
-def _of_starts(problem: Problem) -> float:
-    """Energy by which starts that are off may be above what they are on average. Anything that holds a motion back lets them grow
-    less, and goes below the floor: what it takes off there is no evidence for it."""
-    known = np.bincount(problem.segment_of, weights=problem.layout.known)
-    return STARTS * math.sqrt(2.0 * float(known @ known))
 
 
 def surely_better(problem: Problem, one: HeldOut, other: HeldOut, tried: int) -> bool:
@@ -188,22 +154,7 @@ def surely_better(problem: Problem, one: HeldOut, other: HeldOut, tried: int) ->
     if cut.name == WINDOWS:
         return True
     low, _ = bootstrap(gained, groups=cut.groups)
-    return not _may_be_zero(gained, low) and gain >= WORTH * (energy - float(problem.floor.sum()))
-
-
-def _worth(problem: Problem, cut: Cut, proposal: Proposal, held: Array) -> float:
-    """Share of what is above the noise that a proposal must take off; nothing where no more than noise is left with it."""
-    if cut.name != WINDOWS:
-        return WORTH
-    if no_more_than_noise(problem, float(held.sum())) or travelling(problem):
-        return 0.0
-    expected = all(c.effect.everywhere and c.effect.family == "drive" for c in proposal.parts)
-    return WORTH if expected else ALONE
-
-
-def no_more_than_noise(problem: Problem, energy: float) -> bool:
-    """Whether the energy of a held-out residual is that of noise, beyond doubt."""
-    return energy <= NEAR**2 * float(problem.sure.sum())
+    return not may_be_zero(gained, low) and gain >= WORTH * (energy - float(problem.floor.sum()))
 
 
 def _vague(problem: Problem, found: HeldOut, proposal: Proposal) -> bool:
@@ -214,16 +165,6 @@ def _vague(problem: Problem, found: HeldOut, proposal: Proposal) -> bool:
         if (np.abs(fit.u[-proposal.size :]) > half).any():
             return False
     return True
-
-
-def _may_be_zero(gained: Array, low: float) -> bool:
-    """Whether what pieces of evidence gained may be nothing. ``low``: the lower end of the interval of their sum."""
-    return low <= 0 and lost(gained) > LOST_SHARE * float(gained.sum())
-
-
-def lost(gained: Array) -> float:
-    """Energy that pieces of evidence lose where the effect makes them worse."""
-    return float(-np.minimum(gained, 0.0).sum())
 
 
 def _agree(found: HeldOut) -> bool:
