@@ -12,7 +12,7 @@ readings, s, and 0 where there is one in every row.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -28,7 +28,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, SensorLog
 
 LIBRARY = (
     Excitation("rest", 2.0),
@@ -50,6 +50,8 @@ SHORTEST = 60
 """Readings of a trial that can be compared: a window of the open-loop way."""
 TOGETHER = 400_000
 """Robot-steps that are simulated between two words on the progress."""
+AT_STOP = 0.01
+"""Share of a joint's range from its end at which it is at its stop."""
 FARTHEST = 0.5
 """How far, as a share of its range, a value may move to make up for a difference: slopes hold no farther."""
 
@@ -70,11 +72,13 @@ class Contender:
 class PlannedTrial:
     """``separations``: predicted distance of each pair of explanations on this trial, in the order of ``combinations``, in
     standard deviations of what the model cannot know; ``separation``: that of the pair that decides (see ``ranked``), the
-    two most similar. Below ENOUGH the trial would not tell them apart."""
+    two most similar. Below ENOUGH the trial would not tell them apart. ``harm``: what would happen to the robot on it, that
+    nobody wants; such a trial tells nothing."""
 
     excitation: Excitation
     separation: float
     separations: tuple[float, ...] = ()
+    harm: str = ""
 
 
 def next_trials(
@@ -132,10 +136,10 @@ def _predicted(
     every_s: float,
 ) -> list[PlannedTrial]:
     best = contenders[0].hypothesis
-    ahead = ahead_of(robot, best, excitations, evaluator, every_s)
-    usable = [k for k, t in enumerate(ahead) if t.log.finite and len(t.log.readings) >= SHORTEST]
+    ahead, logs = _ahead(robot, best, excitations, evaluator, every_s)
     none = tuple(0.0 for _ in combinations(contenders, 2))
-    out = [PlannedTrial(e, 0.0, none) for e in excitations]
+    out = [PlannedTrial(e, 0.0, none, harm(robot, log)) for e, log in zip(excitations, logs, strict=True)]
+    usable = [k for k, t in enumerate(ahead) if t.log.finite and len(t.log.readings) >= SHORTEST and not out[k].harm]
     if not usable:
         return out
     problem = OpenLoop([ahead[k] for k in usable], robot, evaluator, before=best)
@@ -160,6 +164,13 @@ def ahead_of(
     every_s: float = 0.0,
 ) -> list[MeasuredTrial]:
     """Trials that were not made yet, as one explanation predicts them."""
+    return _ahead(robot, best, excitations, evaluator, every_s)[0]
+
+
+def _ahead(
+    robot: Robot, best: Hypothesis, excitations: Sequence[Excitation], evaluator: Evaluator, every_s: float
+) -> tuple[list[MeasuredTrial], list[SensorLog]]:
+    """These, and what happens in every step of them."""
     model = apply(robot, best)
     jobs, drivers = [], []
     for e in excitations:
@@ -167,13 +178,37 @@ def ahead_of(
         drivers.append(driver)
         # Sensors act on a network in their loop, and on planned commands not at all.
         jobs.append(
-            Job(Rollout(clean(held) if isinstance(driver, Commands) else held, driver, e.steps(robot), 0), Whole())
+            Job(
+                Rollout(clean(held) if isinstance(driver, Commands) else held, driver, e.steps(robot), 0, pose=True),
+                Whole(),
+            )
         )
     logs = evaluator.evaluate(jobs)
-    return [
-        MeasuredTrial(str(e), read_every(log, every_s), driver, setup_of(e))
+    # Where joints are is for the robot's safety: of what was measured nobody knows it.
+    trials = [
+        MeasuredTrial(
+            str(e), replace(read_every(log, every_s), joints=None, torques=None, base_pose=None), driver, setup_of(e)
+        )
         for e, log, driver in zip(excitations, logs, drivers, strict=True)
     ]
+    return trials, logs
+
+
+def harm(robot: Robot, log: SensorLog) -> str:
+    """Where a trial drives a joint into its stop, or faster than it may go; nothing where it does not. Torques that are
+    commanded hold nothing: an arm falls, and nobody's controller is in between. Positions are kept by the robot's own."""
+    if log.joints is None or not log.finite:
+        return ""
+    for k, d in enumerate(robot.drives):
+        if d.command == "position":
+            continue
+        joint, at = robot.joint(d.joint), log.joints[:, k]
+        room = AT_STOP * (joint.upper - joint.lower)
+        if np.isfinite(room) and (np.nanmax(at) > joint.upper - room or np.nanmin(at) < joint.lower + room):
+            return f"{d.joint} meets its stop"
+        if np.nanmax(np.abs(np.diff(at))) > joint.top_speed * robot.time_step_s:
+            return f"{d.joint} goes faster than {joint.top_speed:.3g} {'m' if joint.kind == 'slide' else 'rad'}/s"
+    return ""
 
 
 Sloped = tuple[Array, Array, Array]
@@ -233,11 +268,9 @@ def ranked(count: int, trials: Sequence[PlannedTrial]) -> Plan:
     reach = np.max([t.separations for t in trials], axis=0)
     told = np.flatnonzero(reach >= ENOUGH)
     deciding = told if len(told) else np.arange(len(pairs))
-    scored = [
-        PlannedTrial(t.excitation, float(np.min(np.array(t.separations)[deciding])), t.separations) for t in trials
-    ]
+    scored = [replace(t, separation=float(np.min(np.array(t.separations)[deciding]))) for t in trials]
     # Of trials that separate as well the gentler one.
-    ordered = sorted(scored, key=lambda t: (-round(t.separation, 6), t.excitation.amplitude))
+    ordered = sorted(scored, key=lambda t: (bool(t.harm), -round(t.separation, 6), t.excitation.amplitude))
     alike = tuple(p for k, p in enumerate(pairs) if reach[k] < ENOUGH)
     closest = pairs[min(deciding, key=lambda k: ordered[0].separations[k])]
     return Plan(tuple(ordered), alike, bool(len(told)) and ordered[0].separation >= ENOUGH, closest)

@@ -20,7 +20,9 @@ from ee_dist.trials.log import Array
 
 MASS, STRENGTH = "part_mass", "motor_strength"
 SELDOM_OFF = 0.3
-"""Share by which masses off a scale or a drawing seldom are."""
+"""Share by which a mass off a scale or a drawing seldom is,"""
+ALL_OFF = 0.1
+"""and all of them by one factor."""
 SCALED = ("N.m", "N.m.s/rad", "N.m/rad", "kg.m^2", "kg")
 """Units of what is larger with the torques."""
 
@@ -29,10 +31,11 @@ def other_scale(
     problem: Problem, current: Current, own: int, pool: Sequence[Candidate]
 ) -> Iterator[tuple[Model, Array]]:
     """The model with the strength of all motors in the place of each mass, of those beyond its first ``own`` parts, that is
-    far off, and where this leads if all follow by one factor. Nothing where ``pool`` is of less than half of the kinds of
-    effects that there are: who asks for some wants these."""
+    far off, or of all masses, and where this leads if all follow by one factor. Nothing where ``pool`` is of less than half
+    of the kinds of effects that there are: who asks for some wants these."""
     terms, parts = current.hypothesis, current.parts
-    far = [k for k in range(own, len(parts)) if terms[k].effect == MASS and abs(_change(terms[k])) > SELDOM_OFF]
+    least = [ALL_OFF if c.members(problem.robot) else SELDOM_OFF for c in parts]
+    far = [k for k in range(own, len(parts)) if terms[k].effect == MASS and abs(_change(terms[k])) > least[k]]
     if not far or STRENGTH in {t.effect for t in terms}:
         return
     if 2 * len({c.effect for c in pool}) < len({c.effect for c in pool_of(problem)}):

@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from ee_dist.basics.files import write_whole
+from ee_dist.basics.names import listed
 from ee_dist.discrepancy.contenders import contenders, suspected
 from ee_dist.discrepancy.measured_trial import reading_s
 from ee_dist.discrepancy.plan import Contender, Plan, parting, predicted, ranked
@@ -120,6 +121,8 @@ def run(config: Config, options: Options, out: Path) -> Plan:
         evaluator = evaluator_of(found.config)
         windows = len(problem.segments)
         result = ranked(len(rivals), predicted(robot, rivals, wanted, evaluator, left, windows, progress, every_s))
+        if result.best.harm:
+            raise ConfigError(harmful(robot, result))
         best, models = result.best.excitation, [c.hypothesis for c in rivals]
         shown = parting(robot, models, result.closest, best, evaluator, every_s)
     out.mkdir(parents=True, exist_ok=True)
@@ -153,6 +156,16 @@ def nothing_tied(found: Explained) -> str:
         said = "nothing is missing" if found.verdict == "nothing_missing" else "nothing that was tried explains it"
         return f"{where}: its verdict is that {said}, so that nothing is tied; {more}"
     return f"{where}: nothing is tied with {found.explanations[0][0]}: no further trial is needed to tell; {more}"
+
+
+def harmful(robot: Robot, found: Plan) -> str:
+    """Why none of the trials may be made, in one line, and what to do."""
+    worst = listed(sorted({t.harm for t in found.trials}))
+    return (
+        f"{robot.name}: on each of {len(found.trials)} trials that were tried, with torques that nothing corrects, a joint "
+        f"would come to harm ({worst}); allow less (task.amplitude, task.seconds, task.excursion), or record another "
+        "motion with the robot's own controller in the loop"
+    )
 
 
 def motions(robot: Robot, options: Options, seed: int, every_s: float = 0.0) -> list[Excitation]:

@@ -1,4 +1,4 @@
-"""An effect that shows in one kind of motion only: where that is held out nothing tells its value, and nothing speaks against it."""
+"""An effect that shows in one kind of motion only: where that is held out nothing tells its value, nor speaks against it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,9 @@ class OneMotion(Linear):
 def judged(problem: OneMotion) -> list[Judged]:
     parts = (candidate(problem.robot, OTHER.effect, OTHER.target),)
     pool = [candidate(problem.robot, LIMIT.effect, LIMIT.target)]
-    found = examine(Search(problem), Current(parts, values_of(parts, (OTHER,))), pool, Effort(first=4, second=2, final=2))
+    found = examine(
+        Search(problem), Current(parts, values_of(parts, (OTHER,))), pool, Effort(first=4, second=2, final=2)
+    )
     return found.judged
 
 

@@ -128,6 +128,18 @@ def test_motions_and_settings_are_held_out_whole() -> None:
     assert travelling(problem) == []
 
 
+def test_torques_that_a_controller_worked_out_do_not_make_another_motion_of_a_repeat() -> None:
+    problem = Linear((), motions=2)
+    course = np.sin(np.arange(len(problem.data)) / 20.0)[:, None] * np.ones(len(ROBOT.motor_names))
+    late = np.roll(course, 2, axis=0)
+    another = np.cos(np.arange(len(problem.data)) / 33.0)[:, None] * np.ones(len(ROBOT.motor_names))
+    first, second = problem.measured
+    for joints, motions in ((late, 1), (another, 2)):
+        logs = (replace(first.log, joints=course), replace(second.log, joints=joints))
+        problem.measured = tuple(replace(t, log=log) for t, log in zip((first, second), logs, strict=True))
+        assert len({c.name for c in travelling(problem)}) == motions - 1
+
+
 def test_leftovers_of_noise_are_none() -> None:
     problem = Linear(())
     assert leftovers(problem, problem.residuals([()])[0]) == []

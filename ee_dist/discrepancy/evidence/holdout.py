@@ -18,7 +18,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, Leading
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.fixture import STAND
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, SensorLog
 
 WINDOWS, MOTIONS, SETTINGS = (
     "other windows of the same motions",
@@ -28,7 +28,9 @@ WINDOWS, MOTIONS, SETTINGS = (
 ONE_BY_ONE = 4
 """Up to so many motions or settings each is held out by itself; more take turns in two groups."""
 SAME_MOTION, SAME_LENGTH = 0.02, 0.9
-"""Two trials are one motion where their commands differ by less than this share of how much they vary, over nearly all of it."""
+"""Two trials are one motion where their commands differ by less than this share of how much they vary, over nearly all of it;"""
+SAME_COURSE = 0.15
+"""or their positions do by less than this: torques that a controller works out differ each time."""
 PRIOR = 1.0
 """Energy, beside noise, that a value at its bound costs in a fit that will be judged elsewhere: a value that the fitted part
 does not determine is neutral there, and not what the part held out would like it to be."""
@@ -116,8 +118,8 @@ def travelling(problem: Problem) -> list[Cut]:
 
 
 def _kinds(problem: Problem) -> list[int]:
-    """By trial: the number of its motion. Trials with the same commands (or, with none, positions) are repeats; so are those
-    of one name in which a controller was in the loop."""
+    """By trial: the number of its motion. Trials with the same commands or positions are repeats; so are those of one name in
+    which a controller was in the loop."""
     out: list[int] = []
     for k in range(len(problem.measured)):
         same = [j for j in range(k) if _alike(problem, j, k)]
@@ -129,10 +131,25 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
     one, other = problem.measured[a], problem.measured[b]
     if a in problem.looped or b in problem.looped:
         return one.name == other.name
-    motions = []
-    for log in (one.log, other.log):
-        seen = log.commands if np.isfinite(log.commands).any() or log.joints is None else log.joints
-        motions.append(np.asarray(seen))
+    if _near(one.log.commands, other.log.commands, SAME_MOTION):
+        return True
+    first, second = (_course(problem, t.log) for t in (one, other))
+    if not np.ptp(first, axis=0).any():
+        return False
+    commanded = any(np.isfinite(t.log.commands).any() for t in (one, other))
+    return _near(first, second, SAME_COURSE if commanded else SAME_MOTION)
+
+
+def _course(problem: Problem, log: SensorLog) -> Array:
+    """(T, K) positions of the joints, as they are known or read."""
+    if log.joints is not None:
+        return np.asarray(log.joints)
+    return np.asarray(log.sensors[:, [s.kind == "position" for s in problem.robot.sensors]])
+
+
+def _near(one: Array, other: Array, share: float) -> bool:
+    """Whether two courses (T, M) differ by less than a share of how much they vary."""
+    motions = [np.asarray(one), np.asarray(other)]
     rows = min(map(len, motions))
     if rows < SAME_LENGTH * max(map(len, motions)):
         return False
@@ -143,7 +160,7 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
         return False
     gap = np.sqrt(np.mean((first - second) ** 2, where=both))
     varies = [np.nanvar(column) for column in first.T if np.isfinite(column).any()]
-    return bool(gap <= SAME_MOTION * np.sqrt(np.mean(varies)))
+    return bool(gap <= share * np.sqrt(np.mean(varies)))
 
 
 def cross_fit(

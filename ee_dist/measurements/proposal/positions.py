@@ -89,7 +89,9 @@ def ask_for_positions(v: View) -> None:
     elif v.hints.joints is None and n > 1:
         v.out.ask(
             f"no columns can be told to be the positions of {names}; if they have no names, say task.joints=[...] "
-            "with the joints in the order of the columns, else write them into the mapping"
+            "with the joints in the order of the columns, else write them into the mapping; a joint that nobody recorded, and "
+            "that stood still, a gripper's say, goes into the description of the robot: 'fixed_joints: "
+            f"{{{v.robot.motor_names[-1]}: 0.0}}'"
         )
     else:
         mute = [b.name for b in v.blocks if v.moves(b) and b.reading.command is None and b.reading.kind is None]

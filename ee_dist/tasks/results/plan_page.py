@@ -90,7 +90,8 @@ def _rows(robot: Robot, found: Plan) -> list[list[str]]:
         kept.setdefault((t.excitation.told(robot), t.excitation.amplitude), t)
     return [
         [t.excitation.told(robot).replace("_", " "), f"{t.excitation.seconds:g}", f"{t.excitation.amplitude:g}",
-         str(t.excitation.seed), f"{t.separation:.1f}", "enough" if t.separation >= ENOUGH else "not enough"]
+         str(t.excitation.seed), "" if t.harm else f"{t.separation:.1f}",
+         t.harm or ("enough" if t.separation >= ENOUGH else "not enough")]
         for t in list(kept.values())[:SHOWN]
     ]  # fmt: skip
 
@@ -107,6 +108,7 @@ def of_plan(
             **t.excitation.as_dict(),
             "separation": t.separation,
             "enough": t.separation >= ENOUGH,
+            "harm": t.harm,
             "pairs": [
                 {"one": one, "other": other, "separation": s}
                 for (one, other), s in zip(pairs, t.separations, strict=True)
