@@ -265,6 +265,7 @@ def gear_ratio(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
             torque_limit=d.torque_limit * n,
             speed_limit=d.speed_limit / n,
             command_speed=d.command_speed / n,
+            command_acceleration=d.command_acceleration / n,
             command_gain=d.command_gain * n if d.command == "torque" else d.command_gain / n,
             zero_offset=d.zero_offset / n,
             deadband=d.deadband / n,

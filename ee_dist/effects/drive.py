@@ -137,6 +137,8 @@ def command_delay(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
     return with_more(robot, target, "delay_s", values["delay_s"])
 
 
+LONGEST_S = 2.0
+"""Longest time in which a profile reaches the speed of the motor by itself, s."""
 SLOWEST = 5.0
 """Times slower than the motor by itself, down to which a controller may hold a joint back."""
 
@@ -169,6 +171,39 @@ def command_speed(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
         return altered(drive, command_speed=1.0 / (1.0 / drive.command_speed + values["slowness_s_rad"]))
 
     return robot.map_drive(target, slower) if values["slowness_s_rad"] > 0 else robot
+
+
+def _reluctance(robot: Robot, target: str) -> dict[str, Range]:
+    return {"reluctance_s2_rad": (0.0, LONGEST_S / scales.speed(robot, target))}
+
+
+@effect(
+    "command_acceleration",
+    family="drive",
+    targets=position_drives,
+    parameters=(
+        Parameter(
+            "reluctance_s2_rad",
+            "s^2/rad",
+            0.0,
+            math.inf,
+            0.0,
+            "what the goal needs to gather speed, on top of nominal: 0.2 s^2/rad is no more than 5 rad/s^2",
+            0.01,
+        ),
+    ),
+    physics="The controller's goal gathers speed, and loses it before it arrives, no faster than a set acceleration: a "
+    "trapezoidal profile of the firmware.",
+    signature="Steps become curves that begin and end gently, whatever the load; slow motions show nothing.",
+    ranges=_reluctance,
+)
+def command_acceleration(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    def gentler(drive: Drive) -> Drive:
+        return altered(
+            drive, command_acceleration=1.0 / (1.0 / drive.command_acceleration + values["reluctance_s2_rad"])
+        )
+
+    return robot.map_drive(target, gentler) if values["reluctance_s2_rad"] > 0 else robot
 
 
 def _zeros(robot: Robot, target: str) -> dict[str, Range]:

@@ -67,7 +67,11 @@ class DrivePath:
         self.shape, self.one = shape, np.ones(shape)
         self.integral = np.zeros(shape)
         self.goal: Array | None = None
-        """Where a controller with a velocity limit has let its commands (B, M) go so far."""
+        """Where a controller with limits of its own has let its commands (B, M) go so far,"""
+        self.pace = np.zeros(shape)
+        """and how fast these go, where their acceleration is limited, rad/s."""
+        self.led = np.isfinite(p["command_speed"]) & (self.kind <= SPEED)
+        self.eased = np.isfinite(p["command_acceleration"]) & (self.kind == POSITION)
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
         limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
@@ -150,7 +154,7 @@ class DrivePath:
         open: no torque and no back-EMF; what sits on the joint (friction, spring, stops) stays.
         """
         wanted = self._command(command)
-        if self.uses["command_speed"]:
+        if self.uses["command_speed"] or self.uses["command_acceleration"]:
             wanted = self._limited(wanted, q, enabled)
         position, speed = (q, qd) if self.transmission is None else self.transmission.motor_side(q, qd)
         for function, rows, columns, context in self.speeds:
@@ -194,16 +198,25 @@ class DrivePath:
         return command
 
     def _limited(self, wanted: Array, q: Array, enabled: Array | None) -> Array:
-        """Commands under the velocity limits of their controllers. A goal sets out from where the joint stands, and stays with
-        it while the drive is released."""
+        """Commands under the limits of their controllers. A goal sets out from where the joint stands, and stays with it while
+        the drive is released."""
         top, led = self.p["command_speed"], self.kind == POSITION
         goal = q if self.goal is None else np.where(np.isnan(self.goal), q, self.goal)
         if enabled is not None:
             goal = np.where(enabled > 0, goal, q)
-        self.goal = np.where(
-            led, np.clip(wanted, goal - top * self.dt, goal + top * self.dt), np.clip(wanted, -top, top)
-        )
-        return np.where(np.isfinite(top) & (self.kind <= SPEED), self.goal, wanted)
+        there = np.where(led, np.clip(wanted, goal - top * self.dt, goal + top * self.dt), np.clip(wanted, -top, top))
+        if self.uses["command_acceleration"]:
+            if enabled is not None:
+                self.pace = np.where(enabled > 0, self.pace, 0.0)
+            most = np.where(self.eased, self.p["command_acceleration"], 1.0)
+            # The pace from which it can still stop where it is wanted.
+            aim = np.sign(wanted - goal) * np.minimum(
+                np.sqrt(2.0 * most * np.abs(wanted - goal)), np.abs(there - goal) / self.dt
+            )
+            self.pace = np.clip(aim, self.pace - most * self.dt, self.pace + most * self.dt)
+            there = np.where(self.eased, goal + self.pace * self.dt, there)
+        self.goal = there
+        return np.where(self.led | self.eased, there, wanted)
 
     def _motor(
         self, wanted: Array, position: Array, speed: Array, supply_v: Array | None, enabled: Array | None

@@ -51,7 +51,9 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     dt = first.time_step_s
     kinds = {s.kind for s in first.sensors}
     drive = DrivePath(robots, dt, bodies.gives)
-    drive.goal = _goals(rollouts)
+    goals = _goals(rollouts)
+    if goals is not None:
+        drive.goal, drive.pace = goals[:, 0], np.nan_to_num(goals[:, 1])
     sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
     scales = per_robot(robots, scaling)
     control = Controllers(robots, [r.driver for r in rollouts], per_robot(robots, command_scaling), steps)
@@ -170,12 +172,13 @@ def by_shape(
 
 
 def _goals(rollouts: Sequence[Rollout]) -> Array | None:
-    """(B, M) how far controllers with a velocity limit have led their goals; not a number where they begin at their joints."""
+    """(B, 2, M) how far controllers with limits of their own have led their goals, and how fast these go; not a number where they
+    begin at their joints."""
     known = [None if r.start is None else r.start.goals for r in rollouts]
     if all(g is None for g in known):
         return None
     return np.stack(
-        [np.full(len(r.model.drives), np.nan) if g is None else g for r, g in zip(rollouts, known, strict=True)]
+        [np.full((2, len(r.model.drives)), np.nan) if g is None else g for r, g in zip(rollouts, known, strict=True)]
     )
 
 

@@ -68,6 +68,7 @@ class Shim:
         self.last_torque = zero.copy()
         self.motor_at: Any = None
         self.goal: Any = None
+        self.pace: Any = 0.0
         self.side, self.carried, self.motor_speed = zero.copy(), zero.copy(), zero.copy()
         self.delay = Delay(d["delay_s"], self.dt) if d["delay_s"].any() else None
         self.late = Delay(self.s["delay_s"], self.dt) if self.s["delay_s"].any() else None
@@ -99,12 +100,19 @@ class Shim:
         return torque + self.native * qd
 
     def _limited(self, wanted: Array, q: Array, enabled: float) -> Array:
-        """What the velocity limits of the controllers let through: goals set out from where the joints stand."""
+        """What the limits of the controllers let through: goals set out from where the joints stand."""
         top, by_position = self.d["command_speed"], self.kinds == "position"
         goal = self.goal if self.goal is not None and enabled > 0 else q
         step = top * self.dt
-        self.goal = np.where(by_position, np.clip(wanted, goal - step, goal + step), np.clip(wanted, -top, top))
-        limited = np.isfinite(top) & (by_position | (self.kinds == "speed"))
+        there = np.where(by_position, np.clip(wanted, goal - step, goal + step), np.clip(wanted, -top, top))
+        eased = np.isfinite(self.d["command_acceleration"]) & by_position
+        most = np.where(eased, self.d["command_acceleration"], 1.0)
+        pace = self.pace if enabled > 0 else 0.0
+        gap = np.abs(wanted - goal)
+        aim = np.sign(wanted - goal) * np.minimum(np.sqrt(2.0 * most * gap), np.abs(there - goal) / self.dt)
+        self.pace = np.clip(aim, pace - most * self.dt, pace + most * self.dt)
+        self.goal = np.where(eased, goal + self.pace * self.dt, there)
+        limited = eased | (np.isfinite(top) & (by_position | (self.kinds == "speed")))
         return np.where(limited, self.goal, wanted)
 
     def _motor(self, wanted: Array, at: Array, turning: Array, supply_v: float | None, enabled: float) -> Any:

@@ -138,6 +138,9 @@ class Drive:
     command_speed: float = float("inf")
     """Velocity limit of the controller, rad/s: how fast it lets a commanded position move, or how large a commanded speed it
     obeys. It has nothing to do with ``speed_limit``, which is the motor's."""
+    command_acceleration: float = float("inf")
+    """Acceleration limit of a controller of positions, rad/s^2: how fast the goal to which it leads its joint gathers speed, and
+    loses it again before it arrives (a trapezoidal profile)."""
     # -- what may be wrong or missing (neutral values); for a slide read m for rad and N for N.m --
     strength: float = 1.0
     current_gain: float = 1.0  # torque of the motor over what is read off its current

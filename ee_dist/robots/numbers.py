@@ -19,6 +19,7 @@ DRIVE: dict[str, Bounds] = dict.fromkeys(DRIVE_NUMBERS, AT_LEAST_0) | {
     "torque_limit": (1e-12, math.inf),
     "speed_limit": (1e-12, math.inf),
     "command_speed": (1e-12, math.inf),
+    "command_acceleration": (1e-12, math.inf),
     "current_gain": (1e-3, 1e3),
     "strength": (0.0, 100.0),
     "command_gain": (-100.0, 100.0),

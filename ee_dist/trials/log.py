@@ -116,7 +116,8 @@ class SensorLog:
 @dataclass(frozen=True, eq=False)
 class State:
     """Where a rollout starts. joints, speeds: (M,) in the order of the robot's drives; base: pose (7,), twist (6,); goals
-    (M,): how far controllers with a velocity limit have led their goals, where they stand if None."""
+    (2, M): how far controllers with limits of their own have led their goals, and how fast these go; where they stand if
+    None."""
 
     joints: Array
     speeds: Array

@@ -32,10 +32,19 @@ def test_a_goal_under_a_limit_goes_on_from_window_to_window(monkeypatch: pytest.
     assert right < 1.5 * windows().noise_floor()[0]
     assert error(windows().residuals([()])[0]) > 10 * right
     model = apply(ROBOT, [SLOW])
-    monkeypatch.setattr(Past, "goals", lambda self, _: self.joints[self.begin])
+    monkeypatch.setattr(Past, "goals", lambda self, _: np.stack([self.joints[self.begin], 0.0 * self.joints[0]]))
     windows().evaluator.close()
     forgetful = FreeRun(windows().measured, model, evaluator_for(ROBOT), windows_s=0.5)
     assert error(forgetful.residuals([()])[0]) > 5 * right
+
+
+def test_a_goal_that_gathers_speed_goes_on_from_window_to_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    gentle = term("command_acceleration", ROBOT.motor_names[0], reluctance_s2_rad=0.03)
+    trials = measure(Sample(ROBOT, (Excitation("steps", 3.0, 0.7, 0),), (gentle,), ()), (gentle,))
+    problem = FreeRun(trials, ROBOT, evaluator_for(ROBOT), windows_s=0.5)
+    right = error(problem.residuals([(gentle,)])[0])
+    assert right < 1.5 * problem.noise_floor()[0]
+    assert error(problem.residuals([()])[0]) > 10 * right
 
 
 def test_goals_follow_commands_no_faster_than_their_limit_and_joints_while_released() -> None:
@@ -44,7 +53,7 @@ def test_goals_follow_commands_no_faster_than_their_limit_and_joints_while_relea
     model = apply(ROBOT, [SLOW])
 
     def goal(begin: int, enabled: np.ndarray | None = None) -> float:
-        return float(Past(commands, enabled, joints, 0.01, begin).goals(model)[0])
+        return float(Past(commands, enabled, joints, 0.01, begin).goals(model)[0, 0])
 
     assert goal(4) == pytest.approx(-0.3 + 4 * 0.025)
     assert goal(40) == pytest.approx(-0.3 + 40 * 0.025)

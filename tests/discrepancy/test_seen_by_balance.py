@@ -26,6 +26,7 @@ CONTROLLERS = {
     "zero_offset",
     "deadband",
     "command_speed",
+    "command_acceleration",
 }
 
 

@@ -205,6 +205,7 @@ def test_effects_act_where_the_kind_of_command_has_them() -> None:
         ("zero_offset", ()),
         ("deadband", ()),
         ("command_speed", ()),
+        ("command_acceleration", ()),
         ("speed_gain", ()),
         ("motor_weak", ("elbow",)),
         ("command_gain", ("elbow",)),

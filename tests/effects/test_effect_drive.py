@@ -121,6 +121,31 @@ def test_command_speed_makes_a_ramp_of_a_step(bench: Bench) -> None:
     np.testing.assert_allclose(capped.channel("position"), ramp.channel("position"), atol=1e-9)
 
 
+def test_command_acceleration_makes_a_trapezoid_of_a_step(bench: Bench) -> None:
+    times, far = 0.001 * np.arange(1, 2501), 0.4
+    for slowest, most in ((np.inf, 0.5), (0.25, 0.5)):
+        terms = [term("command_acceleration", "joint", reluctance_s2_rad=1.0 / most)]
+        if np.isfinite(slowest):
+            terms.append(term("command_speed", "joint", slowness_s_rad=1.0 / slowest))
+        eased = bench.run(slider(**SERVO), *terms, steps=2500, command=far)
+        # As long at rest, gathering speed, at full speed and losing it as the area under a trapezoid says.
+        top = min(slowest, np.sqrt(far * most))
+        rises, lasts = top / most, far / top + top / most
+        before, after = np.minimum(times, rises), np.clip(times - (lasts - rises), 0.0, rises)
+        goal = 0.5 * most * before**2 + top * np.clip(times - rises, 0.0, lasts - 2 * rises) + top * after
+        goal = np.minimum(goal - 0.5 * most * after**2, far)
+        profile = bench.run(slider(**SERVO), steps=2500, command=goal)
+        np.testing.assert_allclose(eased.channel("position"), profile.channel("position"), atol=1.5e-3)
+        assert eased.channel("position").max() < far + 1e-3, "it stops where it is wanted"
+
+
+def test_command_acceleration_adds_to_a_limit_that_is_described() -> None:
+    robot = slider(**SERVO, command_acceleration=0.5)
+    gentler = apply(robot, [term("command_acceleration", "joint", reluctance_s2_rad=2.0)])
+    assert gentler.drives[0].command_acceleration == pytest.approx(0.25)
+    assert apply(robot, [term("command_acceleration", "joint", reluctance_s2_rad=0.0)]) == robot
+
+
 def test_command_speed_adds_to_a_limit_that_is_described() -> None:
     robot = slider(**SERVO, command_speed=0.5)
     slower = apply(robot, [term("command_speed", "joint", slowness_s_rad=2.0)])

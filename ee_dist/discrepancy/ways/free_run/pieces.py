@@ -10,7 +10,7 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
 from ee_dist.discrepancy.problem import Index
 from ee_dist.discrepancy.starting import starting_speeds
-from ee_dist.discrepancy.ways.free_run.past import Past
+from ee_dist.discrepancy.ways.free_run.past import Past, limited
 from ee_dist.effects.scales import longest_delay
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -34,7 +34,7 @@ class Piece:
     again: tuple[tuple[int, State], ...] = ()
     """Rows at which it starts anew from the measured state."""
     past: Past | None = None
-    """What came before, of which controllers with a velocity limit know how far they have led their goals."""
+    """What came before, of which controllers with limits of their own know how far they have led their goals."""
 
     @property
     def window(self) -> Index:
@@ -75,7 +75,7 @@ class Piece:
         """For ``steps`` rows, the last inputs held; ``switched``: say that the drives are on even where they always are."""
         enabled = np.ones(len(self.log)) if self.enabled is None and switched else self.enabled
         start = self.start
-        if self.past is not None and any(np.isfinite(d.command_speed) for d in model.drives):
+        if self.past is not None and any(map(limited, model.drives)):
             start = replace(start, goals=self.past.goals(model))
         return Rollout(
             model,
