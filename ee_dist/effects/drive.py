@@ -137,7 +137,7 @@ def command_delay(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
     return with_more(robot, target, "delay_s", values["delay_s"])
 
 
-LONGEST_S = 2.0
+LONGEST_S = 5.0
 """Longest time in which a profile reaches the speed of the motor by itself, s."""
 SLOWEST = 5.0
 """Times slower than the motor by itself, down to which a controller may hold a joint back."""
