@@ -229,7 +229,9 @@ def _drive(name: str, entry: Mapping[str, Any], found: Mapping[str, float | str]
     if command in ("position", "speed") and "kp" not in numbers:
         raise RobotError(f"{here}: expected at least 'kp' (torque per {command} error), or 'command: torque'")
     if command != "position" and "command_acceleration" in numbers:
-        raise RobotError(f"{here}: command_acceleration is of controllers of positions, and this one's command is {command}")
+        raise RobotError(
+            f"{here}: command_acceleration is of controllers of positions, and this one's command is {command}"
+        )
     if "torque_limit" not in numbers:
         if command != "none":
             raise RobotError(f"{here}: no torque_limit, and the file gives no effort limit")
