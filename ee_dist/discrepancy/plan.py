@@ -195,16 +195,18 @@ def _ahead(
 
 
 def harm(robot: Robot, log: SensorLog) -> str:
-    """Where a trial drives a joint into its stop, or faster than it may go; nothing where it does not. Torques that are
-    commanded hold nothing: an arm falls, and nobody's controller is in between. Positions are kept by the robot's own."""
+    """Where a trial drives a joint into its stop, or faster than it may go; nothing where it does not. Torques and speeds that
+    are commanded hold nothing: an arm falls, and nobody's controller is in between. Positions are kept by the robot's own."""
     if log.joints is None or not log.finite:
         return ""
     for k, d in enumerate(robot.drives):
-        if d.command == "position":
+        if d.command not in ("torque", "speed"):
             continue
         joint, at = robot.joint(d.joint), log.joints[:, k]
         room = AT_STOP * (joint.upper - joint.lower)
-        if np.isfinite(room) and (np.nanmax(at) > joint.upper - room or np.nanmin(at) < joint.lower + room):
+        # Where it begins at a stop nothing drives it there.
+        above, below = joint.upper - room, joint.lower + room
+        if np.isfinite(room) and (np.nanmax(at) > above >= at[0] or np.nanmin(at) < below <= at[0]):
             return f"{d.joint} meets its stop"
         if np.nanmax(np.abs(np.diff(at))) > joint.top_speed * robot.time_step_s:
             return f"{d.joint} goes faster than {joint.top_speed:.3g} {'m' if joint.kind == 'slide' else 'rad'}/s"

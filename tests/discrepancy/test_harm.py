@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 
 from ee_dist.discrepancy.plan import Contender, PlannedTrial, harm, predicted, ranked
@@ -58,6 +59,13 @@ def test_a_trial_that_does_harm_goes_last_and_where_all_do_it_is_said(evaluator)
     assert not found.best.harm
     bad = ranked(2, [PlannedTrial(LARGE, 0.0, (0.0,), "servo meets its stop")])
     assert "on each of 1 trials" in harmful(robot, bad) and "servo meets its stop" in harmful(robot, bad)
+
+
+def test_a_joint_that_begins_at_its_stop_is_not_driven_there() -> None:
+    robot = pendulum("torque")
+    still = np.full((5, 1), robot.joints[0].upper)
+    assert harm(robot, Mock(joints=still, finite=True)) == ""
+    assert harm(robot, Mock(joints=still - np.linspace(0.4, 0.0, 5)[:, None], finite=True)) == "servo meets its stop"
 
 
 def test_of_what_nobody_recorded_nothing_is_told() -> None:
