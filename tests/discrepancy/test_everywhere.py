@@ -79,7 +79,7 @@ class _Trial:
     def __init__(self, name: str, commands: np.ndarray) -> None:
         self.name = name
         times = np.arange(len(commands)) * 0.01
-        self.log = type("Log", (), {"commands": commands, "joints": None, "times_s": times})()
+        self.log = type("Log", (), {"commands": commands, "joints": commands, "times_s": times})()
 
 
 @pytest.fixture(scope="module")
