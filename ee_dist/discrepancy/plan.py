@@ -50,6 +50,8 @@ SHORTEST = 60
 """Readings of a trial that can be compared: a window of the open-loop way."""
 TOGETHER = 400_000
 """Robot-steps that are simulated between two words on the progress."""
+UNHELD = ("torque", "speed")
+"""Commands under which nothing keeps a joint where it may be."""
 AT_STOP = 0.01
 """Share of a joint's range from its end at which it is at its stop."""
 FARTHEST = 0.5
@@ -171,7 +173,7 @@ def _ahead(
     robot: Robot, best: Hypothesis, excitations: Sequence[Excitation], evaluator: Evaluator, every_s: float
 ) -> tuple[list[MeasuredTrial], list[SensorLog]]:
     """These, and what happens in every step of them."""
-    model = apply(robot, best)
+    model, unheld = apply(robot, best), any(d.command in UNHELD for d in robot.drives)
     jobs, drivers = [], []
     for e in excitations:
         held, driver = apply(model, setup_of(e)), driver_of(e, robot)
@@ -179,7 +181,7 @@ def _ahead(
         # Sensors act on a network in their loop, and on planned commands not at all.
         jobs.append(
             Job(
-                Rollout(clean(held) if isinstance(driver, Commands) else held, driver, e.steps(robot), 0, pose=True),
+                Rollout(clean(held) if isinstance(driver, Commands) else held, driver, e.steps(robot), 0, pose=unheld),
                 Whole(),
             )
         )
@@ -200,7 +202,7 @@ def harm(robot: Robot, log: SensorLog) -> str:
     if log.joints is None or not log.finite:
         return ""
     for k, d in enumerate(robot.drives):
-        if d.command not in ("torque", "speed"):
+        if d.command not in UNHELD:
             continue
         joint, at = robot.joint(d.joint), log.joints[:, k]
         room = AT_STOP * (joint.upper - joint.lower)

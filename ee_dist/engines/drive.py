@@ -200,11 +200,13 @@ class DrivePath:
     def _limited(self, wanted: Array, q: Array, enabled: Array | None) -> Array:
         """Commands under the limits of their controllers. A goal sets out from where the joint stands, and stays with it while
         the drive is released."""
-        top, led = self.p["command_speed"], self.kind == POSITION
+        top, by_position = self.p["command_speed"], self.kind == POSITION
         goal = q if self.goal is None else np.where(np.isnan(self.goal), q, self.goal)
         if enabled is not None:
             goal = np.where(enabled > 0, goal, q)
-        there = np.where(led, np.clip(wanted, goal - top * self.dt, goal + top * self.dt), np.clip(wanted, -top, top))
+        there = np.where(
+            by_position, np.clip(wanted, goal - top * self.dt, goal + top * self.dt), np.clip(wanted, -top, top)
+        )
         if self.uses["command_acceleration"]:
             if enabled is not None:
                 self.pace = np.where(enabled > 0, self.pace, 0.0)

@@ -38,7 +38,7 @@ def test_a_goal_under_a_limit_goes_on_from_window_to_window(monkeypatch: pytest.
     assert error(forgetful.residuals([()])[0]) > 5 * right
 
 
-def test_a_goal_that_gathers_speed_goes_on_from_window_to_window(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_goal_that_gathers_speed_goes_on_from_window_to_window() -> None:
     gentle = term("command_acceleration", ROBOT.motor_names[0], reluctance_s2_rad=0.03)
     trials = measure(Sample(ROBOT, (Excitation("steps", 3.0, 0.7, 0),), (gentle,), ()), (gentle,))
     problem = FreeRun(trials, ROBOT, evaluator_for(ROBOT), windows_s=0.5)
