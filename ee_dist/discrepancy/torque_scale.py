@@ -62,12 +62,15 @@ def _change(t: Term) -> float:
 
 
 def _scaled(robot: Robot, t: Term, factor: float) -> Term:
-    """A term with all of what it is on top of larger by a factor, where that goes with torques."""
-    if t.effect == MASS:
-        return term(MASS, t.target, change=(1.0 + _change(t)) * factor - 1.0)
+    """A term with all of what it is on top of larger by a factor, where that goes with torques, as far as its ranges go: a fit
+    begins there."""
     drive = next((d for d in robot.drives if d.joint == t.target), None)
     values = {}
     for p, (name, value) in zip(find(t.effect).parameters, t.values, strict=True):
-        described = float(getattr(drive, p.on_top, 0.0)) if p.on_top and drive is not None else 0.0
-        values[name] = (described + value) * factor - described if p.unit in SCALED else value
+        if t.effect == MASS:
+            value = (1.0 + value) * factor - 1.0
+        elif p.unit in SCALED:
+            described = float(getattr(drive, p.on_top, 0.0)) if p.on_top and drive is not None else 0.0
+            value = (described + value) * factor - described
+        values[name] = min(max(value, p.lower), p.upper)
     return term(t.effect, t.target, **values)
