@@ -58,6 +58,22 @@ def mounting_tilt(robot: Robot, target: str, values: Mapping[str, float]) -> Rob
 
 
 @effect(
+    "weight_carried",
+    family="world",
+    targets=mounting,
+    parameters=(Parameter("share", "1", 0.0, 1.0, 0.0, "share of the weight that is carried", 0.02),),
+    physics="The robot's own controllers, or springs and counterweights, carry a share of its weight before any command comes "
+    "in, as those of most arms that are sold do: it moves as if gravity were weaker, and measured torques may leave it out.",
+    signature="The model sags under its weight where the robot does not, in proportion to the load on each joint and in every "
+    "pose; what acceleration needs is right, which lighter parts would make wrong.",
+    reference="Siciliano, Sciavicco, Villani and Oriolo 2009, Robotics, section 8.5.1 (PD control with gravity compensation)",
+    worth_proposing=is_arm,
+)
+def weight_carried(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    return robot.with_world(gravity_m_s2=robot.world.gravity_m_s2 * (1.0 - values["share"]))
+
+
+@effect(
     "floor_friction",
     family="world",
     targets=floor,

@@ -138,6 +138,16 @@ def test_mounting_tilt_turns_the_weight_at_all_joints(bench: Bench) -> None:
     assert not CATALOGUE["mounting_tilt"].targets(quadruped())
 
 
+def test_weight_carried_is_missing_at_all_joints_and_inertia_stays() -> None:
+    pose, still, moving = np.array([[0.3, 0.9]]), np.zeros((1, 2)), np.array([[0.7, -0.4]])
+    half, none = (apply(arm(), [term("weight_carried", "base", share=s)]) for s in (0.5, 1.0))
+    weight = joint_torques(arm(), pose, still, still)
+    assert np.abs(weight).min() > 0
+    assert joint_torques(half, pose, still, still) == pytest.approx(0.5 * weight)
+    assert joint_torques(none, pose, still, moving) == pytest.approx(joint_torques(arm(), pose, still, moving) - weight)
+    assert not CATALOGUE["weight_carried"].targets(quadruped())
+
+
 def test_speed_gain_is_a_factor_on_the_damping_of_the_drive(bench: Bench) -> None:
     robot = slider(kp=0.0, kd=3.0)
     for factor in (0.0, 2.0):
@@ -195,7 +205,7 @@ def test_sensor_group_delay_is_one_age_for_all_of_a_kind(bench: Bench) -> None:
 def test_what_suits_arms_is_proposed_for_arms_alone() -> None:
     for robot, wanted in ((arm(), True), (quadruped(), False), (lever(), False)):
         names = {name for name, effect in CATALOGUE.items() if effect.proposed(robot)}
-        assert ({"payload", "mounting_tilt"} <= names) == wanted
+        assert ({"payload", "mounting_tilt", "weight_carried"} <= names) == wanted
         assert not {"part_inertia", "gear_ratio", "sensor_group_delay"} & names
 
 
