@@ -71,11 +71,13 @@ def everywhere(
     cuts: Sequence[Cut],
     again: bool = False,
     twins: Sequence[tuple[int, Candidate, Array]] = (),
+    seen: Sequence[tuple[Candidate, Array]] = (),
 ) -> Everywhere | None:
     """On top of the current model, whose first ``own`` parts stay. None where it does not earn its place on the data held out
     in each of ``cuts``. ``again``: after such effects were added, only from neutral: beside what was added since, and beside
     whatever else promises most, for its twin may have been added; and beside each of ``twins``, which were tied with the part
-    whose number they have, with the values that suited."""
+    whose number they have, with the values that suited. ``seen``: single effects that were worth their place before, and the
+    values that they had: they are tried too, whatever they promise on top of values that stood in for them."""
     as_it_is = search.on(current.hypothesis).base()
     without = [as_it_is for _ in cuts]
     if current.parts:
@@ -83,7 +85,7 @@ def everywhere(
         without = [cross_fit(search, [(model, current.u)], cut)[0].residual for cut in cuts]
     calm = search.among(calm_trials(search.problem, as_it_is))
     brief = _brief(calm, as_it_is, current)
-    look = _Look(search, calm, brief, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)))
+    look = _Look(search, calm, brief, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)), tuple(seen))
     robot, places = search.problem.robot, Model(current.parts).places
     begun = list(instead(robot, current, own))
     # From neutral, which the model as it is may be, small values take in least of what is not theirs.
@@ -157,7 +159,7 @@ class _Kept:
 @dataclass(frozen=True, eq=False)
 class _Look:
     """``cuts``: what is held out, each with the held-out residual (n,) of the ``current`` model; ``calm``: the search on
-    predictable trials, ``brief``: on the beginning of these."""
+    predictable trials, ``brief``: on the beginning of these; ``seen`` as in ``everywhere``."""
 
     search: Search
     calm: Search
@@ -166,6 +168,7 @@ class _Look:
     pool: tuple[Candidate, ...]
     current: Current
     cuts: tuple[tuple[Cut, Array], ...]
+    seen: tuple[tuple[Candidate, Array], ...]
 
     def luck(self, energy: float) -> float:
         """By how much held-out energy of about this size may differ for no reason."""
@@ -265,7 +268,8 @@ class _Look:
         refit = Refit(slopes_at(search, alone.model, alone.u))
         now = search.on(alone.hypothesis)
         one = telling(search.problem, alone.residual, np.unique(search.problem.trial_of[search.everything]).tolist())
-        screened = screen(now, possible(search.problem.robot, now.fixed, self._others(model)), refit=refit, trial=one)
+        others = possible(search.problem.robot, now.fixed, self._others(model))
+        screened = screen(now, others, refit=refit, trial=one)
         few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
         starts = []
         for s in few[:TRIED]:
@@ -273,6 +277,8 @@ class _Look:
             # Small values take in least of what is not theirs, where they do anything.
             more = s.starts[0] if c.size > 1 or s.late else next(iter(c.hinted), np.zeros(c.size))
             starts.append((Model((*model.parts, c)), np.concatenate([start, more])))
+        left = {c.name for c in others}.difference(s.candidate.name for s in few[:TRIED])
+        starts += [(Model((*model.parts, c)), np.concatenate([start, u])) for c, u in self.seen if c.name in left]
         if not starts:
             return None
         problem, own = search.problem, search.everything

@@ -99,6 +99,7 @@ def improve(
     else:
         exchanges, looked, spread, anew, refused = 0, -1, 0, 0, 0
         beside: set[str] = set()
+        seen: dict[str, tuple[Candidate, Array]] = {}
         worse: list[Proposal] = []
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
@@ -112,11 +113,14 @@ def improve(
                 if kept is not None:
                     last, current = kept, Current(current.parts, values_of(current.parts, before))
             best = last.best
+            for j in last.judged:
+                if j.earned and len(j.proposal.parts) == 1:
+                    seen.setdefault(j.name, (j.proposal.parts[0], j.own))
             special = {c.name for c in current.parts[own:] if stands_out(problem.robot, c)}
             ready = anew < OFTEN and special != beside and bool(special) if spread else len(current.parts) != looked
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
-                found = everywhere(search, current, own, pool, travelling(problem), spread > 0, alike)
+                found = everywhere(search, current, own, pool, travelling(problem), spread > 0, alike, [*seen.values()])
                 looked = len(current.parts)
                 # Where a single one does more than all of them, it goes first, and they are looked for beside it.
                 if found is None or best is None or found.held < float(best.held.sum()):
