@@ -283,10 +283,10 @@ class _Look:
             return None
         problem, own = search.problem, search.everything
         heats = telling_values(problem, alone.residual, own)
-        best, *others = race(search, starts, own, HEATS, PRIOR, heats_on=heats)
+        best, *ended = race(search, starts, own, HEATS, PRIOR, heats_on=heats)
         best = over_ridges(search, best, PRIOR)
         noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))
-        ties = [f.model.parts[-1].name for f in others if f.energy - best.energy < TIE_ENERGY * noise]
+        ties = [f.model.parts[-1].name for f in ended if f.energy - best.energy < TIE_ENERGY * noise]
         return self._worth(best, {best.model.parts[-1].name: ties})
 
     def _others(self, model: Model) -> list[Candidate]:

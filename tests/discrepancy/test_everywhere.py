@@ -142,7 +142,7 @@ def test_kinds_that_make_what_is_held_out_worse_are_left_out_again(robot):
     problem, pool = Curved(robot, truth), pool_of(robot)[:2]
     search, cut = Search(problem), travelling(problem)[0]
     model = Current(tuple(pool), np.array([0.1, 0.2]))
-    looked = _Look(search, search, search, 0, tuple(pool), Current(), ((cut, search.base()),))
+    looked = _Look(search, search, search, 0, tuple(pool), Current(), ((cut, search.base()),), ())
     kept = _Kept(model, 5.0, cut, {})
     starts = [(Model(tuple(pool[:k])), model.u[:k]) for k in (1, 2)]
     assert looked._as_far(kept, starts, [9.0, 5.0]) == (1, model, 5.0)

@@ -9,7 +9,8 @@ import pytest
 from linear_problem import Linear
 from way_samples import measure, problem_by, samples
 
-from ee_dist.discrepancy.evidence.holdout import bootstrap, windows
+from ee_dist.discrepancy.evidence.holdout import MOTIONS, bootstrap, joint_by_joint, travelling, windows
+from ee_dist.discrepancy.problem import Problem
 from ee_dist.effects.catalogue import Hypothesis
 
 
@@ -51,3 +52,29 @@ def test_however_short_a_log_is_there_is_something_to_hold_out(rows: int) -> Non
     )
     problem = problem_by("open_loop", (replace(trial, log=cut),), sample.robot)
     assert windows(problem).folds == 2
+
+
+def arm_moved(*shares: tuple[float, float]) -> Problem:
+    """The arm of two joints, in each trial moved by shares of what it does in another."""
+    sample = samples()["arm"]
+    trials = [t for t in measure(sample, ()) if t.log.joints is not None][: len(shares)]
+    moved = []
+    for k, (trial, share) in enumerate(zip(trials, shares, strict=True)):
+        wave = np.sin((1 + k) * np.linspace(0.0, 6.0, len(trial.log.times_s)))[:, None]
+        log = replace(trial.log, joints=0.5 * wave * share, commands=0.5 * wave * share)
+        moved.append(replace(trial, name=f"{trial.name} {k}", log=log))
+    return problem_by("open_loop", tuple(moved), sample.robot)
+
+
+def test_motions_of_one_joint_each_are_not_held_out() -> None:
+    """With the only motion of a joint held out nothing that is fitted says what it is like."""
+    each = arm_moved((1.0, 0.0), (0.02, 1.0))
+    assert joint_by_joint(each)
+    assert travelling(each) == []
+
+
+@pytest.mark.parametrize("shares", [((1.0, 1.0), (0.5, 1.0)), ((1.0, 0.3), (0.3, 1.0)), ((1.0, 0.0), (0.5, 0.001))])
+def test_motions_in_which_joints_move_together_or_twice_are_held_out(shares: tuple[tuple[float, float], ...]) -> None:
+    both = arm_moved(*shares)
+    assert not joint_by_joint(both)
+    assert [c.name for c in travelling(both)] == [MOTIONS]

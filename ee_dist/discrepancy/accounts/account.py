@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ee_dist.basics.names import counted
+from ee_dist.discrepancy.evidence.holdout import joint_by_joint
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed, plain
@@ -37,6 +38,10 @@ PLAN_LATER = "To tell apart what may stay tied then:"
 where more is missing than what is tied, once that is added."""
 NEXT, OR = "Next", "Or go on without"
 """Before the command to type: the only one, or beside that which tells apart what is tied."""
+ONE_EACH = (
+    "Most joints move in one motion of their own: what is found at a joint is judged on other windows of that motion. Record "
+    "each joint in two motions or more to have it judged on one that was not fitted."
+)
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
 
@@ -82,6 +87,11 @@ class Account:
 def advised(problem: Problem, advice: str) -> str:
     """The advice, and before it what is to be put right first."""
     return " ".join(t for t in (problem.doubts and f"Before this is believed: {problem.doubts}", advice) if t)
+
+
+def held_out_notes(problem: Problem) -> list[str]:
+    """What to know of what was held out, in lines for people."""
+    return [ONE_EACH] if joint_by_joint(problem) else []
 
 
 def beside_floor(error: float, floor: float, left: bool) -> list[str]:

@@ -19,6 +19,7 @@ from ee_dist.discrepancy.accounts.account import (
     before_and_after,
     beside_floor,
     error_name,
+    held_out_notes,
     left_text,
     listed_few,
     slower,
@@ -110,7 +111,7 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     tied = bool(found.twins) or any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
     good = settled and not warnings and not unsure and not any(ties.values())
-    more = (*also, *lines, *problem.notes)
+    more = (*also, *lines, *held_out_notes(problem), *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
 
 

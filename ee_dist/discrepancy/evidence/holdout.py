@@ -18,6 +18,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, Leading
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.fixture import STAND
+from ee_dist.robots.ranges import travel
 from ee_dist.trials.log import Array, SensorLog
 
 WINDOWS, MOTIONS, SETTINGS = (
@@ -31,6 +32,9 @@ SAME_MOTION, SAME_LENGTH = 0.02, 0.9
 """Two trials are one motion where their commands differ by less than this share of how much they vary, over nearly all of it;"""
 SAME_COURSE = 0.15
 """or their positions do by less than this: torques that a controller works out differ each time."""
+MOVES, TAKES_PART = 0.01, 0.2
+"""Share of its range by which a joint varies that moves at all, and share of what it varies by at most in a trial in which it
+takes part."""
 PRIOR = 1.0
 """Energy, beside noise, that a value at its bound costs in a fit that will be judged elsewhere: a value that the fitted part
 does not determine is neutral there, and not what the part held out would like it to be."""
@@ -101,7 +105,8 @@ def windows(problem: Problem) -> Cut:
 
 
 def travelling(problem: Problem) -> list[Cut]:
-    """Ways of holding out that a motion or a setting takes part in as a whole; none where there is only one."""
+    """Ways of holding out that a motion or a setting takes part in as a whole; none where there is only one, nor motions where
+    each joint has one of its own."""
     trial = np.asarray(problem.trial_of_segment)
     kinds = _kinds(problem)
     # How a robot was held is no setting of it: on a stand nothing says how the floor lies, and nothing there speaks against it.
@@ -111,10 +116,28 @@ def travelling(problem: Problem) -> list[Cut]:
         different = list(dict.fromkeys(of_trial))
         if len(different) < 2 or (name == SETTINGS and len(different) == len(settings)):
             continue
+        if name == MOTIONS and joint_by_joint(problem, kinds):
+            continue
         turns = len(different) if len(different) <= ONE_BY_ONE else 2
         number = np.array([different.index(x) % turns for x in of_trial])
         cuts.append(Cut(name, number[trial], trial, np.zeros_like(trial)))
     return cuts
+
+
+def joint_by_joint(problem: Problem, kinds: Sequence[int] | None = None) -> bool:
+    """Whether most joints that move do so in a single motion (of the numbers ``kinds``, by trial) each: what a joint is like is
+    then told by none of the others, and with its motion held out nothing says anything of it."""
+    of = np.array(_kinds(problem) if kinds is None else kinds)
+    courses = [_course(problem, t.log) for t in problem.measured]
+    read = [s.target for s in problem.robot.sensors if s.kind == "position"]
+    targets = read if problem.measured[0].log.joints is None else list(problem.robot.motor_names)
+    if len(targets) < 2 or not all(len(c) and np.isfinite(c).any(axis=0).all() for c in courses):
+        return False
+    varies = np.stack([np.nanstd(c, axis=0) for c in courses])
+    most = varies.max(axis=0)
+    moving = most > MOVES * np.array([travel(problem.robot.joint(t)) for t in targets])
+    apart = [len(set(of[varies[:, k] > TAKES_PART * most[k]])) == 1 for k in np.flatnonzero(moving)]
+    return len(apart) > 1 and 2 * sum(apart) > len(apart)
 
 
 def _kinds(problem: Problem) -> list[int]:
