@@ -76,6 +76,16 @@ def test_an_interval_goes_no_farther_than_physics() -> None:
         assert p.low >= c.effect.parameters[0].lower
 
 
+def test_no_more_is_taken_off_a_description_than_it_has() -> None:
+    """Friction is not negative, however wide an interval is."""
+    problem, found = pendulum(OTHERS[0])
+    c = candidate(problem.robot, "coulomb_friction", "servo")
+    fit = fit_one(Search(problem), Model((c,)), [c.shares({"torque_nm": 0.02})])
+    (p,) = parameters(problem, replace(fit, slopes=fit.slopes * 0.02), found.left)
+    described = problem.robot.drives[0].coulomb
+    assert p.low == pytest.approx(-described) and p.high > 2 * p.value
+
+
 def test_a_clean_case_has_the_interval_of_its_noise() -> None:
     problem, found = pendulum(())
     (p,) = found.parameters

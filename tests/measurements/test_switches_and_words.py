@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import small_logs as logs
 from measurement_files import STEP_S, motion, robot_file
 
 from ee_dist.measurements.need import torques_needed
 from ee_dist.measurements.proposal.files import proposal_for
-from ee_dist.measurements.proposal.model import Hints
+from ee_dist.measurements.proposal.model import FIT, Hints
 from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, read_name
 from ee_dist.robots.describe import load_robot
 
@@ -79,7 +81,7 @@ def test_currents_that_were_measured_are_taken_not_those_that_were_asked_for(tmp
     for k in range(2):
         frame[f"i_ref{k + 1}_A"] = needed[0][:, k] / 0.2
         frame[f"i{k + 1}_A"] = needed[0][:, k] / 0.2 + noise[:, k]
-    proposal = proposal_for([logs.written(tmp_path, frame)], robot, Hints(gains=[0.2, 0.2]))
+    proposal = proposal_for([logs.written(tmp_path, pd.DataFrame(frame))], robot, Hints(gains=[0.2, 0.2]))
     assert [c.column for c in proposal.choices if c.group == "torques"] == ["i1_A", "i2_A"]
     assert not any("applied to nothing" in n for n in proposal.notes)
 
@@ -90,3 +92,45 @@ def test_gains_that_are_applied_to_nothing_are_told(tmp_path: Path) -> None:
     file = logs.written(tmp_path, logs.frame_of(m["t"], m["q"], m["g"]))
     proposal = proposal_for([file], robot, Hints(gains=[0.2, 0.2]))
     assert [n for n in proposal.notes if "task.gains: applied to nothing" in n]
+
+
+def counts(tmp_path: Path) -> Path:
+    """Positions in counts of an encoder, 544 to a turn, with speeds in rad/s and currents beside them."""
+    m = motion()
+    robot, _ = load_robot(robot_file(tmp_path))
+    needed = torques_needed(robot, m["q"], STEP_S)
+    assert needed is not None
+    of_a_count = 2 * np.pi / 544
+    frame = {"t": m["t"]} | {f"position{k + 1}": np.round(20 * m["q"][:, k] / of_a_count) for k in range(2)}
+    frame |= {f"speed{k + 1}": 20 * np.gradient(m["q"][:, k], m["t"]) for k in range(2)}
+    frame |= {f"current{k + 1}": needed[0][:, k] / 0.2 for k in range(2)}
+    return logs.written(tmp_path, pd.DataFrame(frame))
+
+
+def test_speeds_tell_what_a_count_of_the_positions_is(tmp_path: Path) -> None:
+    robot, _ = load_robot(robot_file(tmp_path))
+    proposal = proposal_for([counts(tmp_path)], robot, Hints(gains=FIT))
+    (why,) = {c.why for c in proposal.choices if c.column.startswith("speed")}
+    scale = float(re.search(r"scale: ([0-9.e-]+)'", why)[1])  # type: ignore[index]
+    assert scale == pytest.approx(2 * np.pi / 544, rel=0.01)
+    assert any("not applied yet" in n for n in proposal.notes)
+    assert not any("applied to nothing" in n for n in proposal.notes)
+
+
+LATE = 14
+"""Rows by which a sensor of speed that filters comes late: the signal alone no longer tells it."""
+
+
+def test_qd_is_a_speed_where_it_goes_with_the_change_and_what_was_desired_where_it_does_not(tmp_path: Path) -> None:
+    m = motion()
+    robot, _ = load_robot(robot_file(tmp_path))
+    rate = np.gradient(m["q"], m["t"], axis=0)
+    for qd, group in (
+        (np.roll(rate, LATE, axis=0), "sensors"),
+        (m["g"], "commands"),
+    ):
+        frame = (
+            {"t": m["t"]} | {f"q{k + 1}": m["q"][:, k] for k in range(2)} | {f"qd{k + 1}": qd[:, k] for k in range(2)}
+        )
+        proposal = proposal_for([logs.written(tmp_path, pd.DataFrame(frame))], robot, Hints())
+        assert {c.group for c in proposal.choices if c.column.startswith("qd")} == {group}

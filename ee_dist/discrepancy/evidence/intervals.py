@@ -72,7 +72,9 @@ def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = ()) -> lis
             low, high = value - half, value + half
             if math.isfinite(half):  # no farther than physics allows
                 known = c.effect.parameters[k]
-                low, high = max(low, min(known.lower, value)), min(high, max(known.upper, value))
+                # Of what is described no more can be taken off than is there.
+                least = max(known.lower, c.bounds[k][0]) if known.on_top else known.lower
+                low, high = max(low, min(least, value)), min(high, max(known.upper, value))
             out.append(ParameterReport(index, name, value, low, high, flag, doubt))
         at += c.size
     return out

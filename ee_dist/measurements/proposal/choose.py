@@ -60,6 +60,8 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
         v.out.notes.append(
             "task.gains: applied to nothing, as no columns can be told to be the motors' currents; write them into the mapping "
             "as torques, with the gain as their scale"
+            if v.units.entries
+            else "task.gains: not applied yet, for what the motion needs is not known before the unit of the positions is"
         )
     add_rest(v)
     add_switches(v)

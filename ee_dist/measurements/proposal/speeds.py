@@ -34,11 +34,9 @@ def add_speeds(v: View) -> None:
         if b.used or not can_be(b, SPEED) or b.reading.command:
             continue
         r = v.derivative(v.position.block, b)
-        score = (
-            (2.0 if b.reading.kind == SPEED and not b.reading.weak else 0.0)
-            + (b.reading.command is False)
-            - 1.5 * b.reading.second
-        )
+        # Of a rate that is filtered, or read coarsely, the name tells more than the signal; of a letter only beside it.
+        called = b.reading.kind == SPEED and (not b.reading.weak or abs(r.correlation) > 0.6)
+        score = (2.0 if called else 0.0) + (b.reading.command is False) - 1.5 * b.reading.second
         # Of two that change with the positions the better by a power of ten is the measured one.
         score -= 0.5 * math.log10(1 - abs(r.correlation) + 1e-6)
         score += 3 if abs(r.correlation) > 0.9 else 1 if abs(r.correlation) > 0.6 else -3
@@ -125,12 +123,23 @@ def _odd(v: View, block: Block) -> dict[int, str]:
     }
 
 
+def _of_a_count(v: View, block: Block) -> str:
+    """What one count of the positions is if the speeds are in the usual unit: no file says how many make a turn, and the speeds
+    beside them do."""
+    r, kinds = v.derivative(v.position.block, block), {j.kind for j in v.joints}
+    if len(kinds) != 1 or r.correlation < AGREES or not r.slope:
+        return ""
+    unit = SPEEDS[kinds.pop()][0]
+    turn = f", {2 * math.pi / r.slope:.4g} to a turn" if unit == "rad/s" else ""
+    return f"; in {unit} one of their numbers is {r.slope:.4g} {unit[:-2]}{turn}: 'unit: {unit[:-2]}, scale: {r.slope:.4g}'"
+
+
 def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
     """The unit in which the numbers are the change of the positions, with the sign that this takes; joints that are ``odd``
     are not asked about."""
     relations = _compared(v, block)
     if relations is None:
-        return UnitChoice((), UNKNOWN, "the unit of the positions is open")
+        return UnitChoice((), UNKNOWN, f"the unit of the positions is open{_of_a_count(v, block)}")
     sure, why = SURE, ""
     entries: list[dict[str, Any]] = []
     telling = signals.lively(v.position.block.values)

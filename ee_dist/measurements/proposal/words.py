@@ -106,8 +106,9 @@ _UNIT = {
 }  # fmt: skip
 _LETTERS = {"s": "s", "m": "m", "a": "A", "v": "V", "n": "N"}
 """Units of one letter count only behind a word that says the quantity."""
-_SHORT = {"v": SPEED, "w": SPEED, "i": CURRENT, "p": POSITION, "u": OTHER, "f": TORQUE, "x": POSITION}
-"""Letters that stand for a quantity where nothing else does; what the signals say goes before them."""
+_SHORT = {"v": SPEED, "w": SPEED, "qd": SPEED, "i": CURRENT, "p": POSITION, "u": OTHER, "f": TORQUE, "x": POSITION}
+"""Letters that stand for a quantity where nothing else does; what the signals say goes before them (qd is a speed, or what was
+desired)."""
 _PER_SECOND = re.compile(r"(rad|deg|m|mm|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg|(?<![^\W_])mm?)_s$", re.I)
 
 
