@@ -9,6 +9,7 @@ import pytest
 from linear_problem import Linear
 from way_samples import measure, problem_by, samples
 
+from ee_dist.discrepancy.accounts.account import held_out_notes
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, bootstrap, joint_by_joint, travelling, windows
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.effects.catalogue import Hypothesis
@@ -71,6 +72,7 @@ def test_motions_of_one_joint_each_are_not_held_out() -> None:
     each = arm_moved((1.0, 0.0), (0.02, 1.0))
     assert joint_by_joint(each)
     assert travelling(each) == []
+    assert held_out_notes(each) and not held_out_notes(arm_moved((1.0, 1.0), (0.5, 1.0)))
 
 
 @pytest.mark.parametrize("shares", [((1.0, 1.0), (0.5, 1.0)), ((1.0, 0.3), (0.3, 1.0)), ((1.0, 0.0), (0.5, 0.001))])

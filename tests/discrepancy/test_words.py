@@ -53,7 +53,14 @@ def account(
         unsure=unsure,
     )
     problem = SimpleNamespace(
-        robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts="", trials=("a",)
+        robot=servo_pendulum(),
+        told=str,
+        natural_name="error",
+        natural_unit="",
+        notes=[],
+        doubts="",
+        trials=("a",),
+        measured=(),
     )
     return explain_account(problem, found, ahead, planner)  # type: ignore[arg-type]
 
@@ -216,7 +223,14 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     )  # fmt: skip
     start = SimpleNamespace(added=(), dropped=(), tied_with=[], error_heldout=5.0, held_out="", name="")
     problem = SimpleNamespace(
-        robot=servo_pendulum(), told=str, natural_name="error", natural_unit="", notes=[], doubts="", trials=("a",)
+        robot=servo_pendulum(),
+        told=str,
+        natural_name="error",
+        natural_unit="",
+        notes=[],
+        doubts="",
+        trials=("a",),
+        measured=(),
     )
     for verdict, share, said in (
         (EXPLAINED, 1.0, "Nothing else is left above the noise."),

@@ -127,6 +127,8 @@ def travelling(problem: Problem) -> list[Cut]:
 def joint_by_joint(problem: Problem, kinds: Sequence[int] | None = None) -> bool:
     """Whether most joints that move do so in a single motion (of the numbers ``kinds``, by trial) each: what a joint is like is
     then told by none of the others, and with its motion held out nothing says anything of it."""
+    if len(problem.measured) < 2:
+        return False
     of = np.array(_kinds(problem) if kinds is None else kinds)
     courses = [_course(problem, t.log) for t in problem.measured]
     read = [s.target for s in problem.robot.sensors if s.kind == "position"]
