@@ -78,6 +78,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             ahead = next(iter(next_trials(robot, tied, evaluator_of(config), every_s=every_s)), None)
     share = confidence(problem.way, found)
     also = problem.other_errors(found.before, found.after) if found.best else ()
+    also = (*also, *way.instead(bool(found.left)))
     account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also)
     account = account.warned(measured.remarks)
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()

@@ -92,6 +92,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
                 problem, pool, measured.model, wanted, most=options.most, progress=progress, climbed=climbed
             )
     also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
+    also = (*also, *way.instead(bool(found.left)))
     account = improve_account(problem, found, planning(out, problem.robot), also).warned(measured.remarks)
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)

@@ -27,13 +27,18 @@ from ee_dist.trials.log import SensorLog
 @dataclass(frozen=True)
 class Way:
     """``build`` makes the problem; ``why`` is what speaks for it; ``moves``: whether it can follow a body that moves about;
-    ``commanded``: whether it needs to know what the drives were told."""
+    ``commanded``: whether it needs to know what the drives were told; ``beside``: another way that these logs allow."""
 
     name: str
     why: str
     build: Callable[[Measurements, Config], Problem]
     moves: bool = False
     commanded: bool = True
+    beside: str = ""
+
+    def instead(self, left: bool) -> tuple[str, ...]:
+        """What to say of the other way where this one has more than noise ``left``, in lines for people."""
+        return (f"{self.beside}.",) if left and self.beside else ()
 
     def make(self, measured: Measurements, config: Config) -> Problem:
         """The problem. Where nobody knows whether drives held their commands from row to row, the reading of the log with which
@@ -148,8 +153,8 @@ def way_of(measured: Measurements, by: str) -> Way:
             return _possible(replace(WAYS["free_run"], why=ONLY_MOTION), measured)
         if by == "open_loop" and torques and not measured.robot.free_base:
             gains = "" if gains_are_known(measured.robot) else GUESSED
-            why = f"{WAYS[by].why}. {TORQUES_TOO.format(gains=gains)}"
-            return _possible(replace(WAYS[by], why=why), measured)
+            beside = TORQUES_TOO.format(gains=gains)
+            return _possible(replace(WAYS[by], why=f"{WAYS[by].why}. {beside}", beside=beside), measured)
     return _possible(WAYS[by], measured)
 
 

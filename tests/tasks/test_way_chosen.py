@@ -67,6 +67,9 @@ def test_where_torques_were_recorded_beside_commands_it_is_said_that_they_can_be
     guessed = replace(beside.robot, assumed=((beside.robot.drives[0].joint, "kp"),))
     assert "gains, which the description only assumed" in way_of(replace(beside, robot=guessed), AUTO).why
     assert "force_balance" not in way_of(known, AUTO).why
+    (told,) = way.instead(True)
+    assert "task.by=force_balance" in told
+    assert not way.instead(False) and not way_of(known, AUTO).instead(True)
 
 
 def test_where_torques_lead_the_model_starts_anew_and_is_searched_as_it_is() -> None:

@@ -201,7 +201,7 @@ class View:
             if not name:
                 continue
             more = units.entries[k] if units.entries else {"unit": "???"}
-            still = "; does not move" if not signals.moves(block.values[:, k]) else ""
+            still = "" if signals.moves(block.values[:, k]) else "; does not move in this file"
             empty = empty_cells(block.table, block.columns[k])
             how = "the last value holds" if group == "commands" else "filled by straight lines"
             filled = f"; {empty} of {len(block.table)} cells are empty, {how}" if empty else ""
