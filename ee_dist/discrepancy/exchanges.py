@@ -13,6 +13,7 @@ from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.instead import Instead, instead_of
 from ee_dist.discrepancy.ladder import Rung, Twin
 from ee_dist.discrepancy.problem import Problem, error, per_segment
+from ee_dist.discrepancy.pruning import allowed_loss
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Model
@@ -118,7 +119,7 @@ def nearest(
     best = next((i for i in found if i.better), None)
     if best is not None and _surely(search, current, best.then, len(pool)):
         return best.then, [], _step(search, best)
-    nearer = min((i for i in found if i.nearer), key=lambda i: float(i.then.u @ i.then.u), default=None)
+    found, nearer = _nearest_of(search, current, found, len(pool))
     fixed = search.fixed
     twins = [
         Twin(i.gone.name, i.then.hypothesis[-1], (*fixed, *i.then.hypothesis))
@@ -130,6 +131,25 @@ def nearest(
     names, was = [c.name for c in current.parts], current.hypothesis
     gone = was[names.index(nearer.gone.name)]
     return nearer.then, [Twin(nearer.comes.name, gone, (*fixed, *was)), *twins], _step(search, nearer)
+
+
+def _nearest_of(
+    search: Search, current: Current, found: Sequence[Instead], tried: int
+) -> tuple[list[Instead], Instead | None]:
+    """What does as well on data held out, too, as far as that was asked; and of it what is nearest to the description."""
+    left = list(found)
+    for one in sorted((i for i in found if i.nearer), key=lambda i: float(i.then.u @ i.then.u)):
+        if not _worse(search, current, one.then, tried):
+            return left, one
+        left.remove(one)
+    return left, None
+
+
+def _worse(search: Search, current: Current, then: Current, tried: int) -> bool:
+    """Whether another model is worse, on data that its fits had not seen, by more than leaving a term out may cost."""
+    cut, models = strictest(search.problem), [(Model(m.parts), m.u) for m in (current, then)]
+    one, other = cross_fit(search, models, cut, WIDTHS[1:])
+    return other.energy - one.energy > allowed_loss(search.problem, one.energy, cut, tried)
 
 
 def _surely(search: Search, current: Current, then: Current, tried: int) -> bool:

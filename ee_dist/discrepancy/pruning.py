@@ -140,10 +140,10 @@ def without_useless(
         keep = np.delete(np.arange(len(current.u)), places[k])
         models.append((Model((*current.parts[:k], *current.parts[k + 1 :])), current.u[keep]))
     whole, *without = cross_fit(search, models, cut)
-    allowed = _allowed(problem, whole.energy, cut, tried)
+    most = allowed_loss(problem, whole.energy, cut, tried)
     costs = [h.energy - whole.energy for h in without]
     cheapest = int(np.argmin(costs))
-    if costs[cheapest] > allowed * 0.5:
+    if costs[cheapest] > most * 0.5:
         return current, ()
     model, start = models[1 + cheapest]
     name = current.parts[own + cheapest].name
@@ -166,11 +166,11 @@ def _as_good(search: Search, energy: float, with_fewer: float, cut: Cut, tried: 
     """Whether held-out data, on which a model has that ``energy`` and the same with fewer terms ``with_fewer``, do without the
     others. What noise makes of one of them is what it may make of each of ``count``."""
     # Many small effects may each be below the resolution at which channels are compared, and not all together.
-    allowed = _allowed(search.problem, energy, cut, tried, float(search.problem.floor.mean()), count)
-    return with_fewer - energy <= allowed
+    most = allowed_loss(search.problem, energy, cut, tried, float(search.problem.floor.mean()), count)
+    return with_fewer - energy <= most
 
 
-def _allowed(problem: Problem, energy: float, cut: Cut, tried: int, least: float = 1.0, count: int = 1) -> float:
+def allowed_loss(problem: Problem, energy: float, cut: Cut, tried: int, least: float = 1.0, count: int = 1) -> float:
     """Held-out energy that leaving ``count`` terms out may cost; ``least``: the variance that counts in a value."""
     luck = count * least_energy(tried) * max(least, energy / len(problem.floor))
     if cut.name == WINDOWS:

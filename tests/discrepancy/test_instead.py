@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_problem import PER, ROBOT, SEGMENTS, Linear
 from way_samples import Sample, measure, problem_by
 
 from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.evidence.holdout import HeldOut, cross_fit, windows
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.exchanges import nearest
 from ee_dist.discrepancy.improve import improve
@@ -65,6 +69,24 @@ def test_one_effect_that_does_what_three_do_is_nearer() -> None:
     (twin,) = twins
     assert twin.name == WEAK.name and [twin.term.name] == list(step.dropped)
     assert twin.terms == current.hypothesis
+
+
+def test_what_is_nearer_and_foretells_worse_is_neither_taken_nor_told_as_a_twin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As well on what was fitted, and not on what was held out."""
+    search, current = fitted(Alike((term("motor_weak", JOINT, loss=0.6),)), THREE)
+
+    def held_out(search: Search, models: Sequence[tuple[Model, Array]], *_: object) -> list[HeldOut]:
+        found = cross_fit(search, models, windows(search.problem))
+        return [
+            replace(h, residual=h.residual * (1.3 if WEAK in m.parts else 1.0))
+            for h, (m, _) in zip(found, models, strict=True)
+        ]
+
+    monkeypatch.setattr("ee_dist.discrepancy.exchanges.cross_fit", held_out)
+    kept, twins, step = nearest(search, current, 0, [*THREE, WEAK, OTHER])
+    assert kept is current and twins == [] and step is None
 
 
 def test_what_three_effects_do_is_not_said_to_be_one_that_would_be_farther() -> None:
