@@ -113,6 +113,8 @@ def test_speeds_tell_what_a_count_of_the_positions_is(tmp_path: Path) -> None:
     (why,) = {c.why for c in proposal.choices if c.column.startswith("speed")}
     scale = float(re.search(r"scale: ([0-9.e-]+)'", why)[1])  # type: ignore[index]
     assert scale == pytest.approx(2 * np.pi / 544, rel=0.01)
+    (asked,) = (q for q in proposal.questions if q.startswith("positions"))
+    assert asked.endswith("into the mapping, with what one count is") and "task.unit" not in asked
     assert any("not applied yet" in n for n in proposal.notes)
     assert not any("applied to nothing" in n for n in proposal.notes)
 

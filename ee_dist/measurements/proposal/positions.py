@@ -6,6 +6,7 @@ from ee_dist.basics.names import listed
 from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, in_full, series_of
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
 from ee_dist.measurements.proposal.other_names import other_names
+from ee_dist.measurements.proposal.units import counts
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
 from ee_dist.measurements.proposal.words import POSITION, SPEED, TIME, read_name, tokens
 
@@ -134,5 +135,7 @@ def add_positions(v: View) -> None:
     names = v.sensor_names("position")
     if v.units.sure == UNKNOWN:
         units = "deg or task.unit=percent" if block.table.header.get("format") == "lerobot" else "rad, deg, m or mm"
-        v.out.ask(f"positions ({block.name}): {v.units.why}; say task.unit={units}")
+        # No unit is right for counts: how many make a turn has to be said.
+        cure = " into the mapping, with what one count is" if counts(block) else f"; say task.unit={units}"
+        v.out.ask(f"positions ({block.name}): {v.units.why}{cure}")
     v.add("sensors", names, block, v.units, v.position.why)

@@ -82,11 +82,11 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
                 (), UNKNOWN, f"numbers to {seen.max():.4g}: a small motion in {allowed[0]}, or {lively[0]}"
             )
     if not lively:
-        why = f"numbers to {seen.max():.4g} fit no unit of {allowed[0]} within the joints' limits{_counts(block)}"
+        why = f"numbers to {seen.max():.4g} fit no unit of {allowed[0]} within the joints' limits{counts(block)}"
         return UnitChoice((), UNKNOWN, why)
     best, turning = lively[0], reach > TURNS_ON
-    if turning.any() and seen[turning].max() > COUNTS and _counts(block):
-        return UnitChoice((), UNKNOWN, f"numbers to {seen.max():.4g}{_counts(block)}")
+    if turning.any() and seen[turning].max() > COUNTS and counts(block):
+        return UnitChoice((), UNKNOWN, f"numbers to {seen.max():.4g}{counts(block)}")
     if best == "rad" and "deg" in lively and turning.any() and seen[turning].max() > TURNS_ON:
         return UnitChoice((), UNKNOWN, f"numbers to {seen[turning].max():.4g}: degrees, or many turns in rad")
     excluded = [u for u in allowed[:2] if u not in lively]
@@ -103,7 +103,7 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
     )
 
 
-def _counts(block: Block) -> str:
+def counts(block: Block) -> str:
     """What whole numbers may be: the counts of an encoder."""
     # As the file holds them: those of the block may stand between rows.
     seen = np.concatenate([block.table.numbers(c, gaps=True) for c in block.columns])
