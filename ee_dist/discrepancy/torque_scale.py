@@ -18,7 +18,7 @@ from ee_dist.effects.catalogue import Term, find, term
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
-MASS, STRENGTH = "part_mass", "motor_strength"
+MASS, STRENGTH, WEAK = "part_mass", "motor_strength", "motor_weak"
 SELDOM_OFF = 0.3
 """Share by which a mass off a scale or a drawing seldom is,"""
 ALL_OFF = 0.1
@@ -36,7 +36,7 @@ def other_scale(
     terms, parts = current.hypothesis, current.parts
     least = [ALL_OFF if c.members(problem.robot) else SELDOM_OFF for c in parts]
     far = [k for k in range(own, len(parts)) if terms[k].effect == MASS and abs(_change(terms[k])) > least[k]]
-    if not far or STRENGTH in {t.effect for t in terms}:
+    if not far or {STRENGTH, WEAK} & {t.effect for t in terms}:
         return
     if 2 * len({c.effect for c in pool}) < len({c.effect for c in pool_of(problem)}):
         return
@@ -48,11 +48,12 @@ def other_scale(
             factor = 1.0 / (1.0 + _change(terms[k]))
             stay = [i for i in range(len(parts)) if i != k]
             new = [_scaled(problem.robot, terms[i], factor) if i >= own else terms[i] for i in stay]
-            model = Model((*(parts[i] for i in stay), c))
-            u = [
-                *(parts[i].shares(dict(t.values)) for i, t in zip(stay, new, strict=True)),
-                c.shares({"change": factor - 1.0}),
-            ]
+            # Of the only motor that there is, weaker than described, a fault has the same name.
+            weak = [w for w in pool if w.effect.name == WEAK and w.target == c.target]
+            fault = weak[0] if weak and factor < 1 and len(joints) == 1 else None
+            comes, values = (c, {"change": factor - 1.0}) if fault is None else (fault, {"loss": 1.0 - factor})
+            model = Model((*(parts[i] for i in stay), comes))
+            u = [*(parts[i].shares(dict(t.values)) for i, t in zip(stay, new, strict=True)), comes.shares(values)]
             yield model, np.clip(np.concatenate(u), model.lower, model.upper)
         return
 

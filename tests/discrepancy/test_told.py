@@ -128,3 +128,16 @@ def test_torques_that_are_all_larger_are_told_where_masses_seem_far_too_small() 
     (change,) = (t.values[0][1] for t in then.hypothesis if t.effect == STRENGTH)
     assert change == pytest.approx(1.2, abs=0.05)
     assert STRENGTH not in {c.effect.name for c in nearest(search, current, 0, fit.model.parts)[0].parts}, "not asked"
+
+
+def test_a_motor_that_lost_more_than_half_is_called_weak_where_all_else_seems_heavier() -> None:
+    """Strength and weakness are one thing, of which the fault is what people know."""
+    search = search_of(term("motor_weak", SERVO, loss=0.62), *FRICTION)
+    heavy = (("part_mass", ARM), ("com_shifted", ARM))
+    fit = settled(search, model_of(*FRICTION, more=heavy))
+    current = Current(fit.model.parts, fit.u)
+    then, twins, _ = nearest(search, current, 0, pool_of(search.problem))
+    terms = [*(t.term for t in twins), *then.hypothesis]
+    assert STRENGTH not in {t.effect for t in terms}
+    (loss,) = {round(t.values[0][1], 2) for t in terms if t.effect == "motor_weak"}
+    assert loss == pytest.approx(0.62, abs=0.03)

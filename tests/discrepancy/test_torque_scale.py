@@ -30,7 +30,7 @@ def test_it_begins_within_the_ranges_of_all_effects(shares: list[float]) -> None
     model = model_of_arm()
     u = np.clip(np.array(shares)[: len(model.lower)], model.lower, model.upper)
     for other, start in other_scale(of_arm, Current(model.parts, u), 0, pool_of(of_arm)):
-        assert other.parts[-1].effect.name == STRENGTH
+        assert other.parts[-1].effect.name == STRENGTH, "of several motors"
         assert np.all((start >= other.lower) & (start <= other.upper))
 
 
