@@ -158,8 +158,15 @@ class Problem(ABC):
         return [None] * len(self.measured)
 
     def shows(self, effect: str, target: str) -> bool:
-        """Whether an effect of one of ``families`` can show at a place in these very data."""
-        return True
+        """Whether an effect of one of ``families`` can show at a place in these very data. A supply that was measured sags as it
+        was measured to: what would take more off it stands in for something else."""
+        return effect != "supply_sag" or not self.supply_known
+
+    @cached_property
+    def supply_known(self) -> bool:
+        """Whether the voltage of the supply was recorded in every trial, for drives that are described to follow it."""
+        logged = all(t.log.supply_v is not None for t in self.measured)
+        return logged and any(d.supply_nominal_v > 0 for d in self.robot.drives)
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         """What this way alone can say about what a model leaves, in lines for people."""

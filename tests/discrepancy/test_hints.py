@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from way_samples import Sample, measure, problem_by
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.fit import fit_one
@@ -18,6 +19,7 @@ from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import CATALOGUE, EffectError, Hypothesis, term
+from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array
@@ -43,6 +45,22 @@ def test_steps_of_a_sensor_are_taken_from_its_readings() -> None:
     assert found["position"].values(np.array(found["position"].hint))["step"] == pytest.approx(STEP, rel=1e-6)
     assert found["speed"].hint == (), "it has noise, and no steps"
     assert not any(c.hint for c in pool_of(problem) if c.effect.name != "sensor_quantisation")
+
+
+def test_a_supply_that_was_measured_is_not_said_to_sag_more() -> None:
+    robot = with_noise(servo_pendulum(), 1e-3)
+    follows, ignores = (
+        replace(robot, drives=tuple(replace(d, supply_nominal_v=v) for d in robot.drives)) for v in (12.0, 0.0)
+    )
+    trials = measure(Sample(robot, (Excitation("multisine", 1.0, 0.5, 0),), (), ()), ())
+    volts = tuple(replace(t, log=replace(t.log, supply_v=np.full(len(t.log.times_s), 11.5))) for t in trials)
+
+    def proposed(some: tuple[MeasuredTrial, ...], of: Robot) -> bool:
+        return "supply_sag" in {c.effect.name for c in pool_of(problem_by("open_loop", some, of))}
+
+    assert not proposed(volts, follows)
+    assert proposed(volts, ignores), "drives that do not follow the voltage"
+    assert proposed(trials, follows), "nothing was measured"
 
 
 def test_what_no_slope_leads_to_is_looked_at_and_kept() -> None:

@@ -195,7 +195,7 @@ class OpenLoop(Problem):
     def shows(self, effect: str, target: str) -> bool:
         """Where most sensors repeat readings, that one does so too says nothing."""
         if effect not in REPEATING:
-            return True
+            return super().shows(effect, target)
         members = members_of(self.robot, target, self.robot.sensor_names) or (target,)
         return not any(x.kind in self.repeating for x in self.robot.sensors if x.name in members)
 
