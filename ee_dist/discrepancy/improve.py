@@ -15,7 +15,7 @@ import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import everywhere, stands_out
-from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, joint_by_joint, travelling, windows
+from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_be_noise
@@ -120,8 +120,7 @@ def improve(
             ready = anew < OFTEN and special != beside and bool(special) if spread else len(current.parts) != looked
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
-                cuts = travelling(problem) or [windows(problem)]
-                found = everywhere(search, current, own, pool, cuts, spread > 0, alike, [*seen.values()])
+                found = everywhere(search, current, own, pool, travelling(problem), spread > 0, alike, [*seen.values()])
                 looked = len(current.parts)
                 # Where a single one does more than all of them, it goes first, and they are looked for beside it.
                 if found is None or best is None or found.held < float(best.held.sum()):
@@ -214,9 +213,8 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
     """Whether much is left although the search had its chance with few effects; or, where it is known to be ``spread`` over
     many places, anything when no single one is left that stands out."""
     best = found.best
-    # Windows of a single motion say nothing about so many values; where each joint has one, they have to do.
-    wide = travelling(search.problem) or joint_by_joint(search.problem)
-    if not wide or (best is not None and added < FEW):
+    # Windows of a single motion say nothing about so many values.
+    if not travelling(search.problem) or (best is not None and added < FEW):
         return False
     energy = float((found.base**2).sum()) if best is None else float(best.held.sum())
     enough = NEAR if spread and best is None else FAR
