@@ -128,9 +128,20 @@ def spoiled(problem: Linear, curves: list[tuple[int, int]], size: float) -> Arra
     return extra
 
 
-@pytest.mark.parametrize(("curves", "quantile"), [([(0, 0)], 12.706), ([(0, 0), (1, 0), (2, 1)], 3.182)])
-def test_each_curve_counts_as_one_piece(curves: list[tuple[int, int]], quantile: float) -> None:
-    problem = Linear((term("coulomb_friction", JOINT, torque_nm=0.3),), motions=4)
+@pytest.mark.parametrize(
+    ("motions", "curves", "quantile"),
+    [
+        (20, [(0, 0)], 12.706),
+        (20, [(0, 0), (1, 0), (2, 1)], 3.182),
+        (4, [(0, 0)], 2.776),
+        (4, [(0, 0), (1, 0), (2, 1)], 2.776),
+        (4, [(k, c) for k in range(4) for c in range(2)], 2.306),
+    ],
+)
+def test_each_curve_counts_as_one_piece_or_up_to_four_of_its_windows_do(
+    motions: int, curves: list[tuple[int, int]], quantile: float
+) -> None:
+    problem = Linear((term("coulomb_friction", JOINT, torque_nm=0.3),), motions=motions)
     problem.data = problem.data + spoiled(problem, curves, 60.0)
     fit = fitted(problem)
     left = leftovers(problem, fit.residual)

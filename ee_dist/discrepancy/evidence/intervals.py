@@ -20,6 +20,10 @@ from ee_dist.trials.log import Array
 AT_BOUND = 0.985
 """Share of the way to a bound from which a value counts as being at it."""
 LEVEL = 0.95
+PARTS = 4
+"""Windows of what stands out that count as pieces by themselves, where fewer curves do. Of 141 values of 47 robots of one joint,
+one record each by a balance of forces, whose models lacked one or two effects, 99 % were within the interval so, and 100 % at 4.6
+times its width, by curves alone."""
 FEW = 3
 """Trials from which they are the pieces that vary; with fewer, segments are."""
 NOT_DETERMINED = "not determined by these data"
@@ -124,7 +128,8 @@ def half_widths_by_rest(problem: Problem, fit: Fit, left: Sequence[Leftover], le
     trial), however many values that has; so each curve that stands out counts as one piece, which moves a value by as much as a
     pattern of the size of its rest can (Cauchy and Schwarz). For a pattern that may run anywhere, along the slopes or across,
     the ratio of the one to the other is Student's, with as many degrees of freedom as there are such curves (as many as would
-    count alike). Zero where nothing stands out."""
+    count alike), or as they have windows, up to PARTS: a record says no less for not having been cut into several files. Zero
+    where nothing stands out."""
     inverse, _ = _inverse(fit)
     pulls = fit.slopes @ inverse
     trial, channel = problem.trial_of[fit.mask], problem.channel_of[fit.mask]
@@ -135,6 +140,9 @@ def half_widths_by_rest(problem: Problem, fit: Fit, left: Sequence[Leftover], le
     squares = np.array(moved).reshape(len(moved), len(fit.u))
     total = squares.sum(axis=0)
     pieces = np.divide(total**2, (squares**2).sum(axis=0), out=np.ones(len(fit.u)), where=total > 0)
+    of = np.asarray(problem.trial_of_segment)
+    windows = sum(int((of == g.index).sum()) for g in left)
+    pieces = np.maximum(pieces, min(windows, PARTS))
     return np.asarray(np.sqrt(total) * scipy.special.stdtrit(pieces, 0.5 + level / 2))
 
 
