@@ -30,6 +30,7 @@ from benchmarks.arm6 import desk_arm_6
 from benchmarks.cases import tried
 
 from ee_dist.discrepancy.draw import draw
+from ee_dist.discrepancy.evidence.intervals import NEUTRAL
 from ee_dist.discrepancy.importance import added, shares
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.ladder import Improvement
@@ -182,7 +183,8 @@ class Bench:
 
     def score(self, found: Case, result: Improvement, truth: Hypothesis, hidden: Hypothesis) -> None:
         """A name that the model has in the end is wrong where nothing of the kind is at any of its joints, and is told without a
-        doubt: neither tied with others, nor one that less depends on than is left unexplained."""
+        doubt: neither tied with others, nor one that less depends on than is left unexplained, nor one of which it is said
+        that no value is told from neutral."""
         steps = [r for r in result.ladder if r.added]
         named = {t.name for t in result.terms} | {name for r in steps for name in r.tied_with}
         named |= {t.term.name for t in result.twins}
@@ -190,6 +192,8 @@ class Bench:
         at = {(t.effect, t.target) for t in truth}
         doubted = {t.name for s in shares(result, self.robot) if s.doubted for t in s.terms}
         doubted |= {t.name for rung in steps if rung.tied_with for t in rung.added} | {t.name for t in result.twins}
+        flags = [[p.flag for p in result.parameters if result.terms[p.term] == t] for t in result.terms]
+        doubted |= {t.name for t, own in zip(result.terms, flags, strict=True) if own and set(own) == {NEUTRAL}}
         for t in added(result):
             if not any((t.effect, p) in at for p in (t.target, *self.places(t))):
                 (found.doubted if t.name in doubted else found.wrong).append(t.name)
