@@ -29,8 +29,8 @@ import numpy as np
 from benchmarks.arm6 import desk_arm_6
 from benchmarks.cases import tried
 
+from ee_dist.discrepancy.accounts.of_improve import may_be_nothing
 from ee_dist.discrepancy.draw import draw
-from ee_dist.discrepancy.evidence.intervals import NEUTRAL
 from ee_dist.discrepancy.importance import added, shares
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.ladder import Improvement
@@ -192,8 +192,7 @@ class Bench:
         at = {(t.effect, t.target) for t in truth}
         doubted = {t.name for s in shares(result, self.robot) if s.doubted for t in s.terms}
         doubted |= {t.name for rung in steps if rung.tied_with for t in rung.added} | {t.name for t in result.twins}
-        flags = [[p.flag for p in result.parameters if result.terms[p.term] == t] for t in result.terms]
-        doubted |= {t.name for t, own in zip(result.terms, flags, strict=True) if own and set(own) == {NEUTRAL}}
+        doubted |= {t.name for t in result.terms if may_be_nothing(result, (t,))}
         for t in added(result):
             if not any((t.effect, p) in at for p in (t.target, *self.places(t))):
                 (found.doubted if t.name in doubted else found.wrong).append(t.name)

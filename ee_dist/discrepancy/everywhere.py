@@ -270,17 +270,17 @@ class _Look:
         one = telling(search.problem, alone.residual, np.unique(search.problem.trial_of[search.everything]).tolist())
         others = possible(search.problem.robot, now.fixed, self._others(model))
         screened = screen(now, others, refit=refit, trial=one)
-        few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)
-        starts = []
-        for s in few[:TRIED]:
+        few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)[:TRIED]
+        tried = []
+        for s in few:
             c = s.candidate
             # Small values take in least of what is not theirs, where they do anything.
-            more = s.starts[0] if c.size > 1 or s.late else next(iter(c.hinted), np.zeros(c.size))
-            starts.append((Model((*model.parts, c)), np.concatenate([start, more])))
-        left = {c.name for c in others}.difference(s.candidate.name for s in few[:TRIED])
-        starts += [(Model((*model.parts, c)), np.concatenate([start, u])) for c, u in self.seen if c.name in left]
-        if not starts:
+            tried.append((c, s.starts[0] if c.size > 1 or s.late else next(iter(c.hinted), np.zeros(c.size))))
+        left = {c.name for c in others}.difference(c.name for c, _ in tried)
+        tried += [(c, u) for c, u in self.seen if c.name in left]
+        if not tried:
             return None
+        starts = [(Model((*model.parts, c)), np.concatenate([start, u])) for c, u in tried]
         problem, own = search.problem, search.everything
         heats = telling_values(problem, alone.residual, own)
         best, *ended = race(search, starts, own, HEATS, PRIOR, heats_on=heats)

@@ -7,7 +7,7 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
+from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.judge import surely_better
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.instead import Instead, instead_of
@@ -147,17 +147,20 @@ def _nearest_of(
 
 def _worse(search: Search, current: Current, then: Current, tried: int) -> bool:
     """Whether another model is worse, on data that its fits had not seen, by more than leaving a term out may cost."""
-    cut, models = strictest(search.problem), [(Model(m.parts), m.u) for m in (current, then)]
-    one, other = cross_fit(search, models, cut, WIDTHS[1:])
-    return other.energy - one.energy > allowed_loss(search.problem, one.energy, cut, tried)
+    one, other = _held_out(search, current, then)
+    return other.energy - one.energy > allowed_loss(search.problem, one.energy, one.cut, tried)
 
 
 def _surely(search: Search, current: Current, then: Current, tried: int) -> bool:
     """Whether another model is better on data that its fits had not seen."""
-    one, other = cross_fit(
-        search, [(Model(m.parts), m.u) for m in (current, then)], strictest(search.problem), WIDTHS[1:]
-    )
+    one, other = _held_out(search, current, then)
     return surely_better(search.problem, one, other, tried)
+
+
+def _held_out(search: Search, current: Current, then: Current) -> list[HeldOut]:
+    """Two models judged on what is held out in the strictest way."""
+    models = [(Model(m.parts), m.u) for m in (current, then)]
+    return cross_fit(search, models, strictest(search.problem), WIDTHS[1:])
 
 
 def _step(search: Search, found: Instead) -> Rung:

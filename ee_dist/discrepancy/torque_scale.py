@@ -41,6 +41,8 @@ def other_scale(
     if 2 * len({c.effect for c in pool}) < len({c.effect for c in pool_of(problem)}):
         return
     joints = find(STRENGTH).targets(problem.robot)
+    # Of the only motor that there is, weaker than described, people know the fault.
+    weak = next((w for w in pool if w.effect.name == WEAK), None) if len(joints) == 1 else None
     for c in pool_of(problem, only=[STRENGTH]):
         if len(c.members(problem.robot) or (c.target,)) != len(joints):
             continue
@@ -48,10 +50,7 @@ def other_scale(
             factor = 1.0 / (1.0 + _change(terms[k]))
             stay = [i for i in range(len(parts)) if i != k]
             new = [_scaled(problem.robot, terms[i], factor) if i >= own else terms[i] for i in stay]
-            # Of the only motor that there is, weaker than described, a fault has the same name.
-            weak = [w for w in pool if w.effect.name == WEAK and w.target == c.target]
-            fault = weak[0] if weak and factor < 1 and len(joints) == 1 else None
-            comes, values = (c, {"change": factor - 1.0}) if fault is None else (fault, {"loss": 1.0 - factor})
+            comes, values = (weak, {"loss": 1.0 - factor}) if weak and factor < 1 else (c, {"change": factor - 1.0})
             model = Model((*(parts[i] for i in stay), comes))
             u = [*(parts[i].shares(dict(t.values)) for i, t in zip(stay, new, strict=True)), comes.shares(values)]
             yield model, np.clip(np.concatenate(u), model.lower, model.upper)

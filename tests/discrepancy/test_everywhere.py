@@ -233,3 +233,16 @@ def test_a_twin_is_tried_in_the_place_of_what_was_added(robot):
     assert "motor_weak@servo" in found.rungs[0].dropped
     without = everywhere(search, current, 0, rest, cuts, True)
     assert without is None or "load_friction" not in names(without)
+
+
+def test_what_was_worth_its_place_before_is_let_loose_again(robot, monkeypatch):
+    """On top of values that stood in for it nothing of it promises, so that it is not among those that are tried for that."""
+    truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2, "zero_offset": -0.15, "load_friction": 0.6}
+    problem, pool = Curved(robot, truth), pool_of(robot)
+    search, cuts = Search(problem), travelling(problem)
+    before = next(c for c in pool if c.effect.name == "load_friction")
+    monkeypatch.setattr("ee_dist.discrepancy.everywhere.TRIED", 0)
+    found = everywhere(search, Current(), 0, pool, cuts, seen=[(before, np.array([0.2]))])
+    assert "load_friction" in names(found)
+    without = everywhere(search, Current(), 0, pool, cuts)
+    assert without is None or "load_friction" not in names(without)

@@ -30,6 +30,20 @@ from ee_dist.tasks.results.tables import typed
 DRY = term("coulomb_friction", "servo", torque_nm=0.3)
 
 
+def made_up() -> SimpleNamespace:
+    """What an account asks of a problem, of one trial."""
+    return SimpleNamespace(
+        robot=servo_pendulum(),
+        told=str,
+        natural_name="error",
+        natural_unit="",
+        notes=[],
+        doubts="",
+        trials=("a",),
+        measured=(),
+    )
+
+
 def account(
     tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = (),
     what: Term = DRY, left: tuple[Leftover, ...] = (),
@@ -52,17 +66,7 @@ def account(
         as_it_was=False,
         unsure=unsure,
     )
-    problem = SimpleNamespace(
-        robot=servo_pendulum(),
-        told=str,
-        natural_name="error",
-        natural_unit="",
-        notes=[],
-        doubts="",
-        trials=("a",),
-        measured=(),
-    )
-    return explain_account(problem, found, ahead, planner)  # type: ignore[arg-type]
+    return explain_account(made_up(), found, ahead, planner)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -222,16 +226,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         held_out="motions that were not fitted", alternatives=[],
     )  # fmt: skip
     start = SimpleNamespace(added=(), dropped=(), tied_with=[], error_heldout=5.0, held_out="", name="")
-    problem = SimpleNamespace(
-        robot=servo_pendulum(),
-        told=str,
-        natural_name="error",
-        natural_unit="",
-        notes=[],
-        doubts="",
-        trials=("a",),
-        measured=(),
-    )
+    problem = made_up()
     for verdict, share, said in (
         (EXPLAINED, 1.0, "Nothing else is left above the noise."),
         (BETTER, 0.9979, "More than noise is left on motions that were not fitted: 99.7 % of"),

@@ -81,7 +81,7 @@ def test_currents_that_were_measured_are_taken_not_those_that_were_asked_for(tmp
     for k in range(2):
         frame[f"i_ref{k + 1}_A"] = needed[0][:, k] / 0.2
         frame[f"i{k + 1}_A"] = needed[0][:, k] / 0.2 + noise[:, k]
-    proposal = proposal_for([logs.written(tmp_path, pd.DataFrame(frame))], robot, Hints(gains=[0.2, 0.2]))
+    proposal = proposal_for([logs.written(tmp_path, frame)], robot, Hints(gains=[0.2, 0.2]))
     assert [c.column for c in proposal.choices if c.group == "torques"] == ["i1_A", "i2_A"]
     assert not any("applied to nothing" in n for n in proposal.notes)
 

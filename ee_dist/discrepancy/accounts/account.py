@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ee_dist.basics.names import counted
-from ee_dist.discrepancy.evidence.holdout import joint_by_joint
+from ee_dist.discrepancy.evidence.holdout import joint_by_joint, travelling
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed, plain
@@ -91,7 +91,8 @@ def advised(problem: Problem, advice: str) -> str:
 
 def held_out_notes(problem: Problem) -> list[str]:
     """What to know of what was held out, in lines for people."""
-    return [ONE_EACH] if joint_by_joint(problem) else []
+    # Where settings differ these are held out, whatever moves in which motion.
+    return [ONE_EACH] if joint_by_joint(problem) and not travelling(problem) else []
 
 
 def beside_floor(error: float, floor: float, left: bool) -> list[str]:

@@ -72,7 +72,7 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in told)
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]
     # What may be nothing is no news, whatever depends on it together with others.
-    parts = sorted(shares(found, robot), key=lambda s: _may_be_nothing(found, s))
+    parts = sorted(shares(found, robot), key=lambda s: may_be_nothing(found, s.terms))
     lines += doubt_text([s for s in parts if s.doubted])
     vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
     if vague:
@@ -115,9 +115,9 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
 
 
-def _may_be_nothing(found: Improvement, share: Share) -> bool:
-    """Whether none of the values that a phrase tells is told from neutral."""
-    flags = [p.flag for p in found.parameters if found.terms[p.term] in share.terms]
+def may_be_nothing(found: Improvement, terms: Sequence[Term]) -> bool:
+    """Whether none of the values of some terms of the model is told from neutral."""
+    flags = [p.flag for p in found.parameters if found.terms[p.term] in terms]
     return bool(flags) and all(flag == NEUTRAL for flag in flags)
 
 

@@ -13,7 +13,7 @@ from ee_dist.measurements.proposal.asked_for import was_asked_for
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.rest import by_its_name
-from ee_dist.measurements.proposal.units import UnitChoice, by_ratio
+from ee_dist.measurements.proposal.units import ANGLES, LENGTHS, UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View, can_be
 from ee_dist.measurements.proposal.words import SPEED
 
@@ -129,9 +129,10 @@ def _of_a_count(v: View, block: Block) -> str:
     r, kinds = v.derivative(v.position.block, block), {j.kind for j in v.joints}
     if len(kinds) != 1 or r.correlation < AGREES or not r.slope:
         return ""
-    unit = SPEEDS[kinds.pop()][0]
-    turn = f", {2 * math.pi / r.slope:.4g} to a turn" if unit == "rad/s" else ""
-    return f"; in {unit} one of their numbers is {r.slope:.4g} {unit[:-2]}{turn}: 'unit: {unit[:-2]}, scale: {r.slope:.4g}'"
+    (kind,) = kinds
+    unit = (ANGLES if kind == "hinge" else LENGTHS)[0]
+    turn = f", {2 * math.pi / r.slope:.4g} to a turn" if kind == "hinge" else ""
+    return f"; in {SPEEDS[kind][0]} one of their numbers is {r.slope:.4g} {unit}{turn}: 'unit: {unit}, scale: {r.slope:.4g}'"
 
 
 def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
