@@ -183,7 +183,7 @@ def improve(
         current, twins, step = nearest(search, current, own, pool, asked)
         if step is not None:
             climb(step)
-    return _finish(search, current, ladder, as_it_is, stopped, last, twins)
+    return _finish(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
 
 
 def _with_room(search: Search, fit: Fit) -> Fit:
@@ -278,6 +278,7 @@ def _finish(
     stopped: str,
     last: Examined | None,
     twins: list[Twin],
+    tried: int,
 ) -> Improvement:
     problem = search.problem
     floor, source = problem.noise_floor()
@@ -289,7 +290,7 @@ def _finish(
         fit = fit_one(search, Model(current.parts), [current.u], None, (*WIDTHS[2:], 0.006))
         residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
         left = leftovers(problem, residual)
-        told = [replace(p, term=p.term + len(search.fixed)) for p in parameters(problem, fit, left)]
+        told = [replace(p, term=p.term + len(search.fixed)) for p in parameters(problem, fit, left, tried)]
         worth = worth_of(problem, fit, base)
     before, after = ladder[0].error_heldout, ladder[-1].error_heldout
     above = before**2 - floor**2

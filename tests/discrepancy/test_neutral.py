@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy.accounts.of_improve import has
-from ee_dist.discrepancy.evidence.intervals import BOUND, NEUTRAL, NOT_DETERMINED, parameters
+from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, NOT_DETERMINED, half_widths, parameters
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.pruning import without_neutral
 from ee_dist.discrepancy.search.candidates import candidate
@@ -50,10 +52,27 @@ def test_a_rival_that_came_into_the_model_later_is_no_rival() -> None:
 )
 def test_a_value_at_its_bound_is_told_so_whatever_its_slope_there(u: float, slope: float, flag: str) -> None:
     """Past a bound the data may say much of what they do not say at it."""
+    problem, fit = valued(u, slope)
+    (told,) = parameters(problem, fit)
+    assert told.flag == flag
+
+
+def valued(u: float, slope: float) -> tuple[Linear, Fit]:
+    """A fit of one value, of that slope in each datum."""
     problem = Linear((), motions=4)
     n = len(problem.data)
     model = Model((candidate(ROBOT, "viscous_friction", ROBOT.motor_names[0]),))
     slopes = slope * np.random.default_rng(0).standard_normal((n, 1))
-    fit = Fit(model, np.array([u]), float(n), problem.data, slopes, np.ones(n, dtype=bool))
-    (told,) = parameters(problem, fit)
-    assert told.flag == flag
+    return problem, Fit(model, np.array([u]), float(n), problem.data, slopes, np.ones(n, dtype=bool))
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "asked_for", "found_among_200"), [(1.0, NEUTRAL, NEUTRAL), (3.0, "", HARDLY), (6.0, "", "")]
+)
+def test_one_of_many_effects_is_told_from_neutral_by_luck(sigmas: float, asked_for: str, found_among_200: str) -> None:
+    """Of two hundred that are nothing, ten are told by two standard deviations, and nearly always one by 2.6."""
+    problem, fit = valued(1.0, 30.0)
+    (half,) = half_widths(problem, fit)
+    fit = replace(fit, u=np.array([sigmas * half / 1.96]))
+    assert [p.flag for p in parameters(problem, fit)] == [asked_for]
+    assert [p.flag for p in parameters(problem, fit, tried=200)] == [found_among_200]

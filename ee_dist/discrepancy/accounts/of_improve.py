@@ -29,7 +29,7 @@ from ee_dist.discrepancy.accounts.account import (
     was_or_were,
 )
 from ee_dist.discrepancy.calibrated_away import OddOne
-from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, NEUTRAL, WIDER, ParameterReport, called
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, HARDLY, NEUTRAL, WIDER, ParameterReport, called
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
@@ -116,9 +116,9 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
 
 
 def may_be_nothing(found: Improvement, terms: Sequence[Term]) -> bool:
-    """Whether none of the values of some terms of the model is told from neutral."""
+    """Whether none of the values of some terms of the model is told from neutral, or farther than luck may tell one."""
     flags = [p.flag for p in found.parameters if found.terms[p.term] in terms]
-    return bool(flags) and all(flag == NEUTRAL for flag in flags)
+    return bool(flags) and all(flag in (NEUTRAL, HARDLY) for flag in flags)
 
 
 def twin_text(twin: Twin, found: Improvement, robot: Robot) -> str:
@@ -170,7 +170,7 @@ def _ranges(found: Improvement, named_: Sequence[Term], robot: Robot) -> str:
         term = found.terms[p.term]
         if term.name in told_of:
             range_ = span(term, p.name, p.low, p.high, robot, interval=True)
-            sure = not p.flag and np.isfinite(p.high - p.low)
+            sure = p.flag in ("", HARDLY) and np.isfinite(p.high - p.low)
             told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
     out = [
         (f"{placed(name)}: " if len(added(found)) > 1 else "") + ", ".join(values)

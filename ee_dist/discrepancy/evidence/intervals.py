@@ -11,6 +11,7 @@ import numpy as np
 import scipy  # which loads its parts when they are used; scipy.stats, which calls these functions, takes a second
 
 from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.evidence.rule import least_energy
 from ee_dist.discrepancy.problem import Mask, Problem
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.fitted import Fit
@@ -30,6 +31,7 @@ NOT_DETERMINED = "not determined by these data"
 BOUND = "at its bound: the range is too small, or the effect is another"
 NONE_LEFT = "at its bound: next to none is left of what was described"
 NEUTRAL = "not told from neutral"
+HARDLY = "hardly told from neutral: of as many effects as were tried, luck may tell one as far"
 WIDER = "widened by what is left unexplained"
 ALL_OF_IT = "what is left unexplained could be all of it"
 
@@ -53,9 +55,11 @@ class ParameterReport:
         return "; ".join(filter(None, (self.flag, self.doubt)))
 
 
-def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = ()) -> list[ParameterReport]:
-    """Every value of a fit, in the order of its terms; ``left`` is what stands out of its residual."""
+def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = (), tried: int = 0) -> list[ParameterReport]:
+    """Every value of a fit, in the order of its terms; ``left`` is what stands out of its residual. ``tried``:
+    how many effects were in question, of which one in twenty is told from neutral for nothing (0: those of the fit)."""
     half_u = half_widths(problem, fit)
+    by_luck = math.sqrt(least_energy(tried)) / scipy.special.ndtri(0.5 + LEVEL / 2) if tried else 1.0
     wider = np.maximum(half_u, half_widths_by_rest(problem, fit, left))
     out, at = [], 0
     hypothesis: Hypothesis = fit.hypothesis
@@ -72,6 +76,8 @@ def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = ()) -> lis
                 flag = f"{flag}; {NOT_DETERMINED}" if flag else NOT_DETERMINED
             elif not flag and abs(u[k]) < s[k]:
                 flag = NEUTRAL
+            elif not flag and abs(u[k]) < by_luck * s[k]:
+                flag = HARDLY
             doubt = "" if w[k] <= s[k] else ALL_OF_IT if abs(u[k]) < w[k] else WIDER
             low, high = value - half, value + half
             if math.isfinite(half):  # no farther than physics allows
