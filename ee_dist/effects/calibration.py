@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
 from ee_dist.effects.catalogue import Parameter, effect, find
@@ -278,7 +280,7 @@ def gear_ratio(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 
 @effect(
     "encoder_zero",
-    family="sensing",
+    family="body",
     targets=motors,
     parameters=(Parameter("offset", "rad", -0.1, 0.1, 0.0, "what the encoder reads where the model has zero", 0.001),),
     physics="The encoder was mounted a little turned: where it reads zero the joint is not where the model has its zero.",
@@ -297,6 +299,37 @@ def encoder_zero(robot: Robot, target: str, values: Mapping[str, float]) -> Robo
     ax, ay, az = joint.axis
     s, c = math.sin(-offset / 2), math.cos(-offset / 2)
     return robot.with_joint(target, rotation=_times(joint.rotation, (ax * s, ay * s, az * s, c)))
+
+
+@effect(
+    "axis_tilt",
+    family="body",
+    targets=motors,
+    parameters=(
+        Parameter("first_deg", "deg", -60.0, 60.0, 0.0, "tilt towards the first direction across the axis", 0.1),
+        Parameter("second_deg", "deg", -60.0, 60.0, 0.0, "tilt towards the second, the axis times the first", 0.1),
+    ),
+    ranges=scales.always(first_deg=(-10.0, 10.0), second_deg=(-10.0, 10.0)),
+    physics="A joint's axis does not point where the model says: a bearing seat that is not square, a printed part that has "
+    "warped, a drawing that was read the wrong way. The pose at position zero stays; what the joint carries swings out of its "
+    "plane. The first direction is that of the part's x, y and z that lies most across the axis, made square to it: x and "
+    "y for an axis along z, y and z for one along x, x and -z for one along y.",
+    signature="Residual torque of one period in the joint's own angle, at the joint and at all beyond it, at rest too; none "
+    "where gravity does no work on them.",
+    reference="Mooring, Roth and Driels 1991, Fundamentals of Manipulator Calibration, chapter 2",
+    worth_proposing=is_arm,
+)
+def axis_tilt(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
+    first, second = (math.tan(math.radians(values[k])) for k in ("first_deg", "second_deg"))
+    if first == second == 0.0:
+        return robot
+    axis = np.array(robot.joint(target).axis)
+    across = np.eye(3)[np.argmin(np.abs(axis).round(9))]
+    p = across - (across @ axis) * axis
+    p /= np.linalg.norm(p)
+    tilted = axis + first * p + second * np.cross(axis, p)
+    x, y, z = (float(v) for v in tilted / np.linalg.norm(tilted))
+    return robot.with_joint(target, axis=(x, y, z))
 
 
 def _times(a: Quat, b: Quat) -> Quat:

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 from effect_robots import ARM_M, MASS_KG, Bench, G, lever, slider
+from scipy.spatial.transform import Rotation
 
-from ee_dist.effects import term
+from ee_dist.effects import apply, term
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.quadruped import quadruped
 
@@ -68,6 +69,28 @@ def test_encoder_zero_turns_the_load_along_the_position_axis(bench: Bench) -> No
     log = bench.run(lever(kp=100.0, kd=10.0), term("encoder_zero", "joint", offset=0.1), steps=2000)
     angle = float(log.channel("position")[-1])
     assert 100.0 * angle == pytest.approx(HOLD_NM * math.cos(angle - 0.1), rel=1e-3)
+
+
+@pytest.mark.parametrize(("first", "second"), [(10.0, 0.0), (0.0, 10.0), (-5.0, 8.0)])
+def test_axis_tilt_lets_the_load_swing_out_of_its_plane(bench: Bench, first: float, second: float) -> None:
+    """About a tilted axis a the arm r, turned by q, has gravity's moment a . (r(q) x m g)."""
+    log = bench.run(
+        lever(kp=100.0, kd=10.0), term("axis_tilt", "joint", first_deg=first, second_deg=second), steps=3000
+    )
+    angle = float(log.channel("position")[-1])
+    # Along y: the directions across it are x and -z.
+    axis = np.array([math.tan(math.radians(first)), 1.0, -math.tan(math.radians(second))])
+    axis /= np.linalg.norm(axis)
+    at = Rotation.from_rotvec(angle * axis).apply([ARM_M, 0.0, 0.0])
+    moment = float(axis @ np.cross(at, [0.0, 0.0, -MASS_KG * G]))
+    assert 100.0 * angle == pytest.approx(moment, rel=1e-3)
+
+
+def test_a_tilted_axis_stays_one_of_length_one_and_leaves_the_pose_at_zero() -> None:
+    robot = apply(lever(), (term("axis_tilt", "joint", first_deg=20.0, second_deg=-35.0),))
+    joint, was = robot.joint("joint"), lever().joint("joint")
+    assert np.linalg.norm(joint.axis) == pytest.approx(1.0)
+    assert (joint.position_m, joint.rotation) == (was.position_m, was.rotation)
 
 
 def test_on_stand_nothing_is_touched_and_the_body_stays(bench: Bench) -> None:

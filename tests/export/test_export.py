@@ -126,9 +126,6 @@ def test_an_exported_effect_follows_our_own_rollout(name: str) -> None:
 def test_what_a_faulty_sensor_reports_is_in_the_shim(name: str) -> None:
     chosen = example(name)
     (fate,) = fates(QUADRUPED, (chosen,), "mjcf")
-    if name == "encoder_zero":
-        assert fate.how == NATIVE
-        return
     assert fate.how == SHIM
     model, commands = apply(QUADRUPED, (chosen,)), calm(QUADRUPED)
     true, faulty = rollout(QUADRUPED, commands), rollout(model, commands)
