@@ -89,7 +89,7 @@ def improve(
     if current.parts:
         climb(refitted(search, current))
     last: Examined | None = None
-    own, asked = len(current.parts), frozenset[str]()
+    own, twins = len(current.parts), list[Twin]()
     if wanted is not None:
         stopped = ASKED if wanted else REFITTED
         for c in wanted:
@@ -169,6 +169,25 @@ def improve(
                 stopped = NO_MORE.format(why=WORSE)
                 break
             climb(rung)
+        current, twins = _settled_on(search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew)
+    return _finish(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
+
+
+def _settled_on(
+    search: Search,
+    current: Current,
+    own: int,
+    pool: Sequence[Candidate],
+    climb: Callable[[Rung], None],
+    spread: bool,
+    seen: Sequence[tuple[Candidate, Array]],
+    often: int,
+) -> tuple[Current, list[Twin]]:
+    """The model without what is not told, or the one that does as well and is nearer to the description, or better; and what does
+    as well as an effect of it. Where what is a little wrong everywhere (``spread``) had stood in for an effect that only comes in
+    its place here, it is fitted anew beside that, ``often`` times at most."""
+    problem, robot, asked = search.problem, search.problem.robot, frozenset[str]()
+    while True:
         if spread or len(current.parts) - own > 1:
             # Of two that leave the same mark the values may be anything, and one of them says it all.
             told = told_only(search, current, own, strictest(problem), len(pool), not spread)
@@ -178,12 +197,23 @@ def improve(
                 climb(
                     refitted(search, current, "without what these data do not tell from neutral", (*told.gone, *none))
                 )
-    twins: list[Twin] = []
-    if wanted is None and len(current.parts) > own + 1:
+        if len(current.parts) <= own + 1:
+            return current, []
+        before = {c.name for c in current.parts}
         current, twins, step = nearest(search, current, own, pool, asked)
-        if step is not None:
-            climb(step)
-    return _finish(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
+        if step is None:
+            return current, twins
+        climb(step)
+        came = [c for c in current.parts if c.name not in before and stands_out(robot, c)]
+        left = leftovers(problem, search.on(current.hypothesis).base())
+        if not (spread and often and came) or _settled(left, step.error_heldout, problem.noise_floor()[0]):
+            return current, twins
+        found = everywhere(search, current, own, pool, travelling(problem), True, (), seen)
+        if found is None:
+            return current, twins
+        often, current = often - 1, found.current
+        for rung in found.rungs:
+            climb(rung)
 
 
 def _with_room(search: Search, fit: Fit) -> Fit:
