@@ -43,8 +43,9 @@ AT_LEAST = 4
 Looked = TypeVar("Looked", Screened, Scanned)
 MANY_JOINTS = 3
 """Joints from which an effect at each of them is judged joint by joint too."""
-FAMILIES_TRIED = 4
-"""Effects whose members at all joints, each with a value of its own, are tried together."""
+FAMILIES_TRIED, ADDS = 4, 0.3
+"""Effects whose members at all joints, each with a value of its own, are tried together, and the share of what the best member
+promises, or of what it leaves above the noise, that the others must add."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,9 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     ]
     starts = [(Proposal((f.model.parts[-1],)), f.u[len(current.u) :]) for f in quick]
     has = {t.effect for t in (*search.fixed, *current.hypothesis) if t.target in WHOLE}
-    starts += _families(screened, starts, least, has)
+    looked_at = np.isin(problem.trial_of, busy)
+    above = float((base[looked_at] ** 2 - problem.floor[looked_at]).sum())
+    starts += _families(screened, starts, least, has, above)
     guessed = assumed_drives(now.among(busy), pool, [t.name for t in (*search.fixed, *current.hypothesis)])
     starts += [guessed] if guessed is not None else []
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, few), 1e-12)
@@ -270,11 +273,15 @@ def _quick(
 
 
 def _families(
-    screened: Sequence[Screened], singles: Sequence[tuple[Proposal, Array]], least: float, has: AbstractSet[str]
+    screened: Sequence[Screened],
+    singles: Sequence[tuple[Proposal, Array]],
+    least: float,
+    has: AbstractSet[str],
+    above: float,
 ) -> list[tuple[Proposal, Array]]:
-    """Effects at all joints, each joint with a value of its own, where several joints promise something: one number for
-    all of them, which the model may have already (``has``), may be too few. And friction by load, linear and quadratic, which pay
-    together."""
+    """Effects at all joints, each joint with a value of its own, where several joints promise something: one number for all of
+    them, which the model may have already (``has``), may be too few. ``above``: energy above the noise. And friction by load,
+    linear and quadratic, which pay together."""
     out: list[tuple[float, Proposal, Array]] = []
     by_effect: dict[str, list[Screened]] = {}
     whole = has | {s.candidate.effect.name for s in screened if s.candidate.target in WHOLE}
@@ -285,8 +292,9 @@ def _families(
         visible = [s for s in members if s.starts and s.promise > least]
         if len(visible) < 2:
             continue
-        promise = sum(s.promise for s in visible)
-        if promise > 1.3 * max(s.promise for s in visible):
+        promise, most = sum(s.promise for s in visible), max(s.promise for s in visible)
+        # A shoulder's friction is little beside that of an elbow that leaves four fifths, and most of what this one cannot say.
+        if promise - most > ADDS * min(most, max(above - most, 0.0)):
             label = f"{name}@each of {len(visible)} joints"
             parts = Proposal(tuple(s.candidate for s in visible), label)
             out.append((promise / np.sqrt(parts.size), parts, np.concatenate([s.starts[0] for s in visible])))

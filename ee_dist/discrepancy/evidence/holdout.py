@@ -216,7 +216,8 @@ def cross_fit(
 
 def held_by_slopes(search: Search, fits: Sequence[Fit], cut: Cut) -> list[HeldOut]:
     """Models that were fitted to all data, judged on what is held out: many values follow in each turn by the slopes that are
-    known, few are fitted anew. What the values do is simulated all the same."""
+    known, few are fitted anew. What the values do is simulated all the same. Where these slopes lead nowhere in any turn, as in a
+    residual that is rugged far above the noise, values that have seen all data would be judged on them: those are fitted anew."""
     known = [i for i, f in enumerate(fits) if len(f.u) >= LARGE and f.mask.all()]
     others = [i for i in range(len(fits)) if i not in known]
     found: dict[int, HeldOut] = {}
@@ -224,6 +225,9 @@ def held_by_slopes(search: Search, fits: Sequence[Fit], cut: Cut) -> list[HeldOu
         if some:
             held = cross_fit(search, [(fits[i].model, fits[i].u) for i in some], cut, leading=leading)
             found |= dict(zip(some, held, strict=True))
+    still = [i for i in known if all(np.array_equal(f.u, fits[i].u) for f in found[i].fits)]
+    if still:
+        found |= dict(zip(still, cross_fit(search, [(fits[i].model, fits[i].u) for i in still], cut), strict=True))
     return [found[i] for i in range(len(fits))]
 
 
