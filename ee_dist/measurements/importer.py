@@ -46,6 +46,8 @@ TORQUE = "torque of"
 """How the report names what a drive gave, before its joint."""
 SAME_RATE = 1e-3
 """A record whose even step is within this share of the wanted one is taken sample by sample."""
+DENSER = 1.1
+"""Rows to a step from which commands reach the model later than they did the robot by what counts."""
 
 
 def import_file(path: str | Path, mapping: Mapping, robot: Robot, index: int = 0) -> tuple[TrialRecord, Report]:
@@ -153,6 +155,7 @@ class _Import:
             report.done.append(
                 f"{how} sampling every {1e3 * timing.median_s:.4g} ms brought to {1e3 * step:.4g} ms: "
                 "states by straight lines, commands held"
+                + (_late(timing.median_s, step) if step > DENSER * timing.median_s else "")
             )
         note = time_suspicion(timing.median_s, length, unit)
         if note:
@@ -438,3 +441,11 @@ def _turn(column: Column) -> float:
     if kind != "angle" or column.unwrap or column.scale == 0:
         return math.inf
     return TURN / size / abs(column.scale)
+
+
+def _late(every_s: float, step_s: float) -> str:
+    """What comes of commands that change between the model's steps."""
+    return (
+        f" and up to {1e3 * step_s:.3g} ms late, by which delays that are found may be off; with time_step_s: {every_s:.4g} in "
+        "the robot's description it steps as often as the log"
+    )

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
+from way_samples import two_joint_arm
 
 from ee_dist.discrepancy.accounts.of_improve import has
 from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, NOT_DETERMINED, half_widths, parameters
@@ -31,13 +32,16 @@ def test_terms_at_neutral_leave_the_model_and_the_others_stay() -> None:
 
 
 def test_a_rival_that_came_into_the_model_later_is_no_rival() -> None:
-    names = {"coulomb_friction@base", "coulomb_friction@elbow", "load_friction@elbow"}
-    assert has(names, "coulomb_friction@base")
-    assert has(names, "coulomb_friction@each of 3 joints")
-    assert has(names, "coulomb_friction@elbow + load_friction@elbow")
-    assert not has(names, "viscous_friction@base")
-    assert not has(names, "viscous_friction@each of 3 joints")
-    assert not has(names, "load_friction@elbow + quadratic_friction@elbow")
+    arm, names = two_joint_arm(), {"coulomb_friction@base", "coulomb_friction@elbow", "load_friction@elbow"}
+    assert has(names, "coulomb_friction@base", arm)
+    assert has(names, "coulomb_friction@each of 3 joints", arm)
+    assert has(names, "coulomb_friction@elbow + load_friction@elbow", arm)
+    assert not has(names, "viscous_friction@base", arm)
+    assert not has(names, "viscous_friction@each of 3 joints", arm)
+    assert not has(names, "load_friction@elbow + quadratic_friction@elbow", arm)
+    joints = arm.motor_names
+    assert not has(names, "coulomb_friction@all_joints", arm), "some of them, not all"
+    assert has({f"coulomb_friction@{j}" for j in joints}, "coulomb_friction@all_joints", arm)
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,8 @@ from ee_dist.discrepancy.ladder import Improvement, Twin
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
 from ee_dist.discrepancy.words import much, named, percent, phrase, placed, plain, quantity, span
-from ee_dist.effects.catalogue import Hypothesis, Term
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
+from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
 
 NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
@@ -46,12 +47,19 @@ NAMED = 3
 """Effects that a headline names."""
 
 
-def has(names: AbstractSet[str], told: str) -> bool:
-    """Whether effects of these ``names`` are all that an explanation is made of: a rival that came into the model later."""
+def has(names: AbstractSet[str], told: str, robot: Robot) -> bool:
+    """Whether effects of these ``names`` are all that an explanation is made of: a rival that came into the model later, at each
+    of the joints that it is shared by if need be."""
     effect, _, place = told.partition("@")
     if place.startswith(EACH):
         return any(name.startswith(f"{effect}@") for name in names)
-    return set(told.split(" + ")) <= names
+
+    def there(name: str) -> bool:
+        effect, _, place = name.partition("@")
+        members = members_of(robot, place, CATALOGUE[effect].targets(robot)) if effect in CATALOGUE else ()
+        return name in names or (bool(members) and {f"{effect}@{m}" for m in members} <= names)
+
+    return all(map(there, told.split(" + ")))
 
 
 def improve_account(problem: Problem, found: Improvement, planner: str = "", also: Sequence[str] = ()) -> Account:
@@ -63,8 +71,15 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     if len(steps) > 1:
         lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
     names = {t.name for t in found.terms}
-    ties = {r.name: [n for n in r.tied_with if not has(names, n)] for r in steps if names & {t.name for t in r.added}}
+    ties = {
+        r.name: [n for n in r.tied_with if not has(names, n, robot)] for r in steps if names & {t.name for t in r.added}
+    }
+    # Of several effects that came as one nobody asked again, once more had come, what could be in their place.
+    then = {r.name: ties.pop(r.name) for r in steps[:-1] if len(r.added) > 1 and ties.get(r.name)}
     lines += [tie_text(placed(name), others) for name, others in ties.items() if others]
+    lines += [
+        f"When {placed(name)} came in, these did as well: {', '.join(map(placed, o))}." for name, o in then.items()
+    ]
     lines += [twin_text(t, found, robot) for t in found.twins]
     for t in found.twins:
         ties[t.name] = [*ties.get(t.name, []), t.term.name]

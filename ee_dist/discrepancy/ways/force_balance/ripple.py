@@ -17,7 +17,9 @@ from ee_dist.discrepancy.problem import Index, Mask
 from ee_dist.trials.log import Array
 
 SLOW_SHARE, CALM_SHARE = 0.15, 0.1
-"""Of the largest speed and acceleration of a record: below the first a joint reverses, below the second it cruises."""
+"""Of the largest speed of a trial, and acceleration of a record: below the first a joint reverses, below the second it cruises."""
+STILL = 0.01
+"""Of the largest speed of a record: a trial that stays below it stands still."""
 BINS = 120
 
 
@@ -58,7 +60,11 @@ def remains(motor: str, left: Array, x: Array, v: Array, a: Array, trial: Index 
     """What is left over at a drive: forces (T,) with position, speed and acceleration at the same instants; ``trial`` (T,) is
     which trial a row is of, without it all are of one."""
     trial = np.zeros(len(left), dtype=np.int64) if trial is None else trial
-    slow = np.abs(v) < SLOW_SHARE * np.abs(v).max()
+    # A trial that is slow all along turns round no more often than a quick one; one that stands still has no pace.
+    which = np.unique(trial, return_inverse=True)[1]
+    pace = np.zeros(int(which.max(initial=0)) + 1)
+    np.maximum.at(pace, which, np.abs(v))
+    slow = np.abs(v) < SLOW_SHARE * np.maximum(pace, STILL * pace.max())[which]
     calm = np.abs(a) < CALM_SHARE * np.abs(a).max()
     groups = (
         ("near a reversal", slow),
