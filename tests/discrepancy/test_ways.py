@@ -161,12 +161,11 @@ def test_a_pass_ends_with_its_trial() -> None:
 def test_a_trial_at_one_slow_speed_is_not_near_a_reversal() -> None:
     """What is slow is so beside the pace of its own trial: the other may be eighty times as quick."""
     slow, quick = np.full(300, 0.02), np.full(300, 1.5)
-    v = np.concatenate([slow, quick])
-    x = np.concatenate([np.cumsum(slow), np.cumsum(quick)])
-    rng = np.random.default_rng(0)
-    found = remains("joint", rng.standard_normal(600), x, v, np.zeros(600), np.repeat([0, 1], 300))
-    assert [r.name for r in found.regimes] == ["cruising up"]
-    still = remains(
-        "joint", rng.standard_normal(600), x, v * np.repeat([0.001, 1], 300), np.zeros(600), np.repeat([0, 1], 300)
-    )
-    assert {r.name: r.time_share for r in still.regimes} == {"near a reversal": 0.5, "cruising up": 0.5}
+    v, x = np.concatenate([slow, quick]), np.concatenate([np.cumsum(slow), np.cumsum(quick)])
+    a, which = np.zeros(600), np.repeat([0, 1], 300)
+    a[300] = 1.0
+    left = np.random.default_rng(0).standard_normal(600)
+    found = {r.name: r.time_share for r in remains("joint", left, x, v, a, which).regimes}
+    assert found == {"speeding up or slowing down": 1 / 600, "cruising up": 599 / 600}
+    still = {r.name: r.time_share for r in remains("joint", left, x, v * np.repeat([0.001, 1], 300), a, which).regimes}
+    assert still["near a reversal"] == 0.5, "what stands still has no pace of its own"
