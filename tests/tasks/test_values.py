@@ -9,6 +9,7 @@ import pytest
 from ee_dist.discrepancy.evidence.intervals import NEUTRAL, NOT_DETERMINED, ParameterReport
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
+from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.results.sections import values_section
 from ee_dist.tasks.results.values import kinds_of, within
@@ -64,3 +65,19 @@ def test_an_interval_that_a_bound_cuts_is_told_by_its_ends():
     assert within(ParameterReport(0, "x", 218.0, -90.0, 300.0, "")) == "218 (-90 to 300)"
     assert within(ParameterReport(0, "x", 218.0, -90.0, 300.0, "at its bound")) == "218 (-90 to 300; at its bound)"
     assert within(ParameterReport(0, "x", 218.0, 23.0, 413.0, "")) == "218 ± 195"
+
+
+def test_a_joint_with_more_or_less_than_all_share_says_how_much_that_is():
+    robot = quadruped()
+    terms = (
+        term("coulomb_friction", "all_joints", torque_nm=1.48),
+        term("coulomb_friction", "knee_front_left", torque_nm=10.2),
+        term("coulomb_friction", "hip_front_left", torque_nm=-0.48),
+        term("zero_offset", "hip_front_left", offset_rad=0.01),
+    )
+    reports = [ParameterReport(k, t.values[0][0], t.values[0][1], 0.0, 1.0, "") for k, t in enumerate(terms)]
+    dry, zero = kinds_of(terms, reports, robot)
+    assert [place for place, _ in dry.at] == [
+        "all joints", "knee front left, 11.7 in all, beside what is shared", "hip front left, 1 in all, beside what is shared",
+    ]  # fmt: skip
+    assert [place for place, _ in zero.at] == ["hip front left"]

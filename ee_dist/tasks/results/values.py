@@ -10,7 +10,8 @@ import numpy as np
 
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.words import is_share, plain, quantity
-from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
+from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
 
 FINE = 1e-4
@@ -47,8 +48,22 @@ def kinds_of(terms: Hypothesis, reports: Sequence[ParameterReport], robot: Robot
             p = replace(p, value=100 * p.value, low=100 * p.low, high=100 * p.high)
         shown = "%" if share else "" if unit in ("1", "channel") else unit
         key = (plain(term.effect), quantity(term, p.name, robot), shown, effect.neutral_values()[p.name])
-        found.setdefault(key, []).append((plain(term.target), p))
+        found.setdefault(key, []).append((plain(term.target) + _in_all(term, p.name, terms, robot), p))
     return [Kind(*key, tuple(at)) for key, at in found.items()]
+
+
+def _in_all(term: Term, name: str, terms: Hypothesis, robot: Robot) -> str:
+    """How much there is at a joint that has more or less beside what all share: nobody adds that up, and less of it is no
+    friction that drives."""
+    effect = CATALOGUE[term.effect]
+    others = [
+        t
+        for t in terms
+        if t.effect == term.effect and term.target in members_of(robot, t.target, effect.targets(robot))
+    ]
+    if not others or not effect.parameter(name).on_top:
+        return ""
+    return f", {sum(dict(t.values)[name] for t in (term, *others)):.3g} in all, beside what is shared"
 
 
 UNEVEN = 0.1
