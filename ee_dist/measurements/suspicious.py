@@ -28,6 +28,9 @@ AGAINST = 0.7
 OTHER_UNIT, OTHER_SIZE = 4.0, 20.0
 """A soft drive goes only part of the way to its command, and a model may be off by a lot: beyond these it is another unit."""
 
+QUICK_S, TOGETHER = 0.25, 0.8
+"""How late a joint may come, s, that is beyond its drive's bandwidth and not the other way round; correlation of commands and
+positions of the same time from which it is within."""
 
 STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
@@ -183,15 +186,19 @@ def pace_suspicion(speed: Array, position: Array, step_s: float, rate_hz: float)
 
 def command_suspicion(name: str, command: Array, position: Array, step_s: float) -> tuple[str, bool] | None:
     """Whether a joint runs away from its commands, or they are in another unit than its position: a sentence, and whether it
-    is certain (a ratio between two units) enough to stop."""
+    is certain (a ratio between two units) enough to stop. Beyond the bandwidth of its drive a joint in order comes half a period
+    late, and goes a small part of the way."""
     a, b = command - command.mean(), position - position.mean()
     size = float(np.sqrt((a @ a) * (b @ b)))
-    if size > 0 and float(a @ b) / size < -0.5:
-        return f"{name}: moves against its command (correlation {float(a @ b) / size:.2f}): a swapped sign?", False
+    at_once = float(a @ b) / size if size > 0 else 0.0
     ahead = signals.lead(command[:, None], position[:, None], step_s)
+    late = 0.0 < ahead.lead_s <= QUICK_S and ahead.correlation > -at_once
+    if at_once < -0.5 and not late:
+        return f"{name}: moves against its command (correlation {at_once:.2f}): a swapped sign?", False
     if ahead.correlation > 0.9 and not 1 / OTHER_UNIT < ahead.slope < OTHER_UNIT:
         note = f"{name}: its commands are {ahead.slope:.3g} times its positions: another unit of one of the two?"
-        return note, _between_units(ahead.slope, POSITION_RATIOS)
+        certain = _between_units(ahead.slope, POSITION_RATIOS)
+        return (note, certain) if certain or at_once > TOGETHER else None
     return None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
@@ -61,6 +62,17 @@ def test_commands_in_another_unit_than_the_positions(factor: float, certain: boo
     note, stops = command_suspicion("j", factor * WAVE, np.sin(2 * T - 0.3), 0.01) or ("", None)
     assert f"{factor:.3g} times its positions" in note
     assert stops is certain
+
+
+def test_a_joint_beyond_the_bandwidth_of_its_drive_is_no_swapped_sign_nor_another_unit() -> None:
+    """A chirp from 2 to 5 Hz through a drive that answers to 1.5: up to half a period late, and a sixth as far."""
+    phase = 2 * np.pi * (2 * T + 3 * T**2 / 40)
+    commands = np.sin(phase)
+    answer = signal.lti([], [-9.4 + 2j, -9.4 - 2j], 9.4**2 + 4)
+    positions = signal.lsim(answer, commands, T)[1]
+    assert np.corrcoef(commands, positions)[0, 1] < -0.5 and np.ptp(positions) < 1.0
+    assert command_suspicion("j", commands, positions, 0.01) is None
+    assert "swapped sign" in str(command_suspicion("j", WAVE, -0.2 * WAVE, 0.01)), "slow, and the other way round"
 
 
 def test_a_soft_drive_is_in_the_same_unit() -> None:
