@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, prior_of
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
@@ -43,7 +43,8 @@ def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int, 
     alike: dict[str, frozenset[str]] = {}
     fits: list[Fit] = []
     while True:
-        (fit,) = follow_valley(search, [(Model(current.parts), current.u)], search.everything, PRIOR, 2, (AGAIN,))
+        start = [(Model(current.parts), current.u)]
+        (fit,) = follow_valley(search, start, search.everything, prior_of(search, start), 2, (AGAIN,))
         fits, found = [*fits[:-1], fit], len(gone)
         # As far as slopes tell what goes is made up for by the rest; then all that stays is fitted anew.
         while least := _least_told(search.problem, fit, own, open_only):

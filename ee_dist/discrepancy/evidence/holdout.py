@@ -200,7 +200,7 @@ def cross_fit(
     problem = search.problem
     residuals = [np.zeros(len(problem.segment_of)) for _ in starts]
     seen, count = np.zeros(len(starts)), 0
-    prior = PRIOR * _unsure(search, starts)
+    prior = prior_of(search, starts)
     fits: list[list[Fit]] = [[] for _ in starts]
     for fold in range(cut.folds):
         mask = cut.seen(problem, fold)
@@ -231,14 +231,15 @@ def held_by_slopes(search: Search, fits: Sequence[Fit], cut: Cut) -> list[HeldOu
     return [found[i] for i in range(len(fits))]
 
 
-def _unsure(search: Search, starts: Sequence[tuple[Model, Array]]) -> float:
-    """By how much less a value is determined than noise alone would have it: what is above the noise does not average out
-    from one value to the next, but at best over some pieces of a segment."""
+def prior_of(search: Search, starts: Sequence[tuple[Model, Array]]) -> float:
+    """Energy that a value at its bound costs beside one at neutral: PRIOR where noise is left, and more by as much as a value is
+    determined less than noise alone would have it. What is above the noise does not average out from one value to the next,
+    but at best over some pieces of a segment."""
     problem = search.problem
     rows = search.residuals([m.hypothesis(u) for m, u in starts])
     energies = [float(r @ r) for r in rows if np.isfinite(r).all()]
     above = max(0.0, min(energies, default=0.0) - float(problem.floor.sum()))
-    return 1.0 + above / (PIECES * len(problem.segments))
+    return PRIOR * (1.0 + above / (PIECES * len(problem.segments)))
 
 
 def bootstrap(

@@ -41,9 +41,15 @@ def fit_all(
 
 
 def fit_one(
-    search: Search, model: Model, starts: Sequence[Array], mask: Mask | None = None, widths: Sequence[float] = WIDTHS
+    search: Search,
+    model: Model,
+    starts: Sequence[Array],
+    mask: Mask | None = None,
+    widths: Sequence[float] = WIDTHS,
+    prior: float = 0.0,
 ) -> Fit:
     """The best fit of a model from any of the starts, and from what the measurements show of its values by themselves, to which
     no slope leads back."""
     seen = [s for u in starts if not np.array_equal(s := model.as_seen(u), u)]
-    return min(fit_all(search, [(model, u) for u in (*starts, *seen)], mask, widths), key=lambda f: f.energy)
+    fits = fit_all(search, [(model, u) for u in (*starts, *seen)], mask, widths, prior)
+    return min(fits, key=lambda f: f.energy + prior * float(f.u @ f.u))
