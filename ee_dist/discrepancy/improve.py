@@ -15,7 +15,7 @@ import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import everywhere, stands_out
-from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, prior_of, travelling, windows
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, cross_fit, prior_of, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_be_noise
@@ -318,7 +318,8 @@ def _finish(
     residual = base
     if current.parts:
         model = Model(current.parts)
-        prior = prior_of(search, [(model, current.u)])
+        # Where only noise is left values are what the measurements say.
+        prior = prior_of(search, [(model, current.u)]) - PRIOR
         fit = fit_one(search, model, [current.u], None, (*WIDTHS[2:], 0.006), prior)
         residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
         left = leftovers(problem, residual)
