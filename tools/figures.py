@@ -54,7 +54,12 @@ LOOP, LOOP_AT_S, LOOP_SIZE = "+scenario=8", 13.0, (1600, 1000)
 """The run whose scene is shown, a moment at which robot and prediction have parted, and the window."""
 BENCH = ("task.excitations=['multisine:seconds=4,amplitude=0.5,seed=1']", "task.noise=0.002")
 """The pendulum of the minute on the workbench: one calm record."""
-MARKS = "Residual against what the joint did"
+MARKS = (
+    "[...document.querySelectorAll('section')].find((s) => s.querySelector('h2')?.textContent === "
+    "'Residual against what the joint did')"
+)
+FIRST = "document.querySelector('.js-plotly-plot')"
+"""Parts of pages, as their scripts find them: the section of the marks, and the first chart."""
 
 
 def told(folder: Path, *words: str, usual: Sequence[str] = ("engine=mujoco",)) -> None:
@@ -108,12 +113,12 @@ def into_docs(name: str, png: bytes) -> None:
     print(f"docs/figures/{name}", f"{(DOCS / name).stat().st_size / 1e3:.0f} kB", flush=True)
 
 
-def part(window: HeadlessBrowser, page: Path, heading: str) -> bytes:
-    """The section of a page under a heading."""
+def part(window: HeadlessBrowser, page: Path, element: str) -> bytes:
+    """The part of a page that an expression of its script finds."""
     seen = window.look(page, WIDTHS[0], height=TALL, whole=True)
     left, top, width, height = window.evaluate(
-        f"(() => {{ const box = [...document.querySelectorAll('section')].find((s) => s.querySelector('h2')?.textContent === "
-        f"'{heading}').getBoundingClientRect(); return [box.x, box.y + scrollY, box.width, box.height]; }})()"
+        f"(() => {{ const box = ({element}).getBoundingClientRect(); "
+        "return [box.x, box.y + scrollY, box.width, box.height]; })()"
     )
     with Image.open(io.BytesIO(seen.png)) as whole:
         out = io.BytesIO()
@@ -121,8 +126,18 @@ def part(window: HeadlessBrowser, page: Path, heading: str) -> bytes:
     return out.getvalue()
 
 
+def study(window: HeadlessBrowser, out: Path) -> None:
+    """The distances of the study that is kept in docs."""
+    runs, folder = ROOT / "docs" / "study_runs.json", out / "study"
+    if not (folder / "logs" / "study" / "report.html").is_file():
+        told(folder, "task=study", f"task.earlier=[{runs}]", "hydra.run.dir=logs/study", usual=())
+    into_docs("study.png", part(window, folder / "logs" / "study" / "report.html", FIRST))
+
+
 def shown_in_docs(window: HeadlessBrowser, out: Path) -> int:
-    """The pictures in docs that are no first screens: the mark of an effect, the scene of the loop, a minute on the workbench."""
+    """The pictures in docs that are no first screens: the mark of an effect, a study, the scene of the loop, a minute on the
+    workbench."""
+    study(window, out)
     into_docs("report_mark.png", part(window, story("quadruped", out)[-1] / "report.html", MARKS))
     loop = out / "loop" / "logs" / "run"
     if not (loop / "recovery.rrd").is_file():
