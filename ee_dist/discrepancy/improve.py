@@ -169,11 +169,11 @@ def improve(
                 stopped = NO_MORE.format(why=WORSE)
                 break
             climb(rung)
-        current, twins = _settled_on(search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew)
+        current, twins = _last_steps(search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew)
     return _finish(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
 
 
-def _settled_on(
+def _last_steps(
     search: Search,
     current: Current,
     own: int,
@@ -205,8 +205,10 @@ def _settled_on(
             return current, twins
         climb(step)
         came = [c for c in current.parts if c.name not in before and stands_out(robot, c)]
+        if not (spread and often and came):
+            return current, twins
         left = leftovers(problem, search.on(current.hypothesis).base())
-        if not (spread and often and came) or _settled(left, step.error_heldout, problem.noise_floor()[0]):
+        if _settled(left, step.error_heldout, problem.noise_floor()[0]):
             return current, twins
         found = everywhere(search, current, own, pool, travelling(problem), True, (), seen)
         if found is None:

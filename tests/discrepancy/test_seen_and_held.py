@@ -100,7 +100,7 @@ def test_small_values_are_fitted_anew_beside_what_came_in_the_place_of_one(monke
     def settled(spread: bool, often: int) -> Current:
         climbed.clear()
         pool: list[Candidate] = []
-        return improving._settled_on(search, current, 0, pool, climbed.append, spread, [], often)[0]
+        return improving._last_steps(search, current, 0, pool, climbed.append, spread, [], often)[0]
 
     assert settled(True, 1).parts == (came,) and [r.name for r in climbed][-2:] == ["supply sag", "all anew"]
     assert asked == [tuple(c.name for c in then.parts)]

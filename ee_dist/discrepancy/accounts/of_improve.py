@@ -55,9 +55,9 @@ def has(names: AbstractSet[str], told: str, robot: Robot) -> bool:
         return any(name.startswith(f"{effect}@") for name in names)
 
     def there(name: str) -> bool:
-        effect, _, place = name.partition("@")
-        members = members_of(robot, place, CATALOGUE[effect].targets(robot)) if effect in CATALOGUE else ()
-        return name in names or (bool(members) and {f"{effect}@{m}" for m in members} <= names)
+        kind, _, where = name.partition("@")
+        members = members_of(robot, where, CATALOGUE[kind].targets(robot)) if kind in CATALOGUE else ()
+        return name in names or (bool(members) and {f"{kind}@{m}" for m in members} <= names)
 
     return all(map(there, told.split(" + ")))
 

@@ -17,7 +17,7 @@ from ee_dist.discrepancy.problem import Index, Mask
 from ee_dist.trials.log import Array
 
 SLOW_SHARE, CALM_SHARE = 0.15, 0.1
-"""Of the largest speed of a trial, and acceleration of a record: it reverses below the first, and cruises below the second."""
+"""Of a trial's largest speed and a record's largest acceleration: below the first it reverses, below the second it cruises."""
 STILL = 0.01
 """Of the largest speed of a record: a trial that stays below it stands still."""
 BINS = 120
