@@ -47,6 +47,11 @@ USED_BY = {
         ("compare", "explain", "improve", "import", "plan", "workbench"),
         "a run or recording to look at is log=...",
     ),
+    "trials": (
+        ("compare", "explain", "improve", "plan"),
+        "what task=import takes in is said by its mapping",
+    ),
+    "held_out": (("compare", "explain", "improve", "plan"), ""),
     "model": (("compare", "explain", "improve", "export", "plan", "workbench"), ""),
     "effect": (("improve",), "what explain tries is task.only=[...], what a trial hides is hidden=..."),
     "hidden": (("trial",), "what recover and online break is +scenario=..."),

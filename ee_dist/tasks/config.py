@@ -267,6 +267,8 @@ class Config:
     """None: of task=trial its own, elsewhere none."""
     plugins: list[str] = field(default_factory=list)
     measured: Any = None
+    trials: Any = None
+    held_out: Any = None
     model: str | None = None
     effect: Any = None
     hidden: Any = None

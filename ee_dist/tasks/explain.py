@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ee_dist.basics.names import listed
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.confidence import confidence
@@ -64,8 +65,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             progress.note(f"Before anything is believed: {problem.doubts}")
         pool = chosen(problem, options.without, options.only)
         count = len(measured.trials)
+        apart = f" (held out from all of it: {listed(measured.held_out)})" if measured.held_out else ""
         console.print(
-            f"{count} trial{'s' if count > 1 else ''} of {measured.robot.name}, {len(pool)} candidate explanations, "
+            f"{count} trial{'s' if count > 1 else ''} of {measured.robot.name}{apart}, {len(pool)} candidate explanations, "
             f"{way.name}: {way.why}.",
             highlight=False,
         )

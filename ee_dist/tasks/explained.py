@@ -120,6 +120,7 @@ def _settings(folder: Path, config: Config) -> Config:
         asked, hydra = (yaml_of(folder / SETTINGS / f"{name}.yaml") for name in ("config", "hydra"))
         where = Path(hydra["hydra"]["runtime"]["cwd"])
         measured, model = asked["measured"], asked["model"]
+        trials, held_out = asked.get("trials"), asked.get("held_out")
         plugins = [str(where / str(p)) for p in asked["plugins"]]
     except (OSError, ValueError, KeyError, TypeError):
         if config.measured:
@@ -133,6 +134,8 @@ def _settings(folder: Path, config: Config) -> Config:
     return replace(
         config,
         measured=config.measured or files,
+        trials=config.trials or trials,
+        held_out=config.held_out or held_out,
         model=config.model or (None if model is None else str(where / str(model))),
         plugins=[*config.plugins, *(p for p in plugins if p not in config.plugins)],
     )

@@ -35,7 +35,8 @@ class Verb:
 
 
 _RUN = ("engine", "evaluator")
-_MODEL = ("measured", "model", "seed", "plugins", "ray.address")
+_LOG = ("measured", "model", "seed", "plugins", "ray.address")
+_MODEL = (*_LOG[:1], "trials", "held_out", *_LOG[1:])
 _HARDWARE = tuple(
     f"hardware.{key}" for key in ("address", "begin_s", "timeout_s", "range_share", "speed", "acceleration", "torque")
 )
@@ -78,14 +79,12 @@ VERBS = {
         "a trial that tells apart what is tied",
         "task=plan task.explained=FOLDER",
         _RUN,
-        ("measured", "model", "seed", "plugins", "ray.address"),
+        _MODEL,
     ),
     "export": Verb("the model for other simulators", "task=export model=MODEL to=mjcf", (), ("model", "to")),
     "reveal": Verb("open the seal, score what was found", "task=reveal log=TRIAL", (), ("log",)),
     "view": Verb("open a run in rerun", "task=view log=RUN", (), ("log",)),
-    "workbench": Verb(
-        "all of it by hand, on a page", "task=workbench measured=LOG", ("robot", *_RUN), (*_MODEL, "log")
-    ),
+    "workbench": Verb("all of it by hand, on a page", "task=workbench measured=LOG", ("robot", *_RUN), (*_LOG, "log")),
 }
 
 

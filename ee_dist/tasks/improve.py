@@ -17,16 +17,18 @@ from ee_dist.discrepancy.calibrated_away import calibrated_away
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve
 from ee_dist.discrepancy.ladder import Improvement, Rung
+from ee_dist.discrepancy.last_word import LastWord, last_word
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import to_entries
+from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError
-from ee_dist.tasks.measurements import Measurements, load
+from ee_dist.tasks.measurements import Measurements, load, load_held_out
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import asked, planning
@@ -35,11 +37,12 @@ from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
 from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_improvement
-from ee_dist.tasks.results.tables import show_account, show_candidates, show_ladder
+from ee_dist.tasks.results.tables import show_account, show_candidates, show_ladder, show_last_word
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
+from ee_dist.tasks.trial_choice import entries
 from ee_dist.tasks.unfinished import keep_so_far
-from ee_dist.tasks.ways import known_way, open_loop, way_of
+from ee_dist.tasks.ways import Way, known_way, open_loop, way_of
 from ee_dist.viewing.report import write_page
 
 
@@ -63,6 +66,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     """Write model.yaml, summary.json, report.html and improve.rrd into ``out``; ``told`` hears of the progress. Raises
     ConfigError, EffectError, LogError."""
     console, watch, measured = terminal(), Stopwatch(), load(config)
+    apart = load_held_out(config)
     wanted = effects_of(config.effect, measured.robot)
     for key in ("without", "only"):
         if wanted is not None and getattr(options, key) and not options.calibrate:
@@ -93,7 +97,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             )
     also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
     also = (*also, *way.instead(bool(found.left)))
-    account = improve_account(problem, found, planning(out, problem.robot), also).warned(measured.remarks)
+    word = None if apart is None else told_of(apart, way, config, found.terms)
+    account = improve_account(problem, found, planning(out, problem.robot), also, word).warned(measured.remarks)
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
     write_model(path, measured.source, measured.folder, found.terms, account.words)
@@ -104,18 +109,33 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             "# takes off it.\n" + yaml.safe_dump(calibration, sort_keys=False),
         )
     digest = hashlib.sha256(repr([(r.terms, r.error_heldout) for r in found.ladder]).encode()).hexdigest()
-    write_summary(out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path)))
-    following = asked("compare", replace(config, model=str(path)), options.by)
+    write_summary(
+        out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path), word)
+    )
+    following = asked("compare", _next(replace(config, model=str(path))), options.by)
     story = links(out, measured.files, config.model)
-    write_page(improve_page(problem, measured, found, account, following, story), out / "report.html")
+    write_page(improve_page(problem, measured, found, account, following, story, word), out / "report.html")
     if options.rerun:
         improve_scene(problem, found, account, measured.model, out / "improve.rrd", following)
     show_ladder(console, problem, found)
+    show_last_word(console, word)
     if found.last is not None:
         refused = [c for c in found.last.judged if not c.earned]
         show_candidates(console, problem, refused, "Tried on top of it, and refused")
     show_account(console, account, out, following)
     return problem, found, account
+
+
+def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis) -> LastWord:
+    """How far the model as it was and the one with ``terms`` are from trials that nothing was fitted to, compared
+    in the same way."""
+    models = (apart.model, terms)
+    return last_word([way.make(replace(apart, model=m), config) for m in models], models)
+
+
+def _next(config: Config) -> Config:
+    """Settings that look at what was held out, where something was: what was fitted is shown already."""
+    return replace(config, trials=config.held_out, held_out=None) if entries(config.held_out) else config
 
 
 def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:

@@ -26,6 +26,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.robots.reached import with_room
 from ee_dist.robots.untrusted import json_of, yaml_of
 from ee_dist.tasks.config import Config, ConfigError
+from ee_dist.tasks.trial_choice import TrialName, divided, entries
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import LogError, SensorLog
 
@@ -52,6 +53,8 @@ class Measurements:
     """The way of comparing that the calibration was made with; empty without one."""
     remarks: tuple[str, ...] = ()
     """What a user should know of before reading any result: where model and log name different robots."""
+    held_out: tuple[str, ...] = ()
+    """Names of trials that are none of these: they were kept for the last word on a model."""
 
     @property
     def real(self) -> bool:
@@ -60,13 +63,16 @@ class Measurements:
 
 
 def load(config: Config) -> Measurements:
-    """The files of ``config.measured`` and the model of ``config.model``. Raises ConfigError, LogError, RecordingError."""
+    """The trials in the files of ``config.measured`` that ``config.trials`` and ``config.held_out`` leave, and the model of
+    ``config.model``. Raises ConfigError, LogError, RecordingError."""
     if config.model == "":
         raise ConfigError("model=: which model file? leave it out for the robot as it is described")
     files = files_of(config.measured)
     runs = [read_run(f) for f in files]
     robot = runs[0].robot
     trials: list[MeasuredTrial] = []
+    names: list[TrialName] = []
+    of_file: list[Path] = []
     short: list[tuple[str, SensorLog]] = []
     for file, run in zip(files, runs, strict=True):
         _same_robot(file, run, robot)
@@ -83,8 +89,13 @@ def load(config: Config) -> Measurements:
             trials.append(
                 MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup, _commands_held(run))
             )
+            names.append(TrialName(len(trials), file.stem, t.name))
+            of_file.append(file)
     if not trials:
         raise LogError(_too_short(*short[0]))
+    kept, apart = divided(names, config.trials, config.held_out)
+    trials, files = [trials[k] for k in kept], list(dict.fromkeys(of_file[k] for k in kept))
+    held_out = tuple(names[k].name for k in apart)
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
     if short:
         more = f", and {len(short) - 1} more as short" if len(short) > 1 else ""
@@ -95,7 +106,9 @@ def load(config: Config) -> Measurements:
         named = robot.name in BUILT_IN and not differences(BUILT_IN[robot.name](), robot)
         source = robot.name if named else robot
         lagged = with_lags(robot, trials)
-        return Measurements(lagged, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks))
+        return Measurements(
+            lagged, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks), held_out=held_out
+        )
     believed = read_model(config.model)
     robot, different = agreed(believed.robot, robot, f"model={config.model}")
     robot = _with_room(robot, trials, remarks)
@@ -114,7 +127,13 @@ def load(config: Config) -> Measurements:
         gained,
         by,
         tuple(remarks),
+        held_out,
     )
+
+
+def load_held_out(config: Config) -> Measurements | None:
+    """The trials that ``config.held_out`` names, alone; None where it names none. Raises as ``load`` does."""
+    return load(replace(config, trials=config.held_out, held_out=None)) if entries(config.held_out) else None
 
 
 def _with_room(robot: Robot, trials: Sequence[MeasuredTrial], remarks: list[str]) -> Robot:

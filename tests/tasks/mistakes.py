@@ -370,6 +370,9 @@ LOGS: Rows = (
     ("task=compare measured=[trial.mcap,trial.mcap]", "measured=trial.mcap: the same log twice; name each once"),
     ("task=compare measured=[trial.mcap,./trial.mcap]", "the same log twice"),
     ("task=compare measured=trial.mcap model=", "model=: which model file?"),
+    ("task=compare measured=trial.mcap trials=[no]", "trials=[no]: no trial 'no'; there are 1. "),
+    ("task=improve measured=trial.mcap effect=auto held_out=[*]", "held_out=[*]: no trial is left to look at"),
+    ("task=import measured=t.csv held_out=[a]", "it is for task=compare, task=explain, task=improve and task=plan"),
     (
         "task=explain measured=trial.mcap task.only=[payload] task.without=[payload]",
         "nothing is left to try",

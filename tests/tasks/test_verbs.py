@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -141,6 +142,32 @@ def test_every_verb_by_every_way(cli, imported, by):
     assert again["model_terms"] == improved["model_terms"]
     told = [line for line in said.out.splitlines() if line.endswith(" on data held out")]
     assert len(told) == len(improved["ladder"]) - 1
+
+
+@pytest.mark.parametrize("by", WAYS)
+def test_what_is_held_out_from_all_of_it_decides_nothing_and_has_the_last_word(cli, imported, by):
+    fit = ("task=improve", f"effect={HIDDEN}", f"task.by={by}", "task.rerun=false", f"measured={imported}", *QUICK)
+    found, said = run(cli, *fit, "held_out=[run2]")
+    improved = json.loads((found / "summary.json").read_text())
+    told_alike(found, said)
+    alone, _ = run(cli, *fit, "trials=[run1]")
+    same = json.loads((alone / "summary.json").read_text())
+    assert same["model_terms"] == improved["model_terms"] and same["ladder"] == improved["ladder"]
+    assert same["last_word"] is None
+
+    word = improved["last_word"]
+    assert [t["name"] for t in word["trials"]] == ["run2"] and word["error_after"] < 0.5 * word["error_before"]
+    page = (found / "report.html").read_text(encoding="utf-8")
+    assert "Held out from all of it" in page and "Held out from all of it (run2): model " in improved["words"][1]
+
+    # The command to type next shows these trials with the model that was found; without it they are as they were before.
+    words = shlex.split(said.out.strip().splitlines()[-1].removeprefix("Next: python -m ee_dist "))
+    assert "trials=run2" in words
+    for model, key in (([], "error_before"), ([f"model={found / 'model.yaml'}"], "error_after")):
+        asked = [w for w in words if not w.startswith(("model=", "measured="))]
+        compared, _ = run(cli, *asked, *model, f"measured={imported}", "task.rerun=false")
+        content = json.loads((compared / "summary.json").read_text())
+        assert content["error"] == pytest.approx(word[key], rel=1e-6) and len(content["trials"]) == 1
 
 
 def test_auto_takes_the_first_way_that_the_channels_allow(cli, imported):

@@ -34,6 +34,7 @@ from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
 from ee_dist.discrepancy.ladder import Improvement, Twin
+from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
 from ee_dist.discrepancy.words import much, named, percent, phrase, placed, plain, quantity, span
@@ -43,6 +44,7 @@ from ee_dist.robots.model import Robot
 
 NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
 EACH = "each of "
+TRIALS_APART = "trials that were held out from all of it"
 NAMED = 3
 """Effects that a headline names."""
 
@@ -62,9 +64,11 @@ def has(names: AbstractSet[str], told: str, robot: Robot) -> bool:
     return all(map(there, told.split(" + ")))
 
 
-def improve_account(problem: Problem, found: Improvement, planner: str = "", also: Sequence[str] = ()) -> Account:
+def improve_account(
+    problem: Problem, found: Improvement, planner: str = "", also: Sequence[str] = (), word: LastWord | None = None
+) -> Account:
     """What was done, how good it is, and what is left; ``planner`` is said where what was added is tied, ``also`` is
-    said first of what speaks for it."""
+    said first of what speaks for it. ``word``: how far the models are from trials that took no part."""
     robot, first, last = problem.robot, found.ladder[0], found.ladder[-1]
     steps = [r for r in found.ladder if r.added]
     lines = []
@@ -99,7 +103,8 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     worse = worse_trials(problem, found)
     if worse:
         lines.append(worse_text(problem, worse))
-    settled = found.verdict in (EXPLAINED, NOTHING_MISSING)
+    more_there = word is not None and word.more
+    settled = found.verdict in (EXPLAINED, NOTHING_MISSING) and not more_there
     unsure = found.unsure if settled else []
     lines += beside_floor(last.error_heldout, found.noise_floor, not settled)
     if found.left:
@@ -116,11 +121,13 @@ def improve_account(problem: Problem, found: Improvement, planner: str = "", als
     else:
         what = _listed([s.text for s in parts]) if parts else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
-        where = "" if found.left or settled else f" on {last.held_out}"
+        where = "" if found.left or settled else f" on {TRIALS_APART if more_there else last.held_out}"
         head += f" {BEYOND if unsure else NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {last.held_out}{unexplained_rest(found.explained, settled)}"
         sure += f"{_ranges(found, [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1], robot)}{_told_from(ties)}"
         sure += f"{unsure_of(unsure)}."
+    if word is not None:
+        error = f"{error} {word.text}"
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     advice = slower(unsure) if unsure else advice
     tied = bool(found.twins) or any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config
+from ee_dist.tasks.trial_choice import entries
 from ee_dist.trials.family import driven
 
 
@@ -43,6 +44,10 @@ def asked(task: str, config: Config, by: str = AUTO, *more: str) -> list[str]:
     """The words that ask for a verb on the measurements and the model of ``config``, with all of its settings that decide
     what comes out."""
     words = [f"task={task}", setting("measured", config.measured)]
+    for key in ("trials", "held_out"):
+        chosen = entries(getattr(config, key))
+        if chosen:
+            words.append(setting(key, [str(name) for name in chosen]))
     if config.model is not None:
         words.append(setting("model", config.model))
     words += more

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ee_dist.basics.names import listed
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.importance import added
 from ee_dist.discrepancy.ladder import Improvement
+from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import phrase, plain
 from ee_dist.tasks.measurements import Measurements
@@ -93,17 +95,18 @@ def improve_page(
     account: Account,
     following: Sequence[str] = (),
     links: Sequence[Link] = (),
+    word: LastWord | None = None,
 ) -> Page:
-    """The page of improve."""
-    first, last = found.ladder[0], found.ladder[-1]
+    """The page of improve; ``word`` is on trials that took no part in it."""
+    first, last, changed = found.ladder[0], found.ladder[-1], len(found.ladder) > 1
     page = _page(problem, measured, "Improve", account, following, links)
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name}, {MODEL}"),
-        *([(problem.told(last.error_heldout), f"{IMPROVED}, held out")] if len(found.ladder) > 1 else []),
+        *([(problem.told(last.error_heldout), f"{IMPROVED}, held out")] if changed else []),
+        *([(word.problem.told(word.after), f"{IMPROVED}, never fitted")] if word is not None and changed else []),
         (problem.told(found.noise_floor), "noise floor"),
         (str(len(found.terms)), "effects in the model"),
     ]
-    changed = len(found.ladder) > 1
     models = [(MODEL, measured.model)] + ([(IMPROVED, found.terms)] if changed else [])
     after = found.residual if changed else None
     overlays = parts.curves(problem, found.base, models)
@@ -122,6 +125,7 @@ def improve_page(
         if len(found.cuts) > 1:
             caption += " A line joins what was judged on the same: from one to the next errors cannot be compared."
         page.sections.append(Section("The ladder", caption, figure))
+    _add(page, None if word is None else parts.last_word_section(word))
     _add(page, parts.values_section(kinds_of(found.terms, found.parameters, problem.robot)))
     page.sections.append(parts.browser_section(overlays, models))
     _add(page, parts.signature_section(problem, found.base, after, tuple(added(found))))
@@ -148,9 +152,10 @@ def _page(
 ) -> Page:
     count, model = len(problem.trials), measured.model
     believed = phrase(model, problem.robot) or "the robot as described"
+    held = f", held out from all of it: {listed(measured.held_out)}" if measured.held_out else ""
     return Page(
         f"{verb}: {plain(problem.robot.name)}",
-        f"{count} trial{'s' if count > 1 else ''} of {', '.join(p.name for p in measured.files)}; model: {believed}; "
+        f"{count} trial{'s' if count > 1 else ''} of {', '.join(p.name for p in measured.files)}{held}; model: {believed}; "
         f"compared by {plain(problem.way)}",
         account.headline,
         account.lines,

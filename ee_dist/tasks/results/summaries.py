@@ -13,6 +13,7 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.importance import shares
 from ee_dist.discrepancy.ladder import Improvement, Rung
+from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.fitted import Model
@@ -123,7 +124,29 @@ def _place(name: str) -> dict[str, str]:
     return {"effect": effect, "target": target}
 
 
-def of_improvement(problem: Problem, found: Improvement, account: Account, path: str) -> dict[str, Any]:
+def of_last_word(word: LastWord | None) -> dict[str, Any] | None:
+    """How far the models are from trials that took no part; None where none were held out from all of it."""
+    if word is None:
+        return None
+    problem = word.problem
+    return {
+        "error_before": word.before,
+        "error_before_natural": problem.natural(word.before),
+        "error_after": word.after,
+        "error_after_natural": problem.natural(word.after),
+        "noise_floor": word.floor,
+        "noise_floor_natural": problem.natural(word.floor),
+        "trials": [
+            {"name": name, "error_before": before, "error_after": after}
+            for name, (before, after) in zip(problem.trials, word.by_trial, strict=True)
+        ],
+        "left": of_left(word.left),
+    }
+
+
+def of_improvement(
+    problem: Problem, found: Improvement, account: Account, path: str, word: LastWord | None = None
+) -> dict[str, Any]:
     terms = hypothesis_list(found.terms)
     return {
         **common(problem, account, found.noise_floor, found.floor_source, found.terms),
@@ -131,6 +154,7 @@ def of_improvement(problem: Problem, found: Improvement, account: Account, path:
         "explained": found.explained,
         "ladder": [of_rung(problem, r) for r in found.ladder],
         "model": path,
+        "last_word": of_last_word(word),
         "parameters": [
             {
                 **terms[p.term],

@@ -17,15 +17,17 @@ from ee_dist.discrepancy.evidence.intervals import called
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
+from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import percent, phrase, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.folder import SETTINGS
 from ee_dist.tasks.results.commands import command
-from ee_dist.tasks.results.labels import excess_share, step_phrase, worst_trials
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, excess_share, step_phrase, worst_trials
 from ee_dist.tasks.results.values import kinds_of, within
 
+HELD_APART = "Held out from all of it"
 TIED_STANDING = "tied with the best"
 Column = tuple[str, bool]
 """Heading, and whether it holds numbers."""
@@ -107,6 +109,24 @@ def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
                 f"Its values, with {called(found.parameters)}", (("effect", False), ("where, and how much", False)), at
             )
         )
+
+
+def show_last_word(console: Console, word: LastWord | None) -> None:
+    """By trial, how far the models are from what was held out from all of it."""
+    if word is None:
+        return
+    head, rows = last_word_rows(word)
+    numeric = [False, *(True for _ in head[1:])]
+    console.print(_table(f"{HELD_APART}: {word.problem.natural_name}", list(zip(head, numeric, strict=True)), rows))
+
+
+def last_word_rows(word: LastWord) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows: each trial, and under several of them all together."""
+    told, errors = word.problem.told, list(zip(word.problem.trials, word.by_trial, strict=True))
+    if len(errors) > 1:
+        errors.append(("all", (word.before, word.after)))
+    rows = [[name, told(before), *([told(after)] if word.changed else [])] for name, (before, after) in errors]
+    return ["trial", MODEL, *([IMPROVED] if word.changed else [])], rows
 
 
 def show_account(console: Console, account: Account, out: Path, following: Sequence[str] = ()) -> None:

@@ -1,0 +1,57 @@
+"""The last word on a model: how far it is from trials that took no part in its search, beside the model that it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ee_dist.basics.names import listed
+from ee_dist.discrepancy.base_model import residual_as_it_is
+from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers
+from ee_dist.discrepancy.problem import Problem, error
+from ee_dist.effects.catalogue import Hypothesis
+
+WORSE = 1.01
+"""Times the error before from which a model is called worse."""
+
+
+@dataclass(frozen=True, eq=False)
+class LastWord:
+    """Errors of the model ``before`` and the one ``after``, of all trials of ``problem`` together and of each by itself, as
+    ``compare`` gives them; ``changed``: whether they are two; ``left``: curves in which the second leaves more than noise."""
+
+    problem: Problem
+    before: float
+    after: float
+    floor: float
+    by_trial: tuple[tuple[float, float], ...]
+    left: tuple[Leftover, ...]
+    changed: bool
+
+    @property
+    def more(self) -> bool:
+        """Whether more than noise is left on these trials."""
+        return bool(self.left) or self.after > SETTLED * self.floor
+
+    @property
+    def text(self) -> str:
+        """For people, in a sentence or two."""
+        told, worse = self.problem.told, self.after > WORSE * self.before
+        improved = f"improved model {told(self.after)}, " if self.changed else ""
+        text = (
+            f"Held out from all of it ({listed(self.problem.trials)}): model {told(self.before)}, {improved}noise floor "
+            f"{told(self.floor)}."
+        )
+        return f"{text} There the improved model is the worse one: do not use it for such motions." if worse else text
+
+
+def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis]) -> LastWord:
+    """Of trials that nothing was fitted to, as a problem of each of two ``models`` (they may be weighed by a calibration).
+    Raises RobotError where one cannot be simulated."""
+    residuals = [residual_as_it_is(p, m) for p, m in zip(problems, models, strict=True)]
+    first, last = problems
+    trials = range(len(last.trials))
+    by_trial = [(first.trial_error(residuals[0], k), last.trial_error(residuals[1], k)) for k in trials]
+    before, after = map(error, residuals)
+    left = tuple(leftovers(last, residuals[1]))
+    return LastWord(last, before, after, last.noise_floor()[0], tuple(by_trial), left, models[0] != models[1])
