@@ -18,12 +18,14 @@ from rich.console import Console
 from rich.table import Table
 
 from ee_dist.basics.files import real, write_whole
+from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.folders import recordings_in
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping
 from ee_dist.measurements.mapping_file import read_mapping
+from ee_dist.measurements.pieces import in_pieces, pieces_asked
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import FIT, UNITS_TO_ASK, Hints, Proposal
 from ee_dist.measurements.proposal.write import as_yaml, rows
@@ -53,6 +55,7 @@ class Options:
     gains: Any = None
     unit: str | None = None
     rate_hz: float | None = None
+    pieces: Any = None
 
 
 def run(config: Config, options: Options, out: Path) -> None:
@@ -63,7 +66,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     """
     watch, console = Stopwatch(), terminal()
     check_file_name("task.output", options.output, "measured.mcap")
-    hints = hints_of(options)
+    hints, pieces = hints_of(options), pieces_asked(options.pieces)
     proposal = None
     if options.mapping:
         given = [k for k in ("joints", "gains", "unit", "rate_hz") if getattr(options, k) is not None]
@@ -87,24 +90,27 @@ def run(config: Config, options: Options, out: Path) -> None:
     notes = (*notes, *left, *remarks, *finer)
     found = import_files(files, mapping, robot)
     reports = [report for _, report in found]
+    records = in_pieces([record for record, _ in found], pieces)
     text = describe(reports)
     out.mkdir(parents=True, exist_ok=True)
     metadata = {"task": "import", "mapping": str(mapping.source), SOURCES: sources_of(mapping, config)}
     with RunWriter(out / options.output, robot, metadata) as writer:
-        for record, _ in found:
+        for record in records:
             writer.trial(record)
     write_whole(out / "report.txt", text + "\n")
     rest = summary_of(reports, notes, options.output)
+    rest["pieces"] = [] if pieces is None else [r.name for r in records]
     if proposal is not None:
         rest["mapping"] = MAPPING
         rest["proposed"] = [
             dict(zip(("channel", "column", "unit", "sure", "why"), r, strict=True)) for r in rows(proposal)
         ]
-    write_summary(out, "import", config, options, watch, digest_of([r for r, _ in found]), rest)
+    write_summary(out, "import", config, options, watch, digest_of(records), rest)
     for line in (*(f"note: {n}" for n in notes), *text.splitlines()):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
+    apart = "" if pieces is None else f", pieces of {len(found)}: {listed(r.name for r in records)}"
     console.print(
-        f"wrote {os.path.relpath(out / options.output)}: {len(found)} trial(s) of {robot.name}",
+        f"wrote {os.path.relpath(out / options.output)}: {len(records)} trial(s) of {robot.name}{apart}",
         highlight=False,
         soft_wrap=True,
     )

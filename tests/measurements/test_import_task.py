@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,30 +13,12 @@ import odd_files
 import pytest
 import small_logs as logs
 
-from ee_dist.__main__ import main
 from ee_dist.recording.reader import read_run
 from ee_dist.robots.agree import changed_sources
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data"
 Command = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
-    """The command line in this process: status, output, complaint."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.chdir(ROOT)
-        monkeypatch.setattr(sys, "argv", ["ee_dist", "task=import", *arguments])
-        capfd.readouterr()
-        try:
-            status = main()
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        return status, *capfd.readouterr()
-
-    return run
 
 
 def test_a_file_without_a_mapping_becomes_a_recording(tmp_path: Path, command: Command) -> None:
