@@ -30,6 +30,7 @@ from ee_dist.discrepancy.pruning import without_neutral, without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.pool import as_long
 from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
@@ -93,7 +94,7 @@ def improve(
     if wanted is not None:
         stopped = ASKED if wanted else REFITTED
         for c in wanted:
-            judged = _asked(search, current, c)
+            judged = _asked(search, current, as_long(problem, c))
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))
     else:

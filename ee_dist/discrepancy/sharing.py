@@ -11,6 +11,7 @@ from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
 from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.pool import as_long
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.robots.model import Robot
@@ -51,7 +52,7 @@ def apart(problem: Problem, current: Current, own: int) -> Current:
             values.append(u)
             continue
         for target in c.members(robot):
-            member = candidate(robot, c.effect, target)
+            member = as_long(problem, candidate(robot, c.effect, target))
             there = {p.name for p in (*parts, *current.parts)}
             if member.name not in there and problem.shows(c.effect.name, target):
                 parts.append(member)

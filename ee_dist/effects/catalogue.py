@@ -57,6 +57,13 @@ class Parameter:
     """The number of a drive that the value comes on top of: below zero there is less of it than described."""
     by_ratio: bool = False
     """Whether ranges are walked through in equal ratios: a factor of a tenth is as far as one of ten."""
+    of_trial: bool = False
+    """Whether it is a time since a trial began: any until the longest one ends is worth trying."""
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is a share of something, from nothing to all of it."""
+        return self.unit == "1" and (self.lower, self.neutral, self.upper) == (0.0, 0.0, 1.0)
 
 
 Transform = Callable[[Any, str, Mapping[str, float]], Any]

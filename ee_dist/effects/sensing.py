@@ -164,7 +164,7 @@ def sensor_quantisation(robot: Robot, target: str, values: Mapping[str, float]) 
         Parameter(
             "share", "1", 0.0, 1.0, 0.0, "share of its movement that it does not report; at 1 it is frozen", 0.02
         ),
-        Parameter("from_s", "s", 0.0, math.inf, 0.0, "time from which on it sticks", 0.05),
+        Parameter("from_s", "s", 0.0, math.inf, 0.0, "time from which on it sticks", 0.05, of_trial=True),
     ),
     physics="A sensor sticks at the value it had: wholly, or so that it follows only a part of the movement since then.",
     signature="One channel stays at a value that it once truly had, which need not be zero, while all others move on.",

@@ -91,10 +91,12 @@ def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = (), tried:
 
 
 def at_bound(c: Candidate, k: int, u: float) -> str:
-    """What to think of the value of a candidate's parameter number ``k`` if it ended where the search may not go farther."""
-    if abs(u) <= AT_BOUND:
+    """What to think of the value of a candidate's parameter number ``k`` if it ended where the search may not go farther.
+    That all of something is lost, as of a frozen sensor or a dead motor, is an answer."""
+    known, (_, end) = c.effect.parameters[k], c.bounds[k]
+    if abs(u) <= AT_BOUND or (u > 0 and known.whole and end == known.upper):
         return ""
-    return NONE_LEFT if u < 0 and c.effect.parameters[k].on_top else BOUND
+    return NONE_LEFT if u < 0 and known.on_top else BOUND
 
 
 def called(reports: Sequence[ParameterReport]) -> str:

@@ -16,8 +16,21 @@ def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] =
     """Candidates at all places and groups, less those left out. Raises EffectError for names that do not exist."""
     found = candidates(problem.robot, without, only or None, problem.families)
     able = (c for c in found if (c.size or problem.switches) and problem.shows(c.effect.name, c.target))
+    judged = (as_long(problem, c) for c in (_judged(problem, c) for c in able) if c is not None)
     # Several groups may be one where joints that nothing is known of are left out.
-    return list({c.name: _hinted(problem, c) for c in (_judged(problem, c) for c in able) if c is not None}.values())
+    return list({c.name: _hinted(problem, c) for c in judged}.values())
+
+
+def as_long(problem: Problem, c: Candidate) -> Candidate:
+    """The candidate with times since a trial began up to the end of the longest trial: what happens then, happens at any time."""
+    if not any(p.of_trial for p in c.effect.parameters):
+        return c
+    longest = max((float(t.log.times_s[-1] - t.log.times_s[0]) for t in problem.measured), default=0.0)
+    bounds = tuple(
+        (low, max(high, longest)) if p.of_trial else (low, high)
+        for p, (low, high) in zip(c.effect.parameters, c.bounds, strict=True)
+    )
+    return replace(c, bounds=bounds)
 
 
 def _judged(problem: Problem, c: Candidate) -> Candidate | None:

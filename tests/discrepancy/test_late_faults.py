@@ -1,0 +1,64 @@
+"""What happens late in a long trial is found there, and what is lost altogether is no sign of another effect."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ee_dist.discrepancy.evidence.intervals import BOUND, NONE_LEFT, at_bound
+from ee_dist.discrepancy.explain import EFFECT, explain
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of
+from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.effects.catalogue import term
+from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.evaluation.physical import PhysicalRobot
+from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.trials.excitation import Excitation
+from ee_dist.trials.noise import with_noise
+
+ROBOT = with_noise(servo_pendulum(), 0.005)
+SUSPECTS = ["sensor_stuck", "sensor_bias", "sensor_gain", "sensor_failing", "coulomb_friction"]
+
+
+def problem(seconds: float, *hidden) -> OpenLoop:
+    engine, trials = MuJoCoEngine(1), []
+    for k, kind in enumerate(("multisine", "slow_sines")):
+        motion = Excitation(kind, seconds, 0.4, k + 1)
+        driver = driver_of(motion, ROBOT)
+        log = PhysicalRobot(engine, ROBOT, hidden, np.random.SeedSequence(k)).trial(driver, motion.steps(ROBOT))
+        trials.append(MeasuredTrial(kind, log, driver))
+    return OpenLoop(trials, ROBOT, SerialEvaluator(engine))
+
+
+@pytest.mark.parametrize(("share", "from_s"), [(0.7, 9.3), (1.0, 7.7)])
+def test_a_sensor_that_sticks_late_is_found_with_its_time(share: float, from_s: float) -> None:
+    late = problem(12.0, term("sensor_stuck", "position", share=share, from_s=from_s))
+    found = explain(late, pool_of(late, only=SUSPECTS))
+    assert found.verdict == EFFECT and found.best is not None and found.best.name == "sensor_stuck@position"
+    values = dict(found.best.terms[0].values)
+    assert values["share"] == pytest.approx(share, abs=0.03) and values["from_s"] == pytest.approx(from_s, abs=0.1)
+
+
+@pytest.mark.parametrize(("seconds", "end"), [(2.0, 5.0), (12.0, 12.0)])
+def test_times_of_a_trial_reach_to_its_end(seconds: float, end: float) -> None:
+    (stuck,) = (c for c in pool_of(problem(seconds), only=["sensor_stuck@position"]))
+    assert stuck.bounds[1] == pytest.approx((0.0, end), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("effect", "target", "u", "said"),
+    [
+        ("motor_weak", "servo", 1.0, ""),
+        ("sensor_stuck", "position", 1.0, ""),
+        ("sensor_failing", "position", 1.0, ""),
+        ("torque_limit", "servo", 1.0, BOUND),
+        ("coulomb_friction", "servo", 1.0, BOUND),
+        ("part_mass", "arm", -1.0, BOUND),
+        ("rotor_inertia", "servo", -1.0, NONE_LEFT),
+    ],
+)
+def test_all_of_a_share_is_an_answer_and_the_end_of_a_range_a_doubt(effect, target, u, said) -> None:
+    assert at_bound(candidate(ROBOT, effect, target), 0, u) == said
