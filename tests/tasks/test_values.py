@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from ee_dist.discrepancy.evidence.intervals import NEUTRAL, NOT_DETERMINED, ParameterReport
+from ee_dist.discrepancy.accounts.of_improve import flag_texts
+from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, NOT_DETERMINED, ParameterReport
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped
@@ -81,3 +82,27 @@ def test_a_joint_with_more_or_less_than_all_share_says_how_much_that_is():
         "all joints", "knee front left, 11.7 in all, beside what is shared", "hip front left, 1 in all, beside what is shared",
     ]  # fmt: skip
     assert [place for place, _ in zero.at] == ["hip front left"]
+
+
+def test_a_doubt_stands_beside_a_value_in_a_word_and_below_in_full():
+    told = [
+        ParameterReport(0, "torque_nm", 0.1, -0.2, 0.4, HARDLY),
+        ParameterReport(1, "torque_nm", 9.0, 8.0, 10.0, BOUND),
+    ]
+    assert [within(p) for p in told] == ["0.10 ± 0.30 (hardly told from neutral)", "9.0 ± 1.0 (at its bound)"]
+    assert within(ParameterReport(0, "x", 1.0, 0.0, 2.0, f"{BOUND}; {NOT_DETERMINED}")).endswith(
+        "(at its bound; not determined by these data)"
+    )
+    joints = ("hip_front_left", "hip_front_right", "hip_rear_left", "hip_rear_right")
+    terms = (
+        *(term("coulomb_friction", j, torque_nm=0.1) for j in joints),
+        term("zero_offset", joints[0], offset_rad=0.01),
+        term("zero_offset", joints[1], offset_rad=0.01),
+        term("viscous_friction", joints[0], damping_nm_s_rad=3.0),
+    )  # fmt: skip
+    reports = [ParameterReport(k, t.values[0][0], 0.1, -1, 1, NEUTRAL if k < 6 else BOUND) for k, t in enumerate(terms)]
+    assert flag_texts(terms, reports) == [
+        "coulomb friction at 4 places, torque; zero offset at hip front left and hip front right, offset: not told from neutral.",
+        "viscous friction at hip front left, damping: at its bound: the range is too small, or the effect is another.",
+    ]
+    assert flag_texts(terms, []) == []

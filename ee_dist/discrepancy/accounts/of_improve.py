@@ -37,7 +37,7 @@ from ee_dist.discrepancy.ladder import Improvement, Twin
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
-from ee_dist.discrepancy.words import much, named, percent, phrase, placed, plain, quantity, span
+from ee_dist.discrepancy.words import much, percent, phrase, placed, plain, quantity, span
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
@@ -47,6 +47,8 @@ EACH = "each of "
 TRIALS_APART = "trials that were held out from all of it"
 NAMED = 3
 """Effects that a headline names."""
+LISTED = 3
+"""Places that a line lists; of more the table of values tells."""
 
 
 def has(names: AbstractSet[str], told: str, robot: Robot) -> bool:
@@ -98,7 +100,7 @@ def improve_account(
         lines.append(f"Left out in the end, since these data do not tell them from neutral: {'; '.join(vague)}.")
     lines.append("The model: " + (phrase(found.terms, robot) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
-    lines += [flag_text(found.terms, p) for p in found.parameters if p.flag]
+    lines += flag_texts(found.terms, found.parameters)
     lines += rest_text(found.terms, found.parameters)
     worse = worse_trials(problem, found)
     if worse:
@@ -225,5 +227,25 @@ def rest_text(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[
     return [text + (f" It could be all of: {'; '.join(names)}." if names else "")]
 
 
-def flag_text(terms: Hypothesis, p: ParameterReport) -> str:
-    return f"{named(terms[p.term])}, {quantity(terms[p.term], p.name)}: {p.flag}."
+def flag_texts(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
+    """What is wrong with values, a line for each kind of doubt: a robot that is a little wrong everywhere has dozens of them."""
+    told: dict[str, dict[tuple[str, str], list[str]]] = {}
+    for p in parameters:
+        if p.flag:
+            term = terms[p.term]
+            told.setdefault(p.flag, {}).setdefault((term.effect, quantity(term, p.name)), []).append(term.target)
+    return [
+        "; ".join(_of_kind(effect, what, places) for (effect, what), places in kinds.items()) + f": {flag}."
+        for flag, kinds in told.items()
+    ]
+
+
+def _of_kind(effect: str, what: str, places: Sequence[str]) -> str:
+    """``zero offset at hip and knee, offset``."""
+    at = f"{len(places)} places" if len(places) > LISTED else _and([plain(place) for place in places])
+    return f"{plain(effect)}{f' at {at}' if any(places) else ''}{f', {what}' if what else ''}"
+
+
+def _and(words: Sequence[str]) -> str:
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last

@@ -71,17 +71,17 @@ UNEVEN = 0.1
 
 
 def within(p: ParameterReport) -> str:
-    """``0.2032 ± 0.0031``, with as many digits as the interval leaves, and what is wrong with it; an interval that a bound
-    cuts is told by its ends: ``218 (-90 to 300)``."""
-    half = (p.high - p.low) / 2
+    """``0.2032 ± 0.0031``, with as many digits as the interval leaves, and in a word what is wrong with it; an
+    interval that a bound cuts is told by its ends: ``218 (-90 to 300)``."""
+    half, flag = (p.high - p.low) / 2, "; ".join(dict.fromkeys(f.partition(":")[0] for f in p.flag.split("; ")))
     if not np.isfinite(half):
-        return f"{p.value:.3g} ({p.flag})" if p.flag else f"{p.value:.3g}"
+        return f"{p.value:.3g} ({flag})" if flag else f"{p.value:.3g}"
     if half <= 0:
         return f"{p.value:.4g}"
     if abs(p.value - (p.low + p.high) / 2) > UNEVEN * half:
         cut = f"{p.value:.3g} ({p.low:.3g} to {p.high:.3g})"
-        return f"{cut[:-1]}; {p.flag})" if p.flag else cut
+        return f"{cut[:-1]}; {flag})" if flag else cut
     digits = max(1 - math.floor(math.log10(half)), 0)  # two of the interval
     fine = half < FINE * abs(p.value)
     shown = f"{p.value:.4g} ± {half:.1g}" if fine else f"{round(p.value, digits) + 0.0:.{digits}f} ± {half:.{digits}f}"
-    return f"{shown} ({p.flag})" if p.flag else shown
+    return f"{shown} ({flag})" if flag else shown
