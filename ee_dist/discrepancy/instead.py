@@ -137,7 +137,7 @@ def _promising(
         for (k, u), row in zip(before.items(), rows, strict=True):
             if not np.isfinite(row).all():
                 continue
-            step = gauss_newton(around[k], row, u, PRIOR)
+            step = gauss_newton(around[k], row, u, PRIOR, models[k])
             left = row + around[k] @ step
             at[k] = np.clip(u + step, models[k].lower, models[k].upper)
             if each or float(left @ left) <= max(wanted, NEARLY * float(row @ row)):

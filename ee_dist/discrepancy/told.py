@@ -114,7 +114,7 @@ def _followed(search: Search, starts: Sequence[Fit]) -> list[Fit]:
             if energy < best[k].energy:
                 best[k] = replace(f, u=now[k], energy=energy, residual=r)
             smooth, weights = weighed(search.problem, r)
-            step = gauss_newton(f.slopes, (weights * smooth)[f.mask], now[k], PRIOR)
+            step = gauss_newton(f.slopes, (weights * smooth)[f.mask], now[k], PRIOR, f.model)
             now[k] = np.clip(now[k] + step, f.model.lower, f.model.upper)
     return best
 

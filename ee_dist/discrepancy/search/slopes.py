@@ -35,6 +35,8 @@ changed the residual than is left of it, for then they told nothing of what is l
 STILL, MISSES = 0.95, 2
 """Share of the energy that an iteration leaves at most which pays, far from the noise (near it SAME is what it takes off at
 least); and after how many in turn that do not the fit ends. Of laws that are left half fitted luck chooses."""
+DETERMINED = 100.0
+"""Times the prior by which data determine a value well."""
 CLOSEST = 1e-9
 """Share of a parameter's room below which two values are one."""
 
@@ -159,6 +161,15 @@ def weighed(problem: Problem, residual: Array) -> tuple[Array, Array]:
     return smooth, np.minimum(np.abs(residual) / np.maximum(np.abs(smooth), 1e-12), 1.0)
 
 
+def counted(change: Array, weights: Array, smooth: Array) -> Array:
+    """Slopes (n, P) as the energy counts them. Where a residual is exactly zero its weight is that of none, as though it said
+    nothing; of a value that moves such values alone (a sensor that is dead, and told to be) it says all that there is."""
+    columns = weights[:, None] * change
+    silent = np.linalg.norm(columns, axis=0) <= 1e-9 * np.linalg.norm(change, axis=0)
+    columns[:, silent] = (change * (smooth == 0)[:, None])[:, silent]
+    return np.asarray(columns)
+
+
 def _slopes(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Problem) -> None:
     """Derivatives over the run's width (narrower for a small value), towards the inside; a better point found is taken. Those of
     the first values may be known."""
@@ -185,7 +196,8 @@ def _slopes(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Probl
             gap = u[k] - run.u[k]
             usable = np.isfinite(value) and np.isfinite(run.energy) and abs(gap) > 1e-12
             change = problem.smooth(r)[mask] - smooth[mask] if usable else np.zeros(int(mask.sum()))
-            columns.append(weights[mask] * change / gap if usable else change)
+            column = (change / gap if usable else change)[:, None]
+            columns.append(counted(column, weights[mask], smooth[mask])[:, 0])
             moved = max(moved, float(np.linalg.norm(change)))
             if value < best[0]:
                 best = (value, u, r)
@@ -216,7 +228,7 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
             # No slope where nothing can be simulated: nearer to neutral.
             full.append((run, run.u * 0.5))
             continue
-        step = gauss_newton(run.slopes, residual[mask], origin, prior)
+        step = gauss_newton(run.slopes, residual[mask], origin, prior, run.model)
         aim = origin + step
         step = np.clip(step, -0.5, 0.5)
         first, *others = (np.clip(origin + length * step, run.model.lower, run.model.upper) for length in LENGTHS)
@@ -237,11 +249,23 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
     better([(run, u) for run, enough, u in shorter if not run.energy <= enough])
 
 
-def gauss_newton(slopes: Array, residual: Array, u: Array, prior: float) -> Array:
+def gauss_newton(slopes: Array, residual: Array, u: Array, prior: float, model: Model) -> Array:
     """(P,) the Gauss-Newton step from values u (P,), where ``slopes`` (n, P) of the residual (n,) are known."""
-    normal = slopes.T @ slopes + prior * np.eye(len(u))
+    plain, down, step = slopes.T @ slopes, -slopes.T @ residual, np.zeros(len(u))
+    normal = plain + prior * np.eye(len(u))
     damp = 1e-6 * np.trace(normal) / max(1, len(u)) + 1e-12
-    return np.asarray(np.linalg.solve(normal + damp * np.eye(len(u)), -slopes.T @ residual - prior * u))
+    free = np.flatnonzero(~at_end(plain, down, u, prior, model))
+    system = (normal + damp * np.eye(len(u)))[np.ix_(free, free)]
+    step[free] = np.linalg.solve(system, (down - prior * u)[free])
+    return step
+
+
+def at_end(normal: Array, down: Array, u: Array, prior: float, model: Model) -> Mask:
+    """(P,) values at an end of their range that stay there: data which determine them well do not ask for less, and the prior
+    would move them by next to nothing. Off the end by next to nothing can be another world: of a dead sensor a trace is left,
+    whose readings are not the same number any more."""
+    outside = ((u >= model.upper) & (down >= 0)) | ((u <= model.lower) & (down <= 0))
+    return np.asarray(outside & (np.diag(normal) > DETERMINED * max(prior, 1e-12)))
 
 
 def _side(run: _Run, k: int, h: float) -> float:
@@ -256,7 +280,7 @@ def _unweighed(run: _Run, mask: Mask, prior: float) -> Array:
     assert run.origin is not None and run.slopes is not None and run.weights is not None
     origin, residual = run.origin
     shares = np.maximum(run.weights, 1e-12)
-    step = gauss_newton(run.slopes / shares[:, None], residual[mask] / shares, origin, prior)
+    step = gauss_newton(run.slopes / shares[:, None], residual[mask] / shares, origin, prior, run.model)
     return np.asarray(np.clip(origin + np.clip(step, -0.5, 0.5), run.model.lower, run.model.upper))
 
 
@@ -270,7 +294,9 @@ def slopes_at(search: Search, model: Model, u: Array, width: float = WIDTHS[2]) 
     rows, problem = search.residuals([model.hypothesis(v) for v in points]), search.problem
     smooth, weights = weighed(problem, rows[0])
     columns = [
-        weights * (problem.smooth(r) - smooth) / (v[k] - u[k]) if np.isfinite(r).all() else np.zeros(len(r))
+        (problem.smooth(r) - smooth) / (v[k] - u[k]) if np.isfinite(r).all() else np.zeros(len(r))
         for k, (v, r) in enumerate(zip(points[1:], rows[1:], strict=True))
     ]
-    return np.stack(columns, axis=1) if columns else np.zeros((rows.shape[1], 0))
+    if not columns:
+        return np.zeros((rows.shape[1], 0))
+    return counted(np.stack(columns, axis=1), weights, smooth)

@@ -20,7 +20,7 @@ import numpy as np
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import NEAR, weighed
+from ee_dist.discrepancy.search.slopes import NEAR, at_end, counted, weighed
 from ee_dist.trials.log import Array
 
 LARGE = 10
@@ -32,6 +32,8 @@ DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)
 """Tried at once, relative to the one that did best before;"""
 PLAIN = (0.1, 1.0, 10.0)
 """those of plain least squares, where more is left than slopes as they are weighed can be trusted with (``slopes.NEAR``)."""
+SHORTEST = 100.0
+"""Damping, relative, with which a step is so short that slopes which lead nowhere by it lead nowhere."""
 GAIN = 0.005
 """Share of the energy that an iteration must take off, or else slopes are taken narrower; at the narrowest it ends."""
 BEHIND = 0.5
@@ -61,15 +63,17 @@ class _Run:
     """how often slopes were taken,"""
     followed: int = 0
     """and which step by the slopes corrected since then comes next (0: they are taken anew)."""
+    again: bool = False
+    """Whether the same slopes are tried again with shorter steps,"""
     still: bool = False
-    """Whether the last slopes led next to nowhere."""
+    """and whether the last slopes led next to nowhere."""
     done: bool = False
 
     def weighed_slopes(self, rows: int) -> Array:
         """(n, P), zeros where none were taken."""
-        if self.slopes is None or self.weights is None:
+        if self.slopes is None or self.weights is None or self.smooth is None:
             return np.zeros((rows, len(self.u)))
-        return np.asarray(self.slopes * self.weights[:, None])
+        return counted(self.slopes, self.weights, self.smooth)
 
 
 def follow_valley(
@@ -97,14 +101,14 @@ def follow_valley(
     far = NEAR * float(search.problem.floor[mask].sum())
     while moving := [run for run in runs if not run.done and (run.followed or run.rounds < iterations)]:
         _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
-        anew = [run for run in moving if not run.followed]
+        anew = [run for run in moving if not (run.followed or run.again)]
         _slopes([run for run in anew if np.isfinite(run.energy)], search, mask)
         for run in anew:
             run.rounds += 1
         going = [run for run in moving if np.isfinite(run.energy)]
         _steps(going, search, mask, prior, far)
         for run in going:
-            _next(run, far, NARROWEST if not settled else np.inf, run.rounds < iterations)
+            _next(run, far, settled, run.rounds < iterations)
             if run.followed:
                 _correct(run, search, mask)
         together = len(runs) if rivals else len(widths)
@@ -181,16 +185,19 @@ def _steps(runs: Sequence[_Run], search: Search, mask: Mask, prior: float, far: 
             run.plain_damping = min(100.0 * run.plain_damping, 1e6)
 
 
-def _next(run: _Run, far: float, last: float, more: bool) -> None:
+def _next(run: _Run, far: float, settled: bool, more: bool) -> None:
     """What a run does next, after a step: another by corrected slopes, if that may pay, or slopes anew, narrower where the last
     took next to nothing: at once as narrow as they get where more than ``far`` is left, for what is missing there is not to be
-    had of the values. ``last``: width from which such a step ends the descent; ``more``: whether slopes may be taken again, for
-    corrected ones are no evidence."""
+    had of the values. One that is ``settled`` ends with such a step, once shorter ones by the same slopes led nowhere either;
+    others at the narrowest. ``more``: whether slopes may be taken again, for corrected ones are no evidence."""
     assert run.before is not None
     before, gained = run.before[0], run.before[0] - run.energy
+    run.again = settled and not run.followed and gained <= 0 and run.damping < SHORTEST
+    if run.again:
+        return
     run.still = not run.followed and gained < GAIN * before
     if run.still:
-        run.done = run.width <= last
+        run.done = settled or run.width <= NARROWEST
         run.width = max(0.5 * run.width, NARROWEST) if run.energy <= far else NARROWEST
     elif not run.followed and not run.rounds % 2:
         run.width = max(0.7 * run.width, NARROWEST)
@@ -230,7 +237,7 @@ def _points(run: _Run, tries: Sequence[tuple[bool, float]], prior: float) -> lis
     assert run.slopes is not None and run.smooth is not None and run.weights is not None
     systems = {}
     for plain in {plain for plain, _ in tries}:
-        slopes = run.slopes if plain else run.slopes * run.weights[:, None]
+        slopes = run.slopes if plain else counted(run.slopes, run.weights, run.smooth)
         values = run.smooth if plain else run.smooth * run.weights
         systems[plain] = slopes.T @ slopes, -(slopes.T @ values)
     return [_step(run, *systems[plain], prior, damping) for plain, damping in tries]
@@ -241,8 +248,8 @@ def _step(run: _Run, normal: Array, down: Array, prior: float, damping: float) -
     u, model = run.u, run.model
     scale = np.diag(normal)
     scale = np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-12))
+    free = ~at_end(normal, down, u, prior, model)
     system, down = normal + prior * np.eye(len(u)) + damping * np.diag(scale), down - prior * u
-    free = np.ones(len(u), dtype=bool)
     point = u
     for _ in range(4):
         step = np.zeros(len(u))
