@@ -93,3 +93,22 @@ def test_a_robot_that_nobody_leads_is_started_anew_and_searched_as_it_is() -> No
     loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque"))
     problem = FreeRun((trial_of(loose, 2.0),), loose, evaluator_for(loose), windows_s=RESTART_S)
     assert problem.searched is problem and problem.other_errors(()) == []
+
+
+def test_what_was_sent_before_a_record_began_is_not_made_up() -> None:
+    """A torque that comes late: before its first row the record knows none, and the first one held would throw the joint."""
+    robot = quiet(samples()["pendulum"].robot)
+    joint = robot.drives[0].joint
+    robot = robot.map_drive(joint, lambda d: replace(d, command="torque", delay_s=0.05, kp=0.0))
+    rest, steps = round(0.5 / robot.time_step_s), round(3.5 / robot.time_step_s)
+    t = np.arange(steps) * robot.time_step_s
+    sent = (t >= 0.5)[:, None] * 0.3 * np.cos(2 * np.pi * 1.1 * (t - 0.5))[:, None]
+    (log,) = evaluator_for(robot).engine.rollout([Rollout(robot, Commands(sent), steps, pose=True)])  # type: ignore[attr-defined]
+    began = log.part(rest, steps)
+    began = replace(began, times_s=began.times_s - began.times_s[0])
+    windows = FreeRun(
+        (MeasuredTrial("from rest", began, Commands(began.commands)),), robot, evaluator_for(robot), windows_s=RESTART_S
+    )
+    off = np.abs(windows.raw(windows.residuals([()])[0]))
+    assert len(windows.segments) == 6 and windows.pieces[0].rows[0] * robot.time_step_s >= 0.05
+    assert off.mean() < 1e-4 * float(np.ptp(began.sensors[:, 0]))

@@ -116,8 +116,11 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
     # An integral is what a controller made of all that came before.
     remembers = any(d.ki > 0 for d in robot.drives)
+    # What was sent before a record began nobody knows. A goal that is held hardly moves a joint that stands there; a torque,
+    # taken to have been held for as long as commands are late, would throw it: there the first window is a later one.
+    unknown = run_up if windows_s is not None and any(d.command == "torque" for d in robot.drives) else 0
     found = []
-    for first in range(0, len(log), len(log) if remembers else length):
+    for first in range(unknown if unknown + length <= len(log) else 0, len(log), len(log) if remembers else length):
         last = len(log) if remembers else min(first + length, len(log))
         if last - first < min(length, len(log)) // 2:
             break
