@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import measurement_files as samples
 import numpy as np
 import pytest
 import small_logs as logs
@@ -11,7 +12,10 @@ import small_logs as logs
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import mapping_of
+from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.model import Hints
 from ee_dist.measurements.sampling import carried, filled
+from ee_dist.robots.describe import load_robot
 
 T = np.arange(1000) / 100
 COMMANDS = ["shoulder_goal_rad", "elbow_goal_rad"]
@@ -75,3 +79,39 @@ def test_without_gaps_every_row_is_measured() -> None:
     assert filled(at_s, at_s + 1e-3 * np.sin(np.arange(500))) is None
     bursts = np.sort(np.concatenate([at_s[::2], at_s[::2] + 1e-4]))
     assert filled(at_s, bursts) is None, "messages that come two at a time are no gap"
+
+
+def test_a_speed_that_reads_one_number_while_its_joint_moves_is_none(tmp_path: Path) -> None:
+    """Compared, it would be most of what a model seems to get wrong; of a joint that rests it is the truth."""
+    moved = wave(T - 0.05)
+    frame = logs.frame_of(T, moved, wave(T))
+    frame["shoulder_vel_rad_s"], frame["elbow_vel_rad_s"] = np.gradient(moved[:, 0], T), 0.0
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, frame))
+    (dead,) = (c for c in proposal.choices if c.name == "velocity_elbow")
+    assert "speed_of" in dead.entry and dead.why.startswith(
+        "elbow_vel_rad_s reads 0 in every row while the joint moves"
+    )
+    (good,) = (c for c in proposal.choices if c.name == "velocity_shoulder")
+    assert good.entry["column"] == "shoulder_vel_rad_s"
+    log, _ = logs.imported(tmp_path, tmp_path / "log.csv")
+    truth = np.gradient(moved[:, 1], T)
+    assert np.corrcoef(log.channel("velocity_elbow")[50:-50], truth[50:-50])[0, 1] > 0.99
+
+    moved[:, 1] = 0.2
+    still = logs.frame_of(T, moved, wave(T))
+    still["shoulder_vel_rad_s"], still["elbow_vel_rad_s"] = np.gradient(moved[:, 0], T), 0.0
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, still))
+    (rests,) = (c for c in proposal.choices if c.name == "velocity_elbow")
+    assert rests.entry["column"] == "elbow_vel_rad_s"
+
+
+def test_goals_of_positions_in_the_log_of_drives_described_to_obey_torques_are_told(tmp_path: Path) -> None:
+    """A description with motors of torque, as MJCF files have them, and a log of a robot that was led by positions."""
+    described = samples.robot_file(tmp_path)
+    text = described.read_text().replace("kp: 20", "command: torque, torque_limit: 5")
+    described.write_text(text)
+    robot, _ = load_robot(described)
+    proposal = proposal_for([logs.written(tmp_path, logs.frame_of(T, wave(T - 0.05), wave(T)))], robot, Hints())
+    (asked,) = (q for q in proposal.questions if q.startswith("commands"))
+    assert "no columns look like torques" in asked and "the positions follow" in asked and "by 50 ms" in asked
+    assert "'command: position' with kp and kd" in asked

@@ -50,7 +50,7 @@ def add_commands(v: View) -> None:
             return
         rivals = " or ".join(s.block.name for s in sorted(found, key=lambda s: -s.score)[:3])
         told = f"commands: {rivals}?" if rivals else f"commands: no columns look like {kind}s that were asked for;"
-        v.out.ask(f"{told} write the right ones into the mapping")
+        v.out.ask(f"{told} write the right ones into the mapping{_goals(v, kind)}")
         for n in names:
             v.out.choices.append(Choice("commands", n, {"column": "???"}, UNKNOWN, "not found"))
         return
@@ -66,6 +66,20 @@ def add_commands(v: View) -> None:
     certain = chosen.block.reading.command and (kind == "torque" or _goes_with_the_motion(v, chosen.block, kind))
     level = SURE if certain else LIKELY
     v.add("commands", names, chosen.block, units, chosen.why, level)
+
+
+def _goals(v: View, kind: str) -> str:
+    """What to do where drives are described to obey something else, and columns are there that positions follow."""
+    for b in v.blocks if kind != "position" else ():
+        if b.used or b.reading.command is False or b.reading.kind not in (POSITION, None) or not v.moves(b):
+            continue
+        ahead = _lead(v, b, "position")
+        if ahead.correlation >= CLOSE and ahead.lead_s > 0 and not np.array_equal(b.values, v.position.block.values):
+            return (
+                f"; but {_why(ahead, f'the positions follow {b.name} by')}, as they do where drives obey positions: then the "
+                "robot's description has 'command: position' with kp and kd"
+            )
+    return ""
 
 
 def _lead(v: View, b: Block, kind: str) -> signals.Lead:

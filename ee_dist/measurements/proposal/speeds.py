@@ -8,6 +8,8 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ee_dist.measurements import signals
 from ee_dist.measurements.proposal.asked_for import was_asked_for
 from ee_dist.measurements.proposal.blocks import Block
@@ -56,7 +58,7 @@ def add_speeds(v: View) -> None:
         _estimate(v, names, positions, LIKELY if able or poor else SURE, [why] * len(names))
         return
     chosen.block.used = True
-    odd = _odd(v, chosen.block)
+    odd = {**_odd(v, chosen.block), **_dead(v, chosen.block)}
     v.add(
         "sensors", [n * (k not in odd) for k, n in enumerate(names)], chosen.block,
         speed_units(v, chosen.block, odd), chosen.why,
@@ -120,6 +122,16 @@ def _odd(v: View, block: Block) -> dict[int, str]:
         f"{relations[k].correlation:.2f}), which is no unit: estimated from the position, which may be a share of a range"
         for k in moving
         if k not in fine and not (block.units and block.units[k])
+    }
+
+
+def _dead(v: View, block: Block) -> dict[int, str]:
+    """Joints that move and whose speed reads one number all the time, and why that is none: compared, it would be most of what a
+    model seems to get wrong."""
+    return {
+        k: f"{block.columns[k]} reads {block.values[0, k]:g} in every row while the joint moves: estimated from the position"
+        for k in signals.lively(v.position.block.values)
+        if not np.ptp(block.values[:, k])
     }
 
 
