@@ -20,6 +20,7 @@ from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_be_noise
 from ee_dist.discrepancy.evidence.rule import LUCK, NEAR, no_more_than_noise
+from ee_dist.discrepancy.evidence.signs import either_sign
 from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.exchanges import exchanged, nearest, refitted, strictest, twins_of
@@ -326,7 +327,8 @@ def _finish(
         fit = fit_one(search, model, [current.u], None, (*WIDTHS[2:], 0.006), prior)
         residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
         left = leftovers(problem, residual)
-        told = [replace(p, term=p.term + len(search.fixed)) for p in parameters(problem, fit, left, tried)]
+        reports = parameters(problem, fit, left, tried, either_sign(search, fit))
+        told = [replace(p, term=p.term + len(search.fixed)) for p in reports]
         worth = worth_of(problem, fit, base)
     before, after = ladder[0].error_heldout, ladder[-1].error_heldout
     above = before**2 - floor**2

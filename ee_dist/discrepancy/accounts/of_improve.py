@@ -29,7 +29,7 @@ from ee_dist.discrepancy.accounts.account import (
     was_or_were,
 )
 from ee_dist.discrepancy.calibrated_away import OddOne
-from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, HARDLY, NEUTRAL, WIDER, ParameterReport, called
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, EITHER, HARDLY, NEUTRAL, WIDER, ParameterReport, called
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
@@ -194,7 +194,8 @@ def _ranges(found: Improvement, named_: Sequence[Term], robot: Robot) -> str:
         term = found.terms[p.term]
         if term.name in told_of:
             range_ = span(term, p.name, p.low, p.high, robot, interval=True)
-            sure = p.flag in ("", HARDLY) and np.isfinite(p.high - p.low)
+            sure = p.flag in ("", HARDLY, EITHER) and np.isfinite(p.high - p.low)
+            range_ += f", of which {EITHER}" if p.flag == EITHER else ""
             told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
     out = [
         (f"{placed(name)}: " if len(added(found)) > 1 else "") + ", ".join(values)

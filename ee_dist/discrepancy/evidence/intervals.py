@@ -32,6 +32,7 @@ BOUND = "at its bound: the range is too small, or the effect is another"
 NONE_LEFT = "at its bound: next to none is left of what was described"
 NEUTRAL = "not told from neutral"
 HARDLY = "hardly told from neutral: of as many effects as were tried, luck may tell one as far"
+EITHER = "the other sign does as well"
 WIDER = "widened by what is left unexplained"
 ALL_OF_IT = "what is left unexplained could be all of it"
 
@@ -55,9 +56,12 @@ class ParameterReport:
         return "; ".join(filter(None, (self.flag, self.doubt)))
 
 
-def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = (), tried: int = 0) -> list[ParameterReport]:
+def parameters(
+    problem: Problem, fit: Fit, left: Sequence[Leftover] = (), tried: int = 0, either: Mask | None = None
+) -> list[ParameterReport]:
     """Every value of a fit, in the order of its terms; ``left`` is what stands out of its residual. ``tried``:
-    how many effects were in question, of which one in twenty is told from neutral for nothing (0: those of the fit)."""
+    how many effects were in question, of which one in twenty is told from neutral for nothing (0: those of the fit). ``either``
+    (P,): values of which the other sign does as well (signs.py)."""
     half_u = half_widths(problem, fit)
     by_luck = math.sqrt(least_energy(tried)) / scipy.special.ndtri(0.5 + LEVEL / 2) if tried else 1.0
     wider = np.maximum(half_u, half_widths_by_rest(problem, fit, left))
@@ -78,6 +82,8 @@ def parameters(problem: Problem, fit: Fit, left: Sequence[Leftover] = (), tried:
                 flag = NEUTRAL
             elif not flag and abs(u[k]) < by_luck * s[k]:
                 flag = HARDLY
+            elif not flag and either is not None and either[at + k]:
+                flag = EITHER
             doubt = "" if w[k] <= s[k] else ALL_OF_IT if abs(u[k]) < w[k] else WIDER
             low, high = value - half, value + half
             if math.isfinite(half):  # no farther than physics allows
