@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+ROUNDING = 1e-12
+"""Share of the larger end of a range below which the other end is what rounding left."""
+
 
 @dataclass
 class Report:
@@ -39,7 +42,13 @@ def describe(reports: Sequence[Report]) -> str:
             + ("" if r.even else " (median; uneven)")
             + f" -> {r.rows} rows at {r.rate_hz:.4g} Hz; gaps: {len(r.gaps)}"
         )
-        lines += [f"  {name}: {low:.5g} to {high:.5g} {unit}" for name, (low, high, unit) in r.ranges.items()]
+        lines += [f"  {name}: {_range(low, high)} {unit}" for name, (low, high, unit) in r.ranges.items()]
         lines += [f"  done: {d}" for d in r.done]
         lines += [f"  suspicious: {s}" for s in r.suspicious]
     return "\n".join(lines)
+
+
+def _range(low: float, high: float) -> str:
+    """``-0.5 to 1.2``; what rounding left beside the other end is 0."""
+    size = max(abs(low), abs(high))
+    return " to ".join(f"{0.0 if abs(x) < ROUNDING * size else x:.5g}" for x in (low, high))

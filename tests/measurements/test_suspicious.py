@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
     command_suspicion,
@@ -131,3 +132,11 @@ def test_rest_steps_and_a_slower_rate_are_no_stale_rows() -> None:
     one[5:295:8, 0] = one[4:294:8, 0]
     assert repeat_suspicion(one) is None, "of the others new readings came"
     assert repeat_suspicion(moving()[:, :1]) is None
+
+
+def test_what_rounding_left_of_a_range_is_nothing() -> None:
+    report = Report(
+        "a.csv", "a", ranges={"q": (-1.4e-16, 1.2, "rad"), "w": (-1e-13, 2e-13, "rad/s"), "z": (0.0, 0.0, "m")}
+    )
+    lines = describe([report]).splitlines()
+    assert lines[2:] == ["  q: 0 to 1.2 rad", "  w: -1e-13 to 2e-13 rad/s", "  z: 0 to 0 m"]
