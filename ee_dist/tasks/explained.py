@@ -134,8 +134,9 @@ def _settings(folder: Path, config: Config) -> Config:
     return replace(
         config,
         measured=config.measured or files,
-        trials=config.trials or trials,
-        held_out=config.held_out or held_out,
+        # Names of trials are those of its own log.
+        trials=config.trials or (None if config.measured else trials),
+        held_out=config.held_out or (None if config.measured else held_out),
         model=config.model or (None if model is None else str(where / str(model))),
         plugins=[*config.plugins, *(p for p in plugins if p not in config.plugins)],
     )

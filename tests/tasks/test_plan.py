@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from ee_dist.recording.reader import read_run
 from ee_dist.robots.servo_pendulum import servo_pendulum
@@ -164,3 +165,23 @@ def test_a_run_of_improve_gives_its_model_and_that_with_what_was_tied_in_its_pla
     assert (last[0], [t.effect for t in last[1]]) == (
         "motor_weak@servo", ["command_delay", "coulomb_friction", "motor_weak"]
     )  # fmt: skip
+
+
+def test_a_plan_looks_at_the_trials_that_its_run_looked_at(tmp_path) -> None:
+    """Names of trials are those of the run's own log: another log has its own."""
+    (tmp_path / "config").mkdir()
+    asked = {"measured": "a.mcap", "model": None, "plugins": [], "trials": ["slow"], "held_out": ["fast"]}
+    (tmp_path / "config" / "config.yaml").write_text(yaml.safe_dump(asked))
+    (tmp_path / "config" / "hydra.yaml").write_text(yaml.safe_dump({"hydra": {"runtime": {"cwd": str(tmp_path)}}}))
+    summary = {
+        "task": "improve",
+        "verdict": "explained",
+        "way": "open_loop",
+        "engine": "mujoco",
+        "ladder": [],
+        "model_terms": [],
+    }
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    same, other = (explained(str(tmp_path), Config(measured=m)).config for m in (None, "b.mcap"))
+    assert (same.measured, same.trials, same.held_out) == ([str(tmp_path / "a.mcap")], ["slow"], ["fast"])
+    assert (other.measured, other.trials, other.held_out) == ("b.mcap", None, None)
