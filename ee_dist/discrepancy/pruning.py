@@ -77,14 +77,15 @@ def halves(count: int) -> list[int]:
 
 def as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: int, each: bool = False) -> int:
     """How many terms may go, of the numbers in ``fewer`` with the models that are left then, most first: without so many held-out
-    data are foretold as well as by the whole model, give or take luck once, or for ``each`` of them. Slopes may mislead where a
-    joint sticks; and where much is left at one joint, luck is taken to be large at all that moves it. 0: none."""
+    data are foretold as well as by the whole model, give or take luck once, or for ``each`` of them. Far from the noise a term
+    must be worth more than luck to come in; to stay, where nothing else tells it, no more than that. Slopes may mislead where
+    a joint sticks; and where much is left at one joint, luck is taken to be large at all that moves it. 0: none."""
     todo = list(fewer)
     for some in (todo[:1], todo[1:]):
         if some:
             known, *others = held_by_slopes(search, [whole, *(fewer[n] for n in some)], cut)
             for n, held in zip(some, others, strict=True):
-                if _as_good(search, known.energy, held.energy, cut, tried, n if each else 1):
+                if held.energy - known.energy <= _may_cost(search.problem, known.energy, cut, tried, n, each):
                     return n
     return 0
 
@@ -162,20 +163,27 @@ def _by_slopes(
     return kept, tuple(c.name for c in current.parts if c.name not in names)
 
 
-def _as_good(search: Search, energy: float, with_fewer: float, cut: Cut, tried: int, count: int) -> bool:
-    """Whether held-out data, on which a model has that ``energy`` and the same with fewer terms ``with_fewer``, do without the
-    others. What noise makes of one of them is what it may make of each of ``count``."""
+def _may_cost(problem: Problem, energy: float, cut: Cut, tried: int, count: int, each: bool) -> float:
+    """Held-out energy, of which a model has so much, that leaving ``count`` terms out may cost. What noise makes of one of
+    them is what it may make of ``each``; else luck may be had once, and far from the noise as often as terms go."""
     # Many small effects may each be below the resolution at which channels are compared, and not all together.
-    most = allowed_loss(search.problem, energy, cut, tried, float(search.problem.floor.mean()), count)
-    return with_fewer - energy <= most
+    least = float(problem.floor.mean())
+    if each:
+        return allowed_loss(problem, energy, cut, tried, least, count)
+    return min(allowed_loss(problem, energy, cut, tried, least), count * luck(problem, energy, tried, least))
 
 
 def allowed_loss(problem: Problem, energy: float, cut: Cut, tried: int, least: float = 1.0, count: int = 1) -> float:
     """Held-out energy that leaving ``count`` terms out may cost; ``least``: the variance that counts in a value."""
-    luck = count * least_energy(tried) * max(least, energy / len(problem.floor))
+    most = count * luck(problem, energy, tried, least)
     if cut.name == WINDOWS:
-        return luck
-    return max(luck, 0.5 * WORTH * max(energy - float(problem.floor.sum()), 0.0))
+        return most
+    return max(most, 0.5 * WORTH * max(energy - float(problem.floor.sum()), 0.0))
+
+
+def luck(problem: Problem, energy: float, tried: int, least: float = 1.0) -> float:
+    """Held-out energy, of which a model has so much, that one useless effect of those ``tried`` may take off."""
+    return least_energy(tried) * max(least, energy / len(problem.floor))
 
 
 def without_these(fit: Fit, gone: Sequence[int]) -> Fit:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from linear_problem import ROBOT, Linear
 from ee_dist.discrepancy.evidence.holdout import travelling
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.examine import Current
-from ee_dist.discrepancy.pruning import _luck, pruned, without_these
+from ee_dist.discrepancy.pruning import _luck, as_many, luck, pruned, without_these
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
@@ -105,3 +106,28 @@ def test_terms_that_nothing_speaks_for_leave_the_model_all_at_once(monkeypatch: 
     assert kept.parts[0] is MODEL.parts[0]
     assert set(gone) == {c.name for c in MODEL.parts} - {c.name for c in kept.parts}
     assert len(gone) >= 4 and sum(n > 0 for n in asked) <= 3, "one fit each would be as many as there are terms"
+
+
+@pytest.mark.parametrize(
+    ("rises", "go"),
+    [
+        ({1: 1.5}, 0),
+        ({1: 0.5}, 1),
+        ({20: 2.0, 10: 1.5, 5: 0.1, 2: 0.1, 1: 0.0}, 20),
+        ({20: 3.0, 10: 2.0, 5: 0.1, 2: 0.1, 1: 0.0}, 10),
+        ({4: 3.0, 2: 2.1, 1: 0.1}, 1),
+    ],
+)  # fmt: skip
+def test_far_from_the_noise_each_term_that_goes_may_cost_luck(monkeypatch, rises, go) -> None:
+    """One that nothing but held-out data tells stays where they tell it: a joint's error doubled without its rotor. ``rises``: of
+    held-out energy, in units of luck, by how many go; together they may cost a twentieth of what is above the noise."""
+    problem = Linear((term("coulomb_friction", JOINTS[0], torque_nm=0.3),), motions=4)
+    cut, energy = travelling(problem)[0], 20.0 * float(problem.floor.sum())
+    chance = luck(problem, energy, 50)
+    assert 2.1 * chance < 0.05 * (energy - float(problem.floor.sum())) < 2.5 * chance
+    held = {0: energy} | {n: energy + rise * chance for n, rise in rises.items()}
+    monkeypatch.setattr(
+        "ee_dist.discrepancy.pruning.held_by_slopes",
+        lambda _search, fits, _cut: [SimpleNamespace(energy=held[f]) for f in fits],
+    )
+    assert as_many(Search(problem), 0, {n: n for n in rises}, cut, 50) == go  # type: ignore[arg-type, dict-item]
