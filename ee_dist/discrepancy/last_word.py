@@ -11,6 +11,7 @@ from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.effects.catalogue import Hypothesis
 
+HELD_APART = "Held out from all of it"
 WORSE = 1.01
 """Times the error before from which a model is called worse."""
 
@@ -18,7 +19,8 @@ WORSE = 1.01
 @dataclass(frozen=True, eq=False)
 class LastWord:
     """Errors of the model ``before`` and the one ``after``, of all trials of ``problem`` together and of each by itself, as
-    ``compare`` gives them; ``changed``: whether they are two; ``left``: curves in which the second leaves more than noise."""
+    ``compare`` gives them; ``changed``: whether they are two; ``left``: curves in which the second leaves more than noise;
+    ``others``: the same errors as this way counts them elsewhere (of positions, say), in lines for people."""
 
     problem: Problem
     before: float
@@ -27,6 +29,7 @@ class LastWord:
     by_trial: tuple[tuple[float, float], ...]
     left: tuple[Leftover, ...]
     changed: bool
+    others: tuple[str, ...] = ()
 
     @property
     def more(self) -> bool:
@@ -34,12 +37,17 @@ class LastWord:
         return bool(self.left) or self.after > SETTLED * self.floor
 
     @property
+    def lines(self) -> list[str]:
+        """``others``, told as of these trials."""
+        return [f"{HELD_APART}: {line[:1].lower()}{line[1:]}" for line in self.others]
+
+    @property
     def text(self) -> str:
         """For people, in a sentence or two."""
         told, worse = self.problem.told, self.after > WORSE * self.before
         improved = f"improved model {told(self.after)}, " if self.changed else ""
         text = (
-            f"Held out from all of it ({listed(self.problem.trials)}): model {told(self.before)}, {improved}noise floor "
+            f"{HELD_APART} ({listed(self.problem.trials)}): model {told(self.before)}, {improved}noise floor "
             f"{told(self.floor)}."
         )
         return f"{text} There the improved model is the worse one: do not use it for such motions." if worse else text
@@ -54,4 +62,6 @@ def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis]) -> Last
     by_trial = [(first.trial_error(residuals[0], k), last.trial_error(residuals[1], k)) for k in trials]
     before, after = map(error, residuals)
     left = tuple(leftovers(last, residuals[1]))
-    return LastWord(last, before, after, last.noise_floor()[0], tuple(by_trial), left, models[0] != models[1])
+    changed = models[0] != models[1]
+    others = tuple(last.other_errors(*models if changed else models[:1]))
+    return LastWord(last, before, after, last.noise_floor()[0], tuple(by_trial), left, changed, others)

@@ -135,7 +135,7 @@ def improve_account(
     tied = bool(found.twins) or any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
     good = settled and not warnings and not unsure and not any(ties.values())
-    more = (*also, *lines, *held_out_notes(problem), *problem.notes)
+    more = (*(word.lines if word is not None else ()), *also, *lines, *held_out_notes(problem), *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
 
 

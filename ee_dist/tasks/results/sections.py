@@ -10,13 +10,13 @@ from ee_dist.discrepancy.accounts.of_explain import shown_gain
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
-from ee_dist.discrepancy.last_word import LastWord
+from ee_dist.discrepancy.last_word import HELD_APART, LastWord
 from ee_dist.discrepancy.problem import Problem, joined
 from ee_dist.discrepancy.words import percent, percents, placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share, trial_name, worst_trials
-from ee_dist.tasks.results.tables import HELD_APART, candidate_label, kind_of, last_word_rows, standing
+from ee_dist.tasks.results.tables import candidate_label, kind_of, last_word_rows, standing
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures

@@ -17,7 +17,7 @@ from ee_dist.discrepancy.evidence.intervals import called
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
-from ee_dist.discrepancy.last_word import LastWord
+from ee_dist.discrepancy.last_word import HELD_APART, LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import percent, phrase, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
@@ -27,7 +27,6 @@ from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, excess_share, step_phrase, worst_trials
 from ee_dist.tasks.results.values import kinds_of, within
 
-HELD_APART = "Held out from all of it"
 TIED_STANDING = "tied with the best"
 Column = tuple[str, bool]
 """Heading, and whether it holds numbers."""
