@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +14,12 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.pruning import AGAIN, as_many, halves, units_of, without_these
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import gauss_newton, weighed
+from ee_dist.discrepancy.search.slopes import NEAR, gauss_newton, weighed
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.trials.log import Array
 
+Units = Callable[[Model, int, int], list[list[int]]]
+"""Numbers of the parts from one to another, by what goes together."""
 NOT_FAR, CHORDS = 5.0, 3
 """How far from neutral, in halves of its interval, a value is without which it is simulated, and in how many steps the others
 follow;"""
@@ -38,7 +40,20 @@ class Told:
 def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int, open_only: bool = False) -> Told:
     """The model without the terms whose intervals hold neutral (``open_only``: of which some value may be anything), one
     after the other, the least told first, for what one of two alike leaves makes the other plain; then without those that
-    are not missed. As many of them leave as held-out data allow; the first ``own`` parts stay."""
+    are not missed. As many of them leave as held-out data allow; the first ``own`` parts stay. Masses of a body's parts go
+    together; far from the noise, where one of them that is told keeps others at their bounds, then each by itself."""
+    told, fit = _left_out(search, current, own, cut, tried, open_only, units_of)
+    problem = search.problem
+    if open_only or fit.energy <= NEAR * float(problem.floor.sum()):
+        return told
+    more, _ = _left_out(search, told.then, own, cut, tried, open_only, _each)
+    return Told(more.then, (*told.gone, *more.gone), told.instead | more.instead)
+
+
+def _left_out(
+    search: Search, current: Current, own: int, cut: Cut, tried: int, open_only: bool, units: Units
+) -> tuple[Told, Fit]:
+    """The same by ``units``, what goes together; and the fit of the model that is left."""
     gone: list[tuple[str, ...]] = []
     alike: dict[str, frozenset[str]] = {}
     fits: list[Fit] = []
@@ -47,11 +62,11 @@ def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int, 
         (fit,) = follow_valley(search, start, search.everything, prior_of(search, start), 2, (AGAIN,))
         fits, found = [*fits[:-1], fit], len(gone)
         # As far as slopes tell what goes is made up for by the rest; then all that stays is fitted anew.
-        while least := _least_told(search.problem, fit, own, open_only):
+        while least := _least_told(search.problem, fit, own, open_only, units):
             gone.append(tuple(fit.model.parts[k].name for k in least))
             fit = without_these(fit, least)
             fits.append(fit)
-        while not open_only and (less := _not_missed(search, fit, own)) is not None:
+        while not open_only and (less := _not_missed(search, fit, own, units)) is not None:
             gone.append(less.names)
             alike |= dict.fromkeys(less.names, less.others)
             fit = less.fit
@@ -62,9 +77,13 @@ def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int, 
     gone = gone[: as_many(search, fits[0], {n: fits[n] for n in halves(len(gone))}, cut, tried)]
     kept, names = fits[len(gone)], tuple(name for names in gone for name in names)
     stay = {c.name for c in kept.model.parts}
-    return Told(
-        Current(kept.model.parts, kept.u), names, frozenset(n for n in names if alike.get(n, frozenset()) & stay)
-    )
+    instead = frozenset(n for n in names if alike.get(n, frozenset()) & stay)
+    return Told(Current(kept.model.parts, kept.u), names, instead), kept
+
+
+def _each(model: Model, first: int, end: int) -> list[list[int]]:
+    """Numbers of the parts from ``first`` to ``end`` that have values, each by itself."""
+    return [[k] for k in range(first, end) if model.parts[k].size]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +95,13 @@ class _Without:
     others: frozenset[str]
 
 
-def _not_missed(search: Search, fit: Fit, own: int) -> _Without | None:
+def _not_missed(search: Search, fit: Fit, own: int, units_by: Units) -> _Without | None:
     """Of parts, from ``own`` on, that slopes tell from neutral, and which are not missed when it is simulated without them,
     those without which the model is nearest to the description. None where each is missed. Along a ridge slopes over finite
     steps rise where the residual does not, and their intervals are too narrow. How far a value is told goes with the root
     of what it costs to go without it (the likelihood ratio beside Wald's test). Of few values all are tried, by fits."""
     told, few = _told(fit, half_widths(search.problem, fit)), len(fit.u) <= FEW
-    units = [unit for unit in units_of(fit.model, own, len(told)) if few or max(told[k] for k in unit) < NOT_FAR]
+    units = [unit for unit in units_by(fit.model, own, len(told)) if few or max(told[k] for k in unit) < NOT_FAR]
     if not units:
         return None
     foretold = [without_these(fit, unit) for unit in units]
@@ -124,11 +143,11 @@ def _told(fit: Fit, half: Array) -> list[float]:
     return [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in fit.model.places]
 
 
-def _least_told(problem: Problem, fit: Fit, own: int, open_only: bool) -> list[int]:
+def _least_told(problem: Problem, fit: Fit, own: int, open_only: bool, units_by: Units) -> list[int]:
     """Numbers of the parts, from ``own`` on, that are told least, if their intervals hold neutral."""
     half, places = half_widths(problem, fit), fit.model.places
     told = _told(fit, half)
-    units = units_of(fit.model, own, len(told))
+    units = units_by(fit.model, own, len(told))
     if open_only:
         units = [unit for unit in units if any(np.max(half[places[k]], initial=0.0) > 1.0 for k in unit)]
     least = min(units, key=lambda unit: max(told[k] for k in unit), default=[])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from linear_problem import ROBOT, Linear
 from way_samples import Sample, measure, problem_by
 
 from ee_dist.discrepancy.evidence.holdout import PRIOR, travelling
@@ -141,3 +142,16 @@ def test_a_motor_that_lost_more_than_half_is_called_weak_where_all_else_seems_he
     assert STRENGTH not in {t.effect for t in terms}
     (loss,) = {round(t.values[0][1], 2) for t in terms if t.effect == "motor_weak"}
     assert loss == pytest.approx(0.62, abs=0.03)
+
+
+@pytest.mark.parametrize(("extra", "apart"), [(0.0, False), (4.0, True)])
+def test_masses_go_together_but_for_those_that_nothing_tells_far_from_the_noise(extra: float, apart: bool) -> None:
+    """At the noise some without the others would have to stand in for these. Far from it one that is told would keep others at
+    their bounds."""
+    parts = ROBOT.parts[0].name, *(p.name for p in ROBOT.parts[1:4])
+    model = Model(tuple(candidate(ROBOT, "part_mass", p) for p in parts))
+    search = Search(Linear((term("part_mass", parts[0], change=0.6),), motions=4, extra=extra))
+    (fit,) = follow_valley(search, [(model, np.zeros(4))], search.everything, PRIOR)
+    left = told_only(search, Current(fit.model.parts, fit.u), 0, travelling(search.problem)[0], 100)
+    assert {c.target for c in left.then.parts} == ({parts[0]} if apart else set(parts))
+    assert len(left.gone) == (3 if apart else 0)
