@@ -54,8 +54,9 @@ def config_digest(config: Config, options: Any) -> str:
     tree.engine.pop("threads", None)
     if tree.repair.name == "paper":  # which has no settings of its own
         tree.pop("repair")
-    if tree.system is None:
-        tree.pop("system")
+    for key in ("system", "trials", "held_out"):  # what says nothing was not there once
+        if tree[key] is None:
+            tree.pop(key)
     if tree.scenario is not None and not tree.scenario.name:
         tree.scenario.pop("name")
     return hashlib.sha256(OmegaConf.to_yaml(tree, sort_keys=True).encode()).hexdigest()

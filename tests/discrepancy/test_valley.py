@@ -17,6 +17,7 @@ from ee_dist.discrepancy.search.valley import (
     BEHIND,
     DAMPINGS,
     NARROWEST,
+    SHORTEST,
     _correct,
     _give_up,
     _next,
@@ -94,11 +95,24 @@ def _run(energy: float, before: float, width: float = 0.12, followed: int = 0) -
 def test_a_descent_narrows_step_by_step_near_the_noise_and_at_once_far_from_it() -> None:
     near, far = _run(1.0, 1.0), _run(100.0, 100.0)
     for run in (near, far):
-        _next(run, 10.0, NARROWEST, True)
+        _next(run, 10.0, False, True)
     assert near.width == 0.06 and far.width == NARROWEST
     assert not (near.done or far.done), "the narrowest slopes decide"
-    _next(far, 10.0, NARROWEST, True)
+    _next(far, 10.0, False, True)
     assert far.done
+
+
+def test_a_settled_descent_tries_its_slopes_with_shorter_steps_before_it_ends() -> None:
+    """Off the end of a range, or where it bends, the first steps lead nowhere, and shorter ones do."""
+    stuck = _run(100.0, 100.0)
+    _next(stuck, 10.0, True, True)
+    assert stuck.again and not stuck.done and not stuck.followed
+    stuck.damping = SHORTEST
+    _next(stuck, 10.0, True, True)
+    assert stuck.done and not stuck.again
+    better = _run(99.9, 100.0)
+    _next(better, 10.0, True, True)
+    assert better.done and not better.again, "a step that takes next to nothing ends it as before"
 
 
 def test_what_pays_is_followed_while_slopes_may_be_taken_again() -> None:
@@ -108,18 +122,18 @@ def test_what_pays_is_followed_while_slopes_may_be_taken_again() -> None:
 
 
 def _after(run: _Run, more: bool) -> int:
-    _next(run, 10.0, NARROWEST, more)
+    _next(run, 10.0, False, more)
     return run.followed
 
 
 def test_a_descent_that_stands_still_far_above_another_is_given_up() -> None:
     best, still, going = _run(1.0, 1.0), _run(2.5, 2.5), _run(2.5, 5.0)
     for run in (best, still, going):
-        _next(run, 10.0, NARROWEST, True)
+        _next(run, 10.0, False, True)
     _give_up([best, still, going])
     assert (best.done, still.done, going.done) == (False, True, False)
     near = _run(0.99 / BEHIND, 0.99 / BEHIND)
-    _next(near, 10.0, NARROWEST, True)
+    _next(near, 10.0, False, True)
     _give_up([best, near])
     assert not near.done
 

@@ -19,7 +19,7 @@ from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.ways import AUTO, way_of
 from ee_dist.trials.log import SensorLog
 
-ROWS = 200
+ROWS = 300
 
 
 def measured(command: str) -> Measurements:
