@@ -25,7 +25,7 @@ def is_xacro(file: Path) -> bool:
 
 
 def expanded(file: Path) -> bytes | None:
-    """The URDF that a xacro makes; None where the program is not installed. Raises XacroError with the last line it said."""
+    """The URDF that a xacro makes; None where the program is not installed. Raises XacroError with what it said."""
     program = shutil.which(PROGRAM)
     if program is None:
         return None
@@ -36,6 +36,13 @@ def expanded(file: Path) -> bytes | None:
     except OSError as error:
         raise XacroError(f"{file}: xacro cannot be run ({error.strerror})") from None
     if done.returncode:
-        said = done.stderr.decode(errors="replace").strip().splitlines() or ["nothing was said"]
-        raise XacroError(f"{file}: xacro failed: {said[-1][:300]}")
+        raise XacroError(f"{file}: xacro failed: {_cause(done.stderr.decode(errors='replace').strip().splitlines())}")
     return done.stdout
+
+
+def _cause(said: list[str]) -> str:
+    """What it said last, and before that what was wrong, which it follows with a line for each file on the way."""
+    if not said:
+        return "nothing was said"
+    causes = [line for line in said[:-1] if not line.startswith("when ")] if said[-1].startswith("when ") else []
+    return " ".join([*(c[:300] for c in causes[-1:]), said[-1][:300]])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.base_model import residual_as_it_is
@@ -62,6 +63,7 @@ def run(config: Config, options: Options, out: Path) -> tuple[Problem, Compariso
     if options.rerun:
         compare_scene(problem, found, account, measured.model, out / "compare.rrd", following)
     show_comparison(console, problem, found)
-    console.print(f"By {way.name}: {way.why}.", *remarks, sep="\n", highlight=False, markup=False)
+    apart = [f"Left out of this: {listed(measured.held_out)}."] if measured.held_out else []
+    console.print(f"By {way.name}: {way.why}.", *apart, *remarks, sep="\n", highlight=False, markup=False)
     show_account(console, account, out, following)
     return problem, found, account

@@ -115,3 +115,12 @@ def test_goals_of_positions_in_the_log_of_drives_described_to_obey_torques_are_t
     (asked,) = (q for q in proposal.questions if q.startswith("commands"))
     assert "no columns look like torques" in asked and "the positions follow" in asked and "by 50 ms" in asked
     assert "'command: position' with kp and kd" in asked
+
+
+@pytest.mark.parametrize("rate_hz", [161.0, 120.0, 80.0])
+def test_rows_between_readings_that_come_a_little_more_seldom_are_none(rate_hz: float) -> None:
+    """A log of 161 readings a second on a grid of 200 rows has no 200 readings: a third would be means of two."""
+    at_s, read_s = np.arange(2000) / 200, np.arange(int(10 * rate_hz)) / rate_hz
+    found = filled(at_s, read_s)
+    assert found is not None and abs(int((~found).sum()) - len(read_s)) <= 1
+    assert filled(at_s, np.arange(1950) / 195) is None, "as good as the grid"

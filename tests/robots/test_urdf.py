@@ -167,6 +167,11 @@ def test_a_xacro_is_expanded_by_the_program_that_is_installed(tmp_path: Path, mo
     file.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="broken"/>')
     with pytest.raises(UrdfError, match=r"arm.urdf.xacro: xacro failed: No such macro: arm$"):
         read_urdf(file)
+    program.write_text(
+        "#!/bin/sh\nprintf 'when: no\\nno module ament\\nwhen processing file: a\\nwhen processing file: b\\n' >&2; exit 2\n"
+    )
+    with pytest.raises(UrdfError, match=r"xacro failed: no module ament when processing file: b$"):
+        read_urdf(file)
 
 
 def test_broken_xml_names_the_line(tmp_path: Path) -> None:
