@@ -20,6 +20,11 @@ PLACEHOLDER = 50.0
 """Times what a robot needs from which a limit is none. Servos that CAD programs enter too strong have ten times as much."""
 
 
+ALIKE, AT_ALL = 4, 12.0
+"""Joints that all have one number, and times what the most loaded of them needs from which it is none: motors that hold an arm
+are not those that turn its hand."""
+
+
 @dataclass(frozen=True)
 class Placeholder:
     """A stated ``limit`` of a joint that is none; ``needed``: to hold the whole robot stretched out and to speed the joint up."""
@@ -37,16 +42,17 @@ def guessed_limit(joint: Joint, body: Body, inertia: float) -> float:
 def placeholders(body: Body, inertia: Mapping[str, float]) -> dict[str, Placeholder]:
     """By joint, of those whose drive the file leaves open. ``inertia`` is what each joint feels."""
     stretched = max(_stretched(body), LEVER_M * _weight(body))
-    found = {}
+    stated = []
     for joint in body.moving:
         limit = body.drives.get(joint.name, {}).get("torque_limit")
         if joint.name in body.driven or limit is None:
             continue
         hold = _weight(body) if joint.kind == "slide" else stretched
-        needed = hold + TORQUE_PER_INERTIA * inertia[joint.name]
-        if float(limit) > PLACEHOLDER * needed:
-            found[joint.name] = Placeholder(joint, float(limit), needed)
-    return found
+        stated.append(Placeholder(joint, float(limit), hold + TORQUE_PER_INERTIA * inertia[joint.name]))
+    hinges = [p for p in stated if p.joint.kind == "hinge"]
+    most = max((p.needed for p in hinges), default=0.0)
+    one = len(hinges) >= ALIKE and len({p.limit for p in hinges}) == 1 and hinges[0].limit > AT_ALL * most
+    return {p.joint.name: p for p in stated if p.limit > PLACEHOLDER * p.needed or (one and p.joint.kind == "hinge")}
 
 
 def told(found: Mapping[str, Placeholder], body: Body) -> list[str]:

@@ -65,3 +65,35 @@ def test_a_heavy_robot_needs_what_a_light_one_does_not(tmp_path: Path, kind: str
     ]
     heavy = begun(tmp_path, 'effort="5000"', 'effort="300"', 30.0, kind)
     assert not [line for line in heavy.assumed if "no real" in line]
+
+
+def chain(folder: Path, efforts: list[float], mass: float = 0.5) -> Starter:
+    parts, below = ['<link name="base"/>'], "base"
+    for k, effort in enumerate(efforts):
+        name = f"link_{k}"
+        parts += [
+            JOINT.format(name=f"j{k}", kind="revolute", parent=below, child=name, effort=f'effort="{effort:g}"'),
+            LINK.format(name=name, com=0.1, mass=mass),
+        ]
+        below = name
+    file = folder / "chain.urdf"
+    file.write_text(f'<robot name="chain">{"".join(parts)}</robot>')
+    return starter(read_urdf(file), "urdf", "chain.urdf", "chain.urdf")
+
+
+@pytest.mark.parametrize(
+    ("efforts", "none"),
+    [
+        ([200.0] * 5, True),
+        ([200.0] * 3, False),
+        ([200.0] * 4 + [5.0], False),
+        ([40.0] * 5, False),
+    ],
+)
+def test_one_large_number_at_all_joints_is_none(tmp_path: Path, efforts: list[float], none: bool) -> None:
+    """It is not fifty times what the first joint needs; but nobody turns a hand by the motor that holds the arm. Servos of one
+    kind at all joints are some times what the first needs."""
+    found = chain(tmp_path, efforts)
+    assert bool([line for line in found.assumed if "no real limit" in line]) is none
+    if none:
+        assert all(d.torque_limit < 0.2 * efforts[0] for d in found.robot.drives)
