@@ -44,3 +44,13 @@ def test_a_pair_of_joints_needs_no_quotes():
 )
 def test_words_stay_words(name):
     assert read(command([setting("effect", name)])) == {"effect": name}
+
+
+@pytest.mark.parametrize(
+    ("asked_for", "word"),
+    [([10, 11], "trials=[10,11]"), (["slow"], "trials=slow"), (["a b", 3], "trials=['a b','3']"), (None, ""), ([], "")],
+)
+def test_trials_are_asked_for_as_they_were(asked_for, word):
+    words = asked("compare", Config(measured="a.mcap", trials=asked_for))
+    assert [w for w in words if w.startswith("trials")] == ([word] if word else [])
+    read(command(words))

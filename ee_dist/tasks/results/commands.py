@@ -46,7 +46,9 @@ def asked(task: str, config: Config, by: str = AUTO, *more: str) -> list[str]:
     words = [f"task={task}", setting("measured", config.measured)]
     for key in ("trials", "held_out"):
         chosen = entries(getattr(config, key))
-        if chosen:
+        if all(isinstance(name, int) for name in chosen):
+            words += [f"{key}=[{','.join(map(str, chosen))}]"] if chosen else []
+        else:
             words.append(setting(key, [str(name) for name in chosen]))
     if config.model is not None:
         words.append(setting("model", config.model))
