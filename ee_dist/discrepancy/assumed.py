@@ -35,6 +35,11 @@ LIMITS = (0.0, 0.7)
 """Shares of the stated torque limit that are not there, to look from."""
 STARTS = 3
 """Of the starts that many are fitted."""
+CARRIED, MUCH = "weight_carried", 0.9
+"""Controllers of arms that are sold carry the weight. Held up by gains alone it takes stiff ones and much friction, which no
+single effect leads away from: soft gains sag. So they are looked for with most of it carried, too,"""
+LESS = 0.9
+"""and found so where that leaves less than this share of what is above the noise otherwise."""
 LEAST, MOST = -0.7, 1.0
 """Changes of mass, as shares, that parts may have all over a robot of which gains were assumed: torques have no scale then but
 the masses, and all may grow together. With gains that are known they may go farther: a load on a light part is many times it."""
@@ -59,24 +64,40 @@ def assumed_text(robot: Robot) -> list[str]:
 def assumed_drives(
     search: Search, pool: Iterable[Candidate], taken: Iterable[str] = ()
 ) -> tuple[Proposal, Array] | None:
-    """Gains and friction of all drives whose position gain was assumed, and values u to fit them from; None where none was,
-    where it is ``taken`` (names of candidates) already, or where the pool has not the gain and another of these effects."""
-    robot = search.problem.robot
+    """Gains and friction of all drives whose position gain was assumed, with the weight that their controllers carry where it is
+    much, and values u to fit them from; None where none was, where it is ``taken`` (names of candidates) already, or where the
+    pool has not the gain and another of these effects."""
+    robot, pool = search.problem.robot, list(pool)
     joints, names = robot.assumed_joints("kp"), {c.effect.name for c in pool}
     if not joints or TOGETHER[0] not in names:
         return None
     parts = tuple(c for name in TOGETHER if name in names for c in _at(robot, _by_factor(robot, name, joints), joints))
     if len(parts) < 2 or {c.name for c in parts} & set(taken):
         return None
+    found, u, energy = _fitted(search, joints, parts)
+    carried = tuple(c for c in pool if c.effect.name == CARRIED and c.name not in taken)
+    if carried:
+        noise = float(search.problem.floor[search.everything].sum())
+        other = _fitted(search, joints, (*parts, *carried))
+        if other[2] - noise < LESS * (energy - noise):
+            found, u, _ = other
+    return Proposal(found, LABEL), u
+
+
+def _fitted(
+    search: Search, joints: Sequence[str], parts: tuple[Candidate, ...]
+) -> tuple[tuple[Candidate, ...], Array, float]:
+    """The parts with their best values u from the best of a grid of starts, and the energy that they leave."""
     model = Model(parts)
-    starts = _starts(robot, joints, model)
+    starts = _starts(search.problem.robot, joints, model)
     energies = [
         float(r @ r) if np.isfinite(r).all() else np.inf
         for r in search.residuals([model.hypothesis(u) for u in starts])
     ]
     best = [starts[k] for k in np.argsort(energies, kind="stable")[:STARTS]]
     fits = follow_valley(search, [(model, u) for u in best], search.everything)
-    return Proposal(parts, LABEL), min(fits, key=lambda f: f.energy).u
+    fit = min(fits, key=lambda f: f.energy)
+    return parts, fit.u, fit.energy
 
 
 def puts_right(robot: Robot, c: Candidate) -> bool:
@@ -125,6 +146,7 @@ def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
             "speed_gain": gain,
             "torque_limit": limit,
             "coulomb_friction": lag * gain * stiffness,
+            CARRIED: MUCH,
         }
         mains = [(c, c.effect.main) for c in model.parts]
         u = [c.shares({p.name: values.get(c.effect.name, p.neutral)}) for c, p in mains]

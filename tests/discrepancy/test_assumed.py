@@ -26,7 +26,7 @@ from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import Proposal, candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.effects.catalogue import Hypothesis, apply, term
+from ee_dist.effects.catalogue import Hypothesis, apply, find, term
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -55,11 +55,31 @@ def test_gains_that_were_assumed_are_found_together_with_friction() -> None:
     proposal, u = assumed_drives(Search(problem), candidates(problem.robot)) or pytest.fail("nothing was proposed")
     terms = Model(proposal.parts).hypothesis(u)
     found = {t.effect: dict(t.values) for t in terms}
-    assert {t.target for t in terms} == {"all_joints"}
+    assert {t.target for t in terms} == {"all_joints"}, "and no weight is carried"
     assert found["position_gain"]["factor"] == pytest.approx(1 / STIFFER, rel=0.15)
     assert found["coulomb_friction"]["torque_nm"] == pytest.approx(np.mean(DRIER), rel=0.5)
     as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
     assert better < 0.2 * as_it_is
+
+
+def test_weight_that_controllers_carry_is_found_with_them() -> None:
+    """Soft gains would sag under it: without it being carried they seem stiff, and dry friction holds the arm."""
+    sample: Sample = samples()["arm"]
+    (mounting,) = find("weight_carried").targets(sample.robot)
+    soft, heavy = term("position_gain", "all_joints", factor=0.3), replace(
+        sample.robot, parts=tuple(replace(p, mass_kg=3 * p.mass_kg) for p in sample.robot.parts)
+    )  # fmt: skip
+    friction = tuple(term("coulomb_friction", j, torque_nm=c) for j, c in zip(heavy.motor_names, DRIER, strict=True))
+    hidden = (soft, term("weight_carried", mounting, share=0.95), *friction)
+    problem = problem_by("open_loop", measure(replace(sample, robot=heavy), hidden), guessed(heavy))
+    proposal, u = assumed_drives(Search(problem), candidates(problem.robot)) or pytest.fail("nothing was proposed")
+    found = {t.effect: dict(t.values) for t in Model(proposal.parts).hypothesis(u)}
+    assert proposal.guess and found["weight_carried"]["share"] == pytest.approx(0.95, abs=0.1)
+    assert found["position_gain"]["factor"] == pytest.approx(0.3 / STIFFER, rel=0.3)
+    other, _ = assumed_drives(Search(problem), candidates(problem.robot, without=["weight_carried"])) or pytest.fail(
+        "nothing was proposed"
+    )
+    assert "weight_carried" not in {c.effect.name for c in other.parts}
 
 
 def test_no_motor_is_called_weak_beside_a_guess() -> None:

@@ -269,7 +269,8 @@ class Proposal:
     def guess(self) -> bool:
         """Whether it puts right no more than what a description only assumed; with what else such a drive has, if each is one
         value for all of just these joints."""
-        return all(c.guess for c in self.parts) or (self.parts[0].guess and len({c.target for c in self.parts}) == 1)
+        at = {c.target for c in self.parts if c.effect.family != "world"}
+        return all(c.guess for c in self.parts) or (self.parts[0].guess and len(at) == 1)
 
 
 def values_of(parts: Sequence[Candidate], terms: Hypothesis) -> Array:
