@@ -174,8 +174,11 @@ class _Import:
             read_s = np.interp(read_s[(read_s >= 0) & (read_s <= rows_s[-1])], rows_s, self.at_s)
         found = filled(self.at_s, read_s)
         if found is not None:
+            some, rows = int((~found).sum()), len(found)
             self.report.done.append(
-                f"{int((~found).sum())} of {len(found)} rows are readings of the sensors: only these are compared"
+                f"{some} of {rows} rows are readings of the sensors: only these are compared"
+                if some <= len(read_s)
+                else f"{rows - some} of {rows} rows lie in gaps between readings: they are not compared"
             )
         return found
 

@@ -22,9 +22,8 @@ MOST_AT_ONCE = 13
 """Samples of which one is kept in a single step."""
 SLACK = 1e-3
 """Share of a step by which a time stamp may be late and still be the row's own."""
-FILLED = 1.1
-"""Rows for each reading from which some rows are no readings, and only those that are count: what lies between two of 161
-readings a second on a grid of 200 rows is a mean of them, with half the noise."""
+FILLED = 1.5
+"""Rows for each reading from which most rows are no readings, and only those that are count."""
 GAP = 5.0
 """Steps longer than this many medians are gaps."""
 

@@ -117,10 +117,14 @@ def test_goals_of_positions_in_the_log_of_drives_described_to_obey_torques_are_t
     assert "'command: position' with kp and kd" in asked
 
 
-@pytest.mark.parametrize("rate_hz", [161.0, 120.0, 80.0])
-def test_rows_between_readings_that_come_a_little_more_seldom_are_none(rate_hz: float) -> None:
-    """A log of 161 readings a second on a grid of 200 rows has no 200 readings: a third would be means of two."""
-    at_s, read_s = np.arange(2000) / 200, np.arange(int(10 * rate_hz)) / rate_hz
-    found = filled(at_s, read_s)
-    assert found is not None and abs(int((~found).sum()) - len(read_s)) <= 1
-    assert filled(at_s, np.arange(1950) / 195) is None, "as good as the grid"
+@pytest.mark.parametrize(
+    ("rate_hz", "said"), [(40.0, "rows are readings of the sensors"), (80.0, "lie in gaps between")]
+)
+def test_the_report_counts_no_more_readings_than_there_are(tmp_path: Path, rate_hz: float, said: str) -> None:
+    """Of 80 readings a second on a grid of 100 rows not all rows are readings, and those in a gap are none at all."""
+    t = np.arange(int(10 * rate_hz)) / rate_hz
+    t = np.concatenate([t, t[-1] + 0.5 + t])
+    frame = logs.frame_of(t, wave(t - 0.05), wave(t))
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, frame))
+    (line,) = (d for d in report.done if "rows are readings" in d or "lie in gaps" in d)
+    assert said in line and (said.startswith("lie") or int(line.split()[0]) <= len(t))
