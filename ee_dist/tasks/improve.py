@@ -28,7 +28,7 @@ from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError
-from ee_dist.tasks.measurements import Measurements, load, load_held_out
+from ee_dist.tasks.measurements import Measurements, load, load_held_out, of_held_out
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import asked, planning
@@ -40,7 +40,6 @@ from ee_dist.tasks.results.summaries import of_improvement
 from ee_dist.tasks.results.tables import show_account, show_candidates, show_ladder, show_last_word
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
-from ee_dist.tasks.trial_choice import entries
 from ee_dist.tasks.unfinished import keep_so_far
 from ee_dist.tasks.ways import Way, known_way, open_loop, way_of
 from ee_dist.viewing.report import write_page
@@ -112,7 +111,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     write_summary(
         out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path), word)
     )
-    following = asked("compare", _next(replace(config, model=str(path))), options.by)
+    # What was fitted is shown already: what was held out is looked at next, where something was.
+    improved = replace(config, model=str(path))
+    following = asked("compare", of_held_out(improved) or improved, options.by)
     story = links(out, measured.files, config.model)
     write_page(improve_page(problem, measured, found, account, following, story, word), out / "report.html")
     if options.rerun:
@@ -131,11 +132,6 @@ def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis) ->
     in the same way."""
     models = (apart.model, terms)
     return last_word([way.make(replace(apart, model=m), config) for m in models], models)
-
-
-def _next(config: Config) -> Config:
-    """Settings that look at what was held out, where something was: what was fitted is shown already."""
-    return replace(config, trials=config.held_out, held_out=None) if entries(config.held_out) else config
 
 
 def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:

@@ -131,9 +131,15 @@ def load(config: Config) -> Measurements:
     )
 
 
+def of_held_out(config: Config) -> Config | None:
+    """Settings that look at the trials that ``config.held_out`` names, alone; None where it names none."""
+    return replace(config, trials=config.held_out, held_out=None) if entries(config.held_out) else None
+
+
 def load_held_out(config: Config) -> Measurements | None:
-    """The trials that ``config.held_out`` names, alone; None where it names none. Raises as ``load`` does."""
-    return load(replace(config, trials=config.held_out, held_out=None)) if entries(config.held_out) else None
+    """Those trials; None where none are named. Raises as ``load`` does."""
+    alone = of_held_out(config)
+    return None if alone is None else load(alone)
 
 
 def _with_room(robot: Robot, trials: Sequence[MeasuredTrial], remarks: list[str]) -> Robot:
