@@ -28,7 +28,7 @@ from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS as SLOPES
-from ee_dist.discrepancy.search.slopes import slopes_at
+from ee_dist.discrepancy.search.slopes import NEAR, slopes_at
 from ee_dist.discrepancy.search.trials import calm_trials, telling, telling_values
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.discrepancy.sharing import apart, distinct, shared, singles, taken_apart
@@ -309,8 +309,13 @@ class _Look:
             chosen = sorted({*chosen, *(k for k, c in enumerate(kept.parts) if c.effect.name == kind)})
             taken.append(chosen)
         starts = [(Model(tuple(kept.parts[k] for k in some)), _values(kept.u, places, some)) for some in taken]
-        # Shown is how far each step comes, and most have many values: they are fitted once.
-        fitted = held_by_slopes(search, fit_all(search, starts, None, SLOPES[2:], PRIOR), found.cut)
+        # Shown is how far each step comes, and most have many values. Where slopes that are known lead nowhere values that have
+        # seen all data would be told as held out, so that far from the noise each turn is fitted anew.
+        fits = fit_all(search, starts, None, SLOPES[2:], PRIOR)
+        if fits[-1].energy > NEAR * float(problem.floor.sum()):
+            fitted = cross_fit(search, [(f.model, f.u) for f in fits], found.cut)
+        else:
+            fitted = held_by_slopes(search, fits, found.cut)
         energies = [held.energy for held in fitted]
         last, model, held_energy = self._as_far(found, starts, energies)
         for k in range(last + 1):
