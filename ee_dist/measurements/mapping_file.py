@@ -129,10 +129,10 @@ def _check_files(mapping: Mapping) -> None:
     if not filed:
         return
     for name, clock in mapping.tables.items():
-        if "{trial}" not in clock.file:
+        if not clock.file or clock.file.count("{trial}") > 1:
             raise MeasurementError(
-                f"{mapping.source}: tables: {name}: file: expected a name with {{trial}} in it, such as "
-                f"'{{trial}}_{name}.csv', not {quoted(clock.file)}"
+                f"{mapping.source}: tables: {name}: file: expected a name such as '{{trial}}_{name}.csv' or "
+                f"'{{trial}}/{name}.csv', or '{name}.csv' where each trial has a folder, not {quoted(clock.file)}"
             )
     for group, name, c in mapping.columns():
         if c.table not in mapping.tables:

@@ -89,9 +89,11 @@ def _joined(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
     parts: dict[Path, tuple[str, str]] = {}
     for file in files:
         for name, clock in mapping.tables.items():
-            found = _pattern(clock).fullmatch(file.name)
+            # As many folders as the pattern names count.
+            own = "/".join(file.absolute().parts[-1 - clock.file.count("/") :])
+            found = _pattern(clock).fullmatch(own)
             if found:
-                parts[file] = (found["trial"], name)
+                parts[file] = (found.groupdict().get("trial", ""), name)
                 break
     if not parts:
         shapes = ", ".join(c.file for c in mapping.tables.values())
@@ -116,10 +118,11 @@ def _joined(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
                     f"for {quoted(name)}; name the folder, or both files"
                 )
         own = " ".join(w for w in (folders[folder] if folder else "", trial.strip("_- .")) if w)
-        out.append(Recorded(own or trial or "trial", tuple(halves[n] for n in mapping.tables)))
+        home = next(iter(halves.values())).path.absolute().parent.name
+        out.append(Recorded(own or trial or home or "trial", tuple(halves[n] for n in mapping.tables)))
     return out
 
 
 def _pattern(clock: Clock) -> re.Pattern[str]:
-    before, _, after = clock.file.partition("{trial}")
-    return re.compile(f"{re.escape(before)}(?P<trial>.*){re.escape(after)}", re.IGNORECASE)
+    """What a file's name is like; without {trial} its folder is the trial."""
+    return re.compile(re.escape(clock.file).replace(re.escape("{trial}"), "(?P<trial>[^/]*)"), re.IGNORECASE)

@@ -106,6 +106,27 @@ def test_two_files_with_their_own_clocks_and_lists_in_cells(tmp_path: Path) -> N
         assert float(said.split()[1]) == pytest.approx(-12.0 + 0.04, abs=0.02)
 
 
+@pytest.mark.parametrize("other", ["ee", "measured"])
+def test_commands_and_what_is_called_nothing_in_one_folder(tmp_path: Path, other: str) -> None:
+    """Two files with the same columns are one trial where one of them is called commands."""
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    m = samples.motion()
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for name, values in ((other, m["q"]), ("cmd", m["g"])):
+        columns = {"time": m["t"]} | {j: values[:, k] for k, j in enumerate(samples.JOINTS)}
+        pd.DataFrame(columns).to_csv(folder / f"{name}.csv", index=False)
+    proposal = proposal_for(sorted(folder.iterdir()), robot, Hints())
+    assert not proposal.questions
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(tmp_path / "chain.yaml"), "run"))
+    ((record, _),) = import_files(sorted(folder.iterdir()), read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert record.name == "run"
+    assert np.abs(record.log.sensors[:, 0] - m["q"][-len(record.log) :, 0]).max() < 1e-6
+    # Each of two clocks that begin at 0 may be its logger's own: where the signals fit best, give or take the lag.
+    away = np.abs(m["g"][:, 0, None] - record.log.commands[:, 0]).min(axis=0)
+    assert np.abs(away).max() < 0.01
+
+
 SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 
 

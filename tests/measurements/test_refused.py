@@ -83,7 +83,7 @@ def q(**changes: Any) -> dict[str, Any]:
         ({"settings": {"effect": "x"}}, "settings: expected a list of effects"),
         ({"time": {"column": "t", "unit": "s", "offset": 3}}, "a time has no sign and no offset"),
         ({"time": {"rate_hz": 0}}, "rate_hz: expected a positive number"),
-        ({"tables": {"a": {"file": "a.csv"}}}, "expected a name with {trial} in it"),
+        ({"tables": {"a": {"file": "a.csv"}, "b": {}}}, "tables: b: file: expected a name such as '{trial}_b.csv'"),
         (
             {"sensors": GOOD["sensors"] | {"speed": {"column": "q", "unit": "rad/s"}}},
             "column 'q' is sensors position and also",

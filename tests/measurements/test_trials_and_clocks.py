@@ -65,11 +65,11 @@ def two_files(folder: Path, shift_s: float, epoch_s: float = 0.0, trial: str = "
     sent.assign(t=unit * (sent["t"] + epoch_s + shift_s)).to_csv(folder / f"{trial}_commands.csv", index=False)
 
 
-def two_tables(**clock: Any) -> Mapping:
+def two_tables(named: str = "{trial}_", **clock: Any) -> Mapping:
     return mapping(
         tables={
-            "states": {"file": "{trial}_states.csv"},
-            "commands": {"file": "{trial}_commands.csv", "time": {"column": "t", "unit": "ms"}} | clock,
+            "states": {"file": f"{named}states.csv"},
+            "commands": {"file": f"{named}commands.csv", "time": {"column": "t", "unit": "ms"}} | clock,
         },
         sensors={
             "position": {"table": "states", "column": "q", "unit": "rad"},
@@ -105,6 +105,20 @@ def test_a_stated_offset_and_a_common_epoch_are_taken_as_they_are(tmp_path: Path
     ((record, report),) = import_files(sorted(other.glob("*.csv")), two_tables(), ROBOT)
     assert any("one epoch" in d for d in report.done)
     assert record.log.commands[:, 0] == pytest.approx(held, abs=1e-9)
+
+
+@pytest.mark.parametrize("named", ["", "{trial}/"])
+@pytest.mark.parametrize("runs", [["run1"], ["run1", "run2"]])
+def test_a_folder_for_each_trial(tmp_path: Path, named: str, runs: list[str]) -> None:
+    for run in runs:
+        (tmp_path / run).mkdir()
+        two_files(tmp_path, 5.0, trial=f"{run}/")
+        for file in (tmp_path / run).iterdir():
+            file.rename(file.with_name(file.name.removeprefix("_")))
+    found = import_files(sorted(tmp_path.glob("*/*.csv")), two_tables(named, offset_s=-5.0), ROBOT)
+    assert [record.name for record, _ in found] == runs
+    with pytest.raises(MeasurementError, match="its other half is missing"):
+        import_files([tmp_path / "run1" / "states.csv"], two_tables(named), ROBOT)
 
 
 def test_what_the_signals_do_not_tell_is_asked(tmp_path: Path) -> None:

@@ -47,11 +47,13 @@ def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints)
 
 def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Table]] | None:
     """Files of two or more kinds, equally many, with a word of its own in each kind's names: (pattern, table) by word. Of
-    files with the same columns those called commands are another kind than those called measurements. Loggers write columns
-    in whatever order, so that only which there are counts; a file with nothing but some of another's columns is of its kind."""
+    files with the same columns those called commands are another kind than those called measurements, or than the equally many
+    that are called neither. Loggers write columns in whatever order, so that only which there are counts; a file with nothing
+    but some of another's columns is of its kind."""
     kinds: dict[tuple[bool | None, frozenset[str]], list[tuple[Path, Table]]] = {}
     roles = [role_of(f.stem) for f in files]
-    told = True in roles and False in roles
+    sent = roles.count(True)
+    told = sent > 0 and (False in roles or 2 * sent == len(roles))
     for k, file in enumerate(files):
         found = [first] if not k else list(read(file))
         if len(found) != 1 or len(found[0].tables) != 1:
