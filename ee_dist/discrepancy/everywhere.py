@@ -27,8 +27,8 @@ from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import WIDTHS as SLOPES
 from ee_dist.discrepancy.search.slopes import NEAR, slopes_at
+from ee_dist.discrepancy.search.slopes import WIDTHS as SLOPES
 from ee_dist.discrepancy.search.trials import calm_trials, telling, telling_values
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.discrepancy.sharing import apart, distinct, shared, singles, taken_apart
