@@ -64,6 +64,9 @@ WORSE = "with all values fitted anew, data held out are foretold no better"
 NOTHING_LEFT = "nothing is left that counts, above the noise and above the resolution at which channels are compared"
 ASKED = "the effects asked for were added"
 REFITTED = "only the model's own values were to be fitted"
+ONE_MORE, AT_ONCE = "one more effect", "all small effects at once"
+NOT_TOLD, IN_PLACE = "leaving out what is not told", "what does as well in its place"
+"""What the search is at, for who waits."""
 EXPLAINED, BETTER = "explained", "better_not_explained"
 
 
@@ -109,7 +112,7 @@ def improve(
             no_better = {c.name for p in worse for c in p.parts}
             others = [c for c in _offered(problem.robot, pool, current, ladder) if c.name not in no_better]
             others = on_top_of(problem.robot, has, others)
-            last = examine(search, current, others, effort)
+            last = examine(search.doing(ONE_MORE), current, others, effort)
             if own and len(current.parts) == own:
                 kept = as_it_was(search, last, before, as_it_is, others, effort)
                 if kept is not None:
@@ -122,7 +125,8 @@ def improve(
             ready = anew < OFTEN and special != beside and bool(special) if spread else len(current.parts) != looked
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
-                found = everywhere(search, current, own, pool, travelling(problem), spread > 0, alike, [*seen.values()])
+                at_once, cuts = search.doing(AT_ONCE), travelling(problem)
+                found = everywhere(at_once, current, own, pool, cuts, spread > 0, alike, [*seen.values()])
                 looked = len(current.parts)
                 # Where a single one does more than all of them, it goes first, and they are looked for beside it.
                 if found is None or best is None or found.held < float(best.held.sum()):
@@ -192,7 +196,7 @@ def _last_steps(
     while True:
         if spread or len(current.parts) - own > 1:
             # Of two that leave the same mark the values may be anything, and one of them says it all.
-            told = told_only(search, current, own, strictest(problem), len(pool), not spread)
+            told = told_only(search.doing(NOT_TOLD), current, own, strictest(problem), len(pool), not spread)
             current, none = without_neutral(told.then, own)
             asked = told.instead
             if told.gone or none:
@@ -202,7 +206,7 @@ def _last_steps(
         if len(current.parts) <= own + 1:
             return current, []
         before = {c.name for c in current.parts}
-        current, twins, step = nearest(search, current, own, pool, asked)
+        current, twins, step = nearest(search.doing(IN_PLACE), current, own, pool, asked)
         if step is None:
             return current, twins
         climb(step)
@@ -212,7 +216,7 @@ def _last_steps(
         left = leftovers(problem, search.on(current.hypothesis).base())
         if _settled(left, step.error_heldout, problem.noise_floor()[0]):
             return current, twins
-        found = everywhere(search, current, own, pool, travelling(problem), True, (), seen)
+        found = everywhere(search.doing(AT_ONCE), current, own, pool, travelling(problem), True, (), seen)
         if found is None:
             return current, twins
         often, current = often - 1, found.current

@@ -10,8 +10,8 @@ from rich.text import Text
 
 from ee_dist.discrepancy.search.search import Progress, quiet
 
-EVERY_S = 15.0
-"""Where there is no terminal, a stage says so often how far it is."""
+EVERY_S, STEPS_S = 15.0, 10.0
+"""Where there is no terminal, a stage says so often how far it is, and, where it has several steps, at which of them."""
 
 
 class SearchProgress:
@@ -20,6 +20,8 @@ class SearchProgress:
 
     def __init__(self, console: Console, told: Progress = quiet) -> None:
         self.console, self.stage, self.told, self.share = console, "", told, 0.0
+        self.said_of, self.other = "", False
+        """Of which stage the last line was, and whether there was another since."""
         self.began = self.stage_began = self.said = self.heard = time.monotonic()
         self.short = True
         """Whether nothing was said yet of how long this stage takes."""
@@ -34,24 +36,29 @@ class SearchProgress:
         if self.status:
             self.status.stop()
 
-    def __call__(self, what: str, share: float) -> None:
+    def __call__(self, what: str, share: float, error: float | None = None) -> None:
         now = time.monotonic()
-        self.told(what, share)
+        self.told(what, share, error)
         another = what != self.stage
         if another or share <= self.share:
             # It, or the same one once more, began when the last word of what came before was said. Of many alike in a row each
             # would say anew how long it takes.
             self.stage_began, self.short = self.heard, self.short or another
+        begins = another and (not self.said_of or what.partition(": ")[0] != self.said_of.partition(": ")[0])
+        self.other |= what != self.said_of
+        another = begins or (self.other and now - self.said >= STEPS_S)
         self.stage, self.share, self.heard = what, share, now
         left = (now - self.stage_began) * (1 - share) / share if share > 0 else 0.0
-        ahead = f"{what} {share:.0%}, about {left:.0f} s left of this stage"
+        so_far = "" if error is None else f", error {error:.3g}"
+        ahead = f"{what} {share:.0%}{so_far}, about {left:.0f} s left of this stage"
         if self.status:
             self.status.update(Text(f"{ahead}, {now - self.began:.0f} s so far"))
             return
         long = left >= EVERY_S and (self.short or now - self.said >= EVERY_S)
         if another or long:
-            self.said, self.short = now, not long
-            self.console.print(f"{now - self.began:6.0f} s  {ahead if long else what}", style="dim", highlight=False)
+            self.said, self.short, self.said_of, self.other = now, not long, what, False
+            text = ahead if long else f"{what}{so_far}"
+            self.console.print(f"{now - self.began:6.0f} s  {text}", style="dim", highlight=False, soft_wrap=True)
 
     def note(self, text: str) -> None:
         """A line that stays: something was found on the way."""

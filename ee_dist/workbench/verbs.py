@@ -40,10 +40,11 @@ class Request:
 
 @dataclass(frozen=True)
 class Told:
-    """Progress: what is being done, and the share of it that is done."""
+    """Progress: what is being done, the share of it that is done, and the error of the best on the way."""
 
     what: str
     share: float
+    error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -85,11 +86,11 @@ def serve(pipe: Connection) -> None:
 def _teller(pipe: Connection) -> Progress:
     last: list[Any] = ["", -1.0]
 
-    def told(what: str, share: float) -> None:
+    def told(what: str, share: float, error: float | None = None) -> None:
         # Some stages report a thousand times a second: nobody sees more than one in a hundred.
         if what != last[0] or share >= 1.0 or abs(share - last[1]) >= 0.01:
             last[:] = [what, share]
-            pipe.send(Told(what, share))
+            pipe.send(Told(what, share, error))
 
     return told
 
@@ -113,12 +114,13 @@ def _explain(request: Request, told: Progress) -> Explained:
 
 def _add(request: Request, told: Progress) -> Improved:
     """Judged alone on held-out data first, then added and fitted whatever the judgement is: the page shows both."""
+    from ee_dist.discrepancy.search.search import within
     from ee_dist.tasks import explain, improve
     from ee_dist.workbench import findings
 
     alone = explain.Options(by=request.by, only=[request.effect], rerun=False)
     folder = request.folder
-    _, judged, _ = explain.run(request.config, alone, folder / "judged", _within("judging: ", told))
+    _, judged, _ = explain.run(request.config, alone, folder / "judged", within("judging", told))
     asked = replace(request.config, effect=request.effect)
     _, found, account = improve.run(asked, improve.Options(by=request.by, rerun=False), folder, told)
     return findings.of_improvement(found, account, folder, len(found.ladder) - 1, findings.refusal(judged.candidates))
@@ -153,10 +155,6 @@ def _compare(request: Request, told: Progress) -> Compared:
     starts = tuple(b - float(m.log.times_s[0]) for b, m in zip(begins, problem.measured, strict=True))
     told_error = problem.told(found.error)
     return Compared(found.error, found.noise_floor, told_error, account.headline, request.folder, starts, RUN_TIME)
-
-
-def _within(prefix: str, told: Progress) -> Progress:
-    return lambda what, share: told(prefix + what, share)
 
 
 _VERBS: dict[str, Callable[[Request, Progress], Any]] = {

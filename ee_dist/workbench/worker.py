@@ -30,16 +30,17 @@ class Progress:
     request: Request
     what: str = "starting"
     share: float = 0.0
+    error: float | None = None
     began_s: float = field(default_factory=time.monotonic)
     stage_began_s: float = field(default_factory=time.monotonic)
     stages: tuple[tuple[str, float], ...] = ()
 
     def after(self, told: Told) -> Progress:
         if told.what == self.what:
-            return replace(self, share=told.share)
+            return replace(self, share=told.share, error=told.error)
         now = time.monotonic()
         past = (*self.stages, (self.what, now - self.stage_began_s))
-        return replace(self, what=told.what, share=told.share, stage_began_s=now, stages=past)
+        return replace(self, what=told.what, share=told.share, error=told.error, stage_began_s=now, stages=past)
 
     @property
     def left_s(self) -> float | None:

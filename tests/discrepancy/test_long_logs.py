@@ -67,7 +67,7 @@ def test_what_is_computed_together_is_limited_by_memory_and_changes_no_bit(monke
     again, engine = look(2.0)
     engine.called.clear()
     told: list[float] = []
-    slow = Search(again, progress=lambda _, share: told.append(share))
+    slow = Search(again, progress=lambda _, share, *__: told.append(share))
     assert [b.stop - b.start for b in slow.batches(14)] == [1, 2, 4, 5, 2]
     assert np.array_equal(again.residuals(asked), expected)
     assert [s.promise for s in screen(slow, POOL)] == promised

@@ -53,6 +53,23 @@ def test_a_diagnosis_is_over_when_it_is_polished_and_told() -> None:
     assert "believes: part lost at upper rear left" in out.getvalue()
 
 
+def test_steps_of_one_stage_are_told_now_and_then_with_the_error_so_far(monkeypatch) -> None:
+    now = 0.0
+    monkeypatch.setattr(progress_line.time, "monotonic", lambda: now)
+    out = io.StringIO()
+    with SearchProgress(Console(file=out, width=40)) as progress:
+        for at, what, share, error in ((1.0, "one more: screening", 0.5, None), (2.0, "one more: fitting", 0.5, 3.0),
+                                       (3.0, "at once: fitting", 1.0, 2.5), (4.0, "at once: fitting 48 values", 1.0, 2.0),
+                                       (14.0, "at once: fitting", 1.0, 1.5), (15.0, "at once: fitting", 1.0, 1.25)):  # fmt: skip
+            now = at
+            progress(what, share, error)
+    assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [
+        "1 s one more: screening",
+        "3 s at once: fitting, error 2.5",
+        "14 s at once: fitting, error 1.5",
+    ]
+
+
 def test_a_long_stage_says_from_its_first_word_how_long_it_will_take(monkeypatch) -> None:
     """Where there is no terminal too, and not more often than one reads; a short one says its name alone."""
     now = 0.0

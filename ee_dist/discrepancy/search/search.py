@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -11,8 +12,14 @@ from ee_dist.discrepancy.problem import Mask, Problem
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
-Progress = Callable[[str, float], None]
-"""Told (what is being done, share done in [0, 1])."""
+
+class Progress(Protocol):
+    """Told what is being done, the share of it that is done in [0, 1], and the error of the best that was found on the way, of
+    the data that it is fitted to."""
+
+    def __call__(self, what: str, share: float, error: float | None = None) -> None: ...
+
+
 BATCH = 240
 """Hypotheses that are asked for in one call while many are probed, at most,"""
 VALUES = 8_000_000
@@ -21,8 +28,23 @@ FIRST = 20
 """How much smaller the first of them is where they are of long logs."""
 
 
-def quiet(what: str, share: float) -> None:
+def quiet(what: str, share: float, error: float | None = None) -> None:
     """Progress that nobody watches."""
+
+
+def least_error(energies: Sequence[float], values: int) -> float | None:
+    """The least error by the energies of so many residual values; None where nothing can be simulated."""
+    least = min(energies, default=np.inf)
+    return float(np.sqrt(least / values)) if np.isfinite(least) and values else None
+
+
+def within(doing: str, progress: Progress) -> Progress:
+    """Progress of the steps of something that is being done: ``doing: step``."""
+
+    def told(what: str, share: float, error: float | None = None) -> None:
+        progress(f"{doing}: {what}", share, error)
+
+    return told
 
 
 @dataclass(frozen=True)
@@ -54,6 +76,10 @@ class Search:
         while at < count:
             yield slice(at, min(at + size, count))
             at, size = at + size, min(2 * size, self.batch)
+
+    def doing(self, what: str) -> Search:
+        """The same, of which it is said what for."""
+        return replace(self, progress=within(what, self.progress))
 
     def base(self) -> Array:
         """(n,) with the fixed terms alone."""

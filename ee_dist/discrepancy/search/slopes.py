@@ -15,7 +15,7 @@ import numpy as np
 
 from ee_dist.discrepancy.problem import Mask, Problem
 from ee_dist.discrepancy.search.fitted import Fit, Model
-from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.search import Search, least_error
 from ee_dist.trials.log import Array
 
 LENGTHS = (1.0, 0.5, 0.2)
@@ -110,7 +110,8 @@ def follow_slopes(
         for run in going:
             run.width = width
         _iterate(going, mask, evaluate, whole.problem, prior)
-        search.progress("fitting", (step + 1) / len(widths))
+        so_far = least_error([run.energy for run in runs], int(mask.sum()))
+        search.progress("fitting", (step + 1) / len(widths), so_far)
     if len(widths) > 1:
         _finer(moving, mask, evaluate, whole.problem, prior)
     out = []

@@ -19,7 +19,7 @@ import numpy as np
 
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit, Model
-from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.search import Search, least_error
 from ee_dist.discrepancy.search.slopes import NEAR, at_end, counted, weighed
 from ee_dist.trials.log import Array
 
@@ -114,7 +114,8 @@ def follow_valley(
         together = len(runs) if rivals else len(widths)
         for k in range(0, len(runs), together):
             _give_up(runs[k : k + together])
-        search.progress("fitting all together", min(run.rounds for run in moving) / iterations)
+        most, so_far = max(len(run.u) for run in moving), least_error([run.energy for run in runs], int(mask.sum()))
+        search.progress(f"fitting {most} values", min(run.rounds for run in moving) / iterations, so_far)
     best = [min(runs[k : k + len(widths)], key=lambda r: r.energy) for k in range(0, len(runs), len(widths))]
     rows = np.array([run.residual for run in best])
     if search is not whole:

@@ -185,6 +185,7 @@ class Page:
         self.bar.set_value(progress.share)
         self.doing.set_text(
             f"{progress.request.verb}: {progress.what} {progress.share:.0%}"
+            + ("" if progress.error is None else f", error {progress.error:.3g}")
             + ("" if left is None else f", about {left:.0f} s left of this stage")
             + f", {progress.spent_s:.0f} s so far"
         )
