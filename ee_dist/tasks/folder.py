@@ -24,7 +24,7 @@ from ee_dist.tasks.config import ConfigError
 LOCK = ".running"
 """Locked by the run that writes into the folder, and gone at its end; the system unlocks it if the run is killed."""
 SETTINGS = "config"
-_NAMED = 3
+_NAMED, LARGE_MB = 3, 50.0
 
 _SWEEP = "multirun.yaml"
 NO_NAME = "{key}=: which folder? a run writes into one of its own, such as {key}=logs/mine"
@@ -151,7 +151,7 @@ def shown(folder: Path) -> str:
 
 def kept(folder: Path) -> str:
     """What a run that was stopped leaves behind, in words."""
-    names = [n for n in held(folder) if n != SETTINGS]
+    names = [n + _size(folder / n) for n in held(folder) if n != SETTINGS]
     return f"kept in {shown(folder)}: {_listed(names)}" if names else "nothing was recorded yet, so nothing is kept"
 
 
@@ -192,6 +192,13 @@ def held(folder: Path) -> list[str]:
         return []
     seen = [p for p in sorted(folder.iterdir()) if not p.name.startswith(".")]
     return [p.name for p in seen if not (p.is_dir() and not any(p.iterdir()))]
+
+
+def _size(path: Path) -> str:
+    """Of what is large: what was simulated of long logs takes gigabytes, and who does not go on may want them back."""
+    files = [path] if path.is_file() else [p for p in path.rglob("*") if p.is_file()]
+    large = sum(p.stat().st_size for p in files) / 1e6
+    return f" ({large:.0f} MB)" if large >= LARGE_MB else ""
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -17,7 +17,7 @@ from ee_dist.evaluation.journal import Journal
 from ee_dist.recording.reader import read_run
 from ee_dist.tasks.compose import LONGEST_NAME, folder_name
 from ee_dist.tasks.config import ConfigError
-from ee_dist.tasks.folder import LOCK, claimed, free_name, missing
+from ee_dist.tasks.folder import LOCK, claimed, free_name, kept, missing
 from ee_dist.tasks.wiring import close_evaluators
 
 FAST = ("evaluator=serial", "engine=mujoco", "budget.compensating_trials=1")
@@ -214,3 +214,11 @@ def test_a_job_of_a_sweep_has_a_name_that_file_systems_take():
     names = {folder_name(f"{long},seed={seed}") for seed in (1, 2)}
     assert len(names) == 2, "what differs at the end only is not lost"
     assert all(len(n) == LONGEST_NAME and n.startswith("budget.population=0_") for n in names)
+
+
+def test_what_is_left_and_large_says_how_large(tmp_path):
+    (tmp_path / "unfinished").mkdir()
+    (tmp_path / "report.html").write_text("small")
+    with (tmp_path / "unfinished" / "simulated.bin").open("wb") as file:
+        file.truncate(120_400_000)
+    assert kept(tmp_path).endswith(": report.html, unfinished (120 MB)")
