@@ -210,8 +210,8 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
             first.tied_with = [name for name in others if name != first.name]
-        more = {j.name for j in ordered if contains(j, first)}
-        first.tied_with = [name for name in first.tied_with if name not in more]
+        same_laws = {j.name for j in ordered if contains(j, first) or contains(first, j)}
+        first.tied_with = [name for name in first.tied_with if name not in same_laws]
         ordered.remove(first)
         ordered.insert(0, first)
     for k, j in enumerate(ordered):
@@ -220,7 +220,7 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
 
 
 def contains(one: Judged, other: Judged) -> bool:
-    """Whether one is the other and more: no other explanation, unless more pays."""
+    """Whether one is the other and more: no other explanation, unless more pays, nor is the other another of it."""
     names, fewer = ({c.name for c in j.proposal.parts} for j in (one, other))
     return fewer < names
 
