@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, cross_fit, held_by_slopes
+from ee_dist.discrepancy.evidence.judge import NONE
 from ee_dist.discrepancy.evidence.rule import WORTH, least_energy
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
@@ -19,8 +20,6 @@ from ee_dist.trials.log import Array
 
 AGAIN = 0.03
 """Finite differences where the values are nearly right already."""
-NONE = 1e-9
-"""Share of its range at which a value is neutral."""
 SURE = 0.01
 """What a channel is at least believed to vary, as a share of the one that varies most: a computed command has no noise."""
 ROUNDS = 3

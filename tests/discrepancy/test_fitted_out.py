@@ -47,7 +47,7 @@ def test_precise_data_are_fitted_down_to_their_noise() -> None:
 def held_out(problem: Linear, residual: Array, whole: bool, parts: tuple[Candidate, ...] = ()) -> HeldOut:
     cut = travelling(problem)[0] if whole else windows(problem)
     everywhere = np.ones(len(residual), dtype=bool)
-    fit = Fit(Model(parts), np.zeros(len(parts)), 1.0, residual, np.ones((len(residual), len(parts))), everywhere)
+    fit = Fit(Model(parts), np.full(len(parts), 0.1), 1.0, residual, np.ones((len(residual), len(parts))), everywhere)
     return HeldOut(cut, residual, 1.0, (fit,))
 
 

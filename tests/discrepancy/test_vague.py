@@ -63,14 +63,16 @@ def test_the_same_and_more_is_no_other_explanation() -> None:
 
 
 def test_less_of_the_same_is_no_other_explanation() -> None:
-    """Of friction by load and by its square, tied with what has three numbers, the first alone is no rival."""
+    """Of friction by load and by its square, which is none, the first alone is no rival."""
     third, both, alone = judged(0.9, vague=False), judged(0.8999, vague=False), judged(0.8998, vague=False)
     one, two, other = (SimpleNamespace(name=n) for n in ("load", "square", "com"))
     for j, parts, size in ((third, (other,), 3), (both, (one, two), 2), (alone, (one,), 3)):
         j.proposal = SimpleNamespace(size=size, guess=False, parts=parts)  # type: ignore[attr-defined]
         j.sure = 1000.0  # type: ignore[attr-defined]
-    order = ranked([third, both, alone])  # type: ignore[list-item]
-    assert order[0] is both and order[0].tied_with == ["0.9"]
+    for none in (False, True):
+        both.none_in_it = none  # type: ignore[attr-defined]
+        order = ranked([third, both, alone])  # type: ignore[list-item]
+        assert order[0] is both and order[0].tied_with == (["0.9"] if none else ["0.9", "0.8998"])
 
 
 @pytest.mark.parametrize(("plain", "named"), [(0.3, 0.3), (0.2, 0.9)])

@@ -21,6 +21,8 @@ TIE_ENERGY = 9.0
 """Two explanations closer than this (3 standard deviations, squared) on held-out data are not told apart."""
 APART = 6.0
 """Held-out energy of an explanation, over that of another, from which it is no other explanation of the same."""
+NONE = 1e-9
+"""Share of its range at which a value is neutral."""
 FULLER = 0.8
 """Share of what a law leaves above the noise that the same with a further term must leave at most, to go before it in a tie."""
 VAGUE = "none of its numbers is told from neutral; a plainer effect explains as much for each of its own"
@@ -87,6 +89,12 @@ class Judged:
     def own(self) -> Array:
         """The fitted u of the proposal."""
         return self.u[len(self.u) - self.proposal.size :]
+
+    @property
+    def none_in_it(self) -> bool:
+        """Whether an effect of it does nothing by its values: without that it is the same."""
+        places = [p for p in Model(self.proposal.parts).places if p.stop > p.start]
+        return any(not np.abs(self.own[p]).max() > NONE for p in places)
 
     @property
     def name(self) -> str:
@@ -210,8 +218,8 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
             first.tied_with = [name for name in others if name != first.name]
-        same_laws = {j.name for j in ordered if contains(j, first) or contains(first, j)}
-        first.tied_with = [name for name in first.tied_with if name not in same_laws]
+        more = {j.name for j in ordered if contains(j, first) or (contains(first, j) and first.none_in_it)}
+        first.tied_with = [name for name in first.tied_with if name not in more]
         ordered.remove(first)
         ordered.insert(0, first)
     for k, j in enumerate(ordered):
@@ -220,7 +228,7 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
 
 
 def contains(one: Judged, other: Judged) -> bool:
-    """Whether one is the other and more: no other explanation, unless more pays, nor is the other another of it."""
+    """Whether one is the other and more: no other explanation, unless more pays."""
     names, fewer = ({c.name for c in j.proposal.parts} for j in (one, other))
     return fewer < names
 
