@@ -108,8 +108,9 @@ def puts_right(robot: Robot, c: Candidate) -> bool:
 
 def beside(robot: Robot, parts: Sequence[Candidate], terms: Hypothesis, others: Sequence[Candidate]) -> list[Candidate]:
     """What else may be a little wrong, with ranges beside the numbers that assumed drives share in a model of these ``parts``
-    and ``terms``: a joint differs from these as from any that are known. As it is where nothing was assumed."""
-    if not robot.assumed_joints("kp"):
+    and ``terms``: a joint differs from these as from any that are known. As it is where nothing was assumed, or where it does not
+    matter: in a balance of measured torques no gain stands in for a mass."""
+    if not robot.assumed_joints("kp") or TOGETHER[0] not in {c.effect.name for c in (*parts, *others)}:
         return list(others)
     right = tuple(t for c, t in zip(parts, terms, strict=True) if puts_right(robot, c))
     around = replace(apply(robot, right), assumed=()) if right else robot

@@ -8,12 +8,15 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.engines.mujoco.contact import LEAST_FRICTION, contact
 from ee_dist.engines.mujoco.model import Model, _body, _spec, principal
 from ee_dist.robots.model import Drive, Robot
 
 _FIXED, _AFFINE = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+DIGITS = 1e-5
+"""Share by which the digits of a file may change a number."""
 STICKING = (0.99, 0.999, 0.001, 0.5, 2.0)
 """Impedance of dry friction: near 1, or a joint that holds creeps."""
 
@@ -33,7 +36,8 @@ def mjcf_text(robot: Robot, motors_only: bool, damping: Sequence[float]) -> str:
     for part in robot.present_parts:
         body = bodies[_body(part.name)]
         body.mass, body.ipos = part.mass_kg, part.com_m
-        body.inertia, body.iquat = principal(part)
+        moments, body.iquat = principal(part)
+        body.inertia = _of_a_body(moments)
     for drive, native in zip(robot.drives, damping, strict=True):
         if drive.joint in joints:
             joint = joints[drive.joint]
@@ -48,6 +52,15 @@ def mjcf_text(robot: Robot, motors_only: bool, damping: Sequence[float]) -> str:
     spec.compile()
     text: str = spec.to_xml()
     return text
+
+
+def _of_a_body(moments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Moments (3,) that MuJoCo reads back: none above the sum of the other two, in the digits of a file too."""
+    order = np.argsort(moments)
+    least, middle, most = moments[order]
+    out = moments.copy()
+    out[order[:2]] += max(0.0, 0.5 * (most * (1.0 + DIGITS) - least - middle))
+    return out
 
 
 def _native(spec: Any, robot: Robot, joint: Any, d: Drive) -> None:
