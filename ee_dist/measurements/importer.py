@@ -25,6 +25,7 @@ from ee_dist.measurements.robot_channels import check_names, command_kind, comma
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
     pace_suspicion,
+    power_suspicion,
     repeat_suspicion,
     speed_suspicion,
     suspicions,
@@ -353,9 +354,7 @@ class _Import:
             if s.kind == "position":
                 joint = self.robot.joint(s.target)
                 unit = column.unit if isinstance(column, Column) and column.scale == 1 else s.unit
-                self._judge(
-                    unit_suspicion(s.name, self.channels[s.name], joint.lower, joint.upper, s.unit, unit), column
-                )
+                self._judge(unit_suspicion(s.name, self.channels[s.name], *joint.ends, s.unit, unit), column)
                 at = self.channels[s.name]
                 self.report.suspicious += [
                     f"{s.name}: {words}: is the description's zero another one, or its stop elsewhere?"
@@ -401,6 +400,13 @@ class _Import:
             self._judge(torque_suspicion(f"{TORQUE} {m}", relation, units[m]), self.mapping.torques[m])
         if note := torques_suspicion(names, judged):
             self.report.suspicious.append(note)
+        assert torques is not None
+        for k, m in enumerate(self.robot.motor_names):
+            # What pushes or pulls from outside may give work.
+            against = any(s.startswith(f"{TORQUE} {m}: runs against") for s in self.report.suspicious)
+            if known[k] and not self.mapping.external and not against:
+                note = power_suspicion(f"{TORQUE} {m}", torques[:, k], joints[:, k], self.step_s)
+                self.report.suspicious += [note] if note else []
 
     def _judge(self, found: tuple[str, bool] | None, column: Column | Estimated | None) -> None:
         if found is None:

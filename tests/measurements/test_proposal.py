@@ -212,11 +212,14 @@ def test_nothing_unknown_goes_without_a_question(tmp_path: Path) -> None:
         assert any("what the motion needs in N.m at shoulder" in q for q in questions) == asked, times
 
 
-@pytest.mark.parametrize(("size", "question"), [(1.0, ""), (odd_files.DEG, "degrees, or many turns in rad")])
+@pytest.mark.parametrize(
+    ("size", "question"),
+    [(1.0, ""), (odd_files.DEG, "degrees, or many turns in rad"), (3e3, "degrees, or many turns in rad")],
+)
 def test_joints_that_turn_on_and_on_are_in_radians_or_it_is_asked(tmp_path: Path, size: float, question: str) -> None:
     """A continuous joint of a URDF has its stops a hundred turns away: a motion is small beside that in any unit."""
     arm = odd_files.robot()
-    free = replace(arm, joints=tuple(replace(j, lower=-628.0, upper=628.0) for j in arm.joints))
+    free = replace(arm, joints=tuple(replace(j, lower=-CONTINUOUS_RAD, upper=CONTINUOUS_RAD) for j in arm.joints))
     m = odd_files.arrays()
     table = {"t": m["t"]} | odd_files.spread("q{}", size * m["q"]) | odd_files.spread("cmd{}", size * m["g"])
     proposal = proposal_for(odd_files.csv(table | odd_files.spread("tau{}", m["tau"]))(tmp_path), free, Hints())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -10,6 +12,7 @@ from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
     command_suspicion,
+    power_suspicion,
     repeat_suspicion,
     speed_suspicion,
     suspicions,
@@ -140,3 +143,26 @@ def test_what_rounding_left_of_a_range_is_nothing() -> None:
     )
     lines = describe([report]).splitlines()
     assert lines[2:] == ["  q: 0 to 1.2 rad", "  w: -1e-13 to 2e-13 rad/s", "  z: 0 to 0 m"]
+
+
+def test_a_joint_without_an_end_reaches_as_far_as_it_likes() -> None:
+    t = np.linspace(0, 20, 2000)
+    assert unit_suspicion("p", 180 * t, -math.inf, math.inf, "rad", "rad") is None
+    assert unit_suspicion("p", 180 * t, -6.3, 6.3, "rad", "rad") is not None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_drive_that_takes_work_out_of_what_goes_to_and_fro_is_told_without_a_model(seed: int) -> None:
+    """Of inertia, weight and friction none can give work to a joint that comes back; a torque of the other sign does."""
+    rng, t = np.random.default_rng(seed), np.arange(0, 20, 0.01)
+    position = 0.3 + 0.5 * np.sin(1.7 * t) + 0.2 * np.sin(3.1 * t + seed)
+    speed = np.gradient(position, t)
+    torque = (
+        0.2 * np.gradient(speed, t) + 3.0 * np.cos(position) + 1.0 * np.sign(speed) + 0.3 * rng.standard_normal(len(t))
+    )
+    position = position + 1e-4 * rng.standard_normal(len(t))
+    assert power_suspicion("torque of j", torque, position, 0.01) is None
+    friction = torque - 3.0 * np.cos(position)
+    note = power_suspicion("torque of j", -friction, position, 0.01) or ""
+    assert "takes" in note and "swapped sign" in note
+    assert power_suspicion("torque of j", -friction[:150], position[:150], 0.01) is None, "it does not come back"

@@ -50,7 +50,7 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
         why = worst.why if worst.sure == UNKNOWN else said
         return UnitChoice(tuple(p.entries[0] if p.entries else {} for p in parts), worst.sure, why)
     allowed = LENGTHS if kinds == {"slide"} else (*ANGLES, "mrad")
-    reach = np.array([reach_of(j) for j in joints])
+    reach = np.array([reach_of(j) if math.isfinite(j.ends[1]) else math.inf for j in joints])
     if hints.unit == SHARE:
         return _share(block, joints)
     if hints.unit:
