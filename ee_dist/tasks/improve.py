@@ -41,7 +41,7 @@ from ee_dist.tasks.results.tables import show_account, show_candidates, show_lad
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.unfinished import keep_so_far
-from ee_dist.tasks.ways import Way, known_way, open_loop, way_of
+from ee_dist.tasks.ways import Way, known_way, open_loop, undriven, way_of
 from ee_dist.viewing.report import write_page
 
 
@@ -77,6 +77,11 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     if options.calibrate and way.name != OpenLoop.way:
+        if silent := undriven(measured):
+            raise ConfigError(
+                f"task.calibrate: a robot is calibrated by what it does on its commands, and trial {silent} holds none; import "
+                "it with its commands, or leave task.calibrate out"
+            )
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
     with SearchProgress(console, told) as progress:
         progress("weighing the measurements", 0.0)

@@ -119,11 +119,15 @@ def _all_driven(measured: Measurements) -> bool:
     return all(_driven(t.log) for t in measured.trials)
 
 
+def undriven(measured: Measurements) -> str:
+    """The name of a trial that holds no commands; empty where all do."""
+    return next((t.name for t in measured.trials if not _driven(t.log)), "")
+
+
 def _nothing_commanded(measured: Measurements, by: str) -> str:
-    silent = next(t.name for t in measured.trials if not _driven(t.log))
     return (
-        f"task.by={by}: trial {silent} holds no commands, so there is nothing to simulate it by; with torques of the drives "
-        "in the log task.by=force_balance compares it, otherwise import it with its commands"
+        f"task.by={by}: trial {undriven(measured)} holds no commands, so there is nothing to simulate it by; with torques of "
+        "the drives in the log task.by=force_balance compares it, otherwise import it with its commands"
     )
 
 

@@ -107,9 +107,7 @@ def test_a_noisy_sensor_explains_the_noise_that_it_leaves() -> None:
     for more in (slow, other):
         open_ = account([], 0.23, what=noise, left=(quick, more))
         assert (
-            not open_.good
-            and "as one of several things" in open_.headline
-            and "in 1 curve; worst" in " ".join(open_.lines)
+            not open_.good and "among other things" in open_.headline and "in 1 curve; worst" in " ".join(open_.lines)
         )
 
 

@@ -54,3 +54,11 @@ def test_trials_are_asked_for_as_they_were(asked_for, word):
     words = asked("compare", Config(measured="a.mcap", trials=asked_for))
     assert [w for w in words if w.startswith("trials")] == ([word] if word else [])
     read(command(words))
+
+
+@pytest.mark.parametrize("name", ["idf_pos_*", "a b", "it's", "$HOME", '"', "back\\slash", "!", "`ls`"])
+def test_names_with_marks_come_through_a_shell(name):
+    """And as few quotes as it takes: patterns none, words with a space one pair in another."""
+    line = command([setting("held_out", [name, "c"])])
+    assert read(line) == {"held_out": [name, "c"]}
+    assert ("'\"'\"'" in line) == (name not in ("idf_pos_*", "a b"))

@@ -191,6 +191,8 @@ def test_a_log_of_torques_without_commands_is_compared_and_explained(cli, record
     told_alike(explained, said)
     outcome = cli("task=compare", log, "task.by=open_loop", *QUICK)
     assert outcome.status == 2 and outcome.err.count("\n") == 1 and "holds no commands" in outcome.err
+    outcome = cli("task=improve", "effect=auto", log, "task.calibrate=true", *QUICK)
+    assert outcome.status == 2 and outcome.err.count("\n") == 1 and "import it with its commands" in outcome.err
 
 
 @pytest.mark.parametrize("by", WAYS)

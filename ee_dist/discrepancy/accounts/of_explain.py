@@ -88,7 +88,7 @@ def explain_account(
         more = "at least " if len(best.tied_with) + 1 == len(looked_at) < found.tried else ""
         less = is_less(best.terms)
         rest = left_beside_noise(found.left, best.terms, robot)
-        head = f"{'Too much' if less else 'Missing'}{', as one of several things' if rest else ''}: "
+        head = f"{'Too much' if less else 'Missing'}{', among other things' if rest else ''}: "
         head += f"{told_all(best.terms, robot)}{_twins(best, more)}."
         nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
         nothing = BEYOND if unsure else nothing

@@ -15,7 +15,17 @@ from ee_dist.trials.family import driven
 
 def command(words: Sequence[str]) -> str:
     """A command line of ours that a shell takes as it is, whatever is in its paths."""
-    return shlex.join(["python", "-m", "ee_dist", *words])
+    return " ".join(map(_for_shell, ["python", "-m", "ee_dist", *words]))
+
+
+def _for_shell(word: str) -> str:
+    """In double quotes where it holds single ones and nothing that a shell looks for in them: those can be read."""
+    readable = "'" in word and not _ALIVE & {*word}
+    return f'"{word}"' if readable else shlex.quote(word)
+
+
+_ALIVE = frozenset('"\\$`!')
+"""What means something between double quotes."""
 
 
 def setting(key: str, value: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
@@ -27,7 +37,7 @@ def setting(key: str, value: str | os.PathLike[str] | Sequence[str | os.PathLike
 
 def _quoted(value: str | os.PathLike[str]) -> str:
     text = os.path.relpath(value) if os.path.exists(value) else str(value)
-    plain = bool(text) and all((ch.isascii() and ch.isalnum()) or ch in "/._-@:+" for ch in text)
+    plain = bool(text) and all((ch.isascii() and ch.isalnum()) or ch in "/._-@:+*" for ch in text)
     return text if plain and not _OTHER.fullmatch(text) else _in_quotes(text)
 
 
