@@ -75,6 +75,24 @@ def test_motions_of_one_joint_each_are_not_held_out() -> None:
     assert held_out_notes(each) and not held_out_notes(arm_moved((1.0, 1.0), (0.5, 1.0)))
 
 
+@pytest.mark.parametrize(
+    ("ways", "apart"), [((1, -1), True), ((1, 1), False), ((1, -1, 1, -1), False), ((1, 0), False)]
+)
+def test_motions_of_one_way_each_are_not_held_out(ways: tuple[int, ...], apart: bool) -> None:
+    """A shaft that turns forwards in one and backwards in the other (0: to and fro)."""
+    sample = samples()["pendulum"]
+    trials, moved = [t for t in measure(sample, ()) if t.log.joints is not None], []
+    for k, way in enumerate(ways):
+        trial = trials[k % len(trials)]
+        t = np.linspace(0.0, 1.0, len(trial.log.times_s))[:, None]
+        course = (way * (1 + 0.3 * k) * t**2 if way else np.sin(7 * t)) + 1e-4 * np.sin(9e3 * t)
+        log = replace(trial.log, joints=course, commands=course)
+        moved.append(replace(trial, name=f"{trial.name} {k}", log=log))
+    problem = problem_by("open_loop", tuple(moved), sample.robot)
+    assert joint_by_joint(problem) == apart
+    assert bool(travelling(problem)) == (not apart)
+
+
 @pytest.mark.parametrize("shares", [((1.0, 1.0), (0.5, 1.0)), ((1.0, 0.3), (0.3, 1.0)), ((1.0, 0.0), (0.5, 0.001))])
 def test_motions_in_which_joints_move_together_or_twice_are_held_out(shares: tuple[tuple[float, float], ...]) -> None:
     both = arm_moved(*shares)

@@ -39,8 +39,8 @@ where more is missing than what is tied, once that is added."""
 NEXT, OR = "Next", "Or go on without"
 """Before the command to type: the only one, or beside that which tells apart what is tied."""
 ONE_EACH = (
-    "Most joints move in one motion of their own: what is found at a joint is judged on other windows of that motion. Record "
-    "each joint in two motions or more to have it judged on one that was not fitted."
+    "Most joints move in one motion of their own, or each way in one: what is found at a joint is judged on other windows of "
+    "that motion. Record each joint, both ways, in two motions or more to have it judged on one that was not fitted."
 )
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 

@@ -35,6 +35,8 @@ SAME_COURSE = 0.15
 MOVES, TAKES_PART = 0.01, 0.2
 """Share of its range by which a joint varies that moves at all, and share of what it varies by at most in a trial in which it
 takes part."""
+STEPS = 100
+"""Steps in which it is looked which way a joint goes."""
 PRIOR = 1.0
 """Energy, beside noise, that a value at its bound costs in a fit that will be judged elsewhere: a value that the fitted part
 does not determine is neutral there, and not what the part held out would like it to be."""
@@ -125,21 +127,37 @@ def travelling(problem: Problem) -> list[Cut]:
 
 
 def joint_by_joint(problem: Problem, kinds: Sequence[int] | None = None) -> bool:
-    """Whether most joints that move do so in a single motion (of the numbers ``kinds``, by trial) each: what a joint is like is
-    then told by none of the others, and with its motion held out nothing says anything of it."""
+    """Whether most joints that move do so in a single motion (of the numbers ``kinds``, by trial) each, or each way in a single
+    one: what a joint is like there is then told by none of the others, and with its motion held out nothing says anything of
+    it. Of a shaft that only ever turned forwards nobody knows its dry friction from a torque that is off."""
     if len(problem.measured) < 2:
         return False
     of = np.array(_kinds(problem) if kinds is None else kinds)
     courses = [_course(problem, t.log) for t in problem.measured]
     read = [s.target for s in problem.robot.sensors if s.kind == "position"]
     targets = read if problem.measured[0].log.joints is None else list(problem.robot.motor_names)
-    if len(targets) < 2 or not all(len(c) and np.isfinite(c).any(axis=0).all() for c in courses):
+    if not targets or not all(len(c) and np.isfinite(c).any(axis=0).all() for c in courses):
         return False
+    least = MOVES * np.array([travel(problem.robot.joint(t)) for t in targets])
     varies = np.stack([np.nanstd(c, axis=0) for c in courses])
-    most = varies.max(axis=0)
-    moving = most > MOVES * np.array([travel(problem.robot.joint(t)) for t in targets])
-    apart = [len(set(of[varies[:, k] > TAKES_PART * most[k]])) == 1 for k in np.flatnonzero(moving)]
+    return _mostly_in_one(varies, least, of) or _mostly_in_one(
+        np.stack([_each_way(c) for c in courses]), [*least, *least], of
+    )
+
+
+def _mostly_in_one(moved: Array, least: Sequence[float] | Array, of: Index) -> bool:
+    """Whether most of what moves (``moved`` (trials, K), by more than ``least`` (K,)) takes part in a single motion each, whose
+    number ``of`` (trials,) tells."""
+    most = moved.max(axis=0)
+    apart = [len(set(of[moved[:, k] > TAKES_PART * most[k]])) == 1 for k in np.flatnonzero(most > least)]
     return len(apart) > 1 and 2 * sum(apart) > len(apart)
+
+
+def _each_way(course: Array) -> Array:
+    """(2 K,) how far each joint of a course (T, K) goes up, and down, by steps in which noise is little."""
+    known = course[np.isfinite(course).all(axis=1)]
+    steps = np.diff(known[:: max(1, len(known) // STEPS)], axis=0)
+    return np.concatenate([np.maximum(steps, 0.0).sum(axis=0), np.maximum(-steps, 0.0).sum(axis=0)])
 
 
 def _kinds(problem: Problem) -> list[int]:
