@@ -25,7 +25,6 @@ from ee_dist.measurements.robot_channels import check_names, command_kind, comma
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
     pace_suspicion,
-    power_suspicion,
     repeat_suspicion,
     speed_suspicion,
     suspicions,
@@ -35,6 +34,7 @@ from ee_dist.measurements.suspicious import (
     unit_suspicion,
 )
 from ee_dist.measurements.table import LARGEST, Recorded
+from ee_dist.measurements.taking import power_suspicion
 from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.trials import trials_of
 from ee_dist.measurements.units import TURN, UNITS, factor

@@ -32,11 +32,6 @@ QUICK_S, TOGETHER = 0.25, 0.8
 """How late a joint may come, s, that is beyond its drive's bandwidth and not the other way round; correlation of commands and
 positions of the same time from which it is within."""
 
-SMOOTHED_S, SLOW, REVERSALS, TAKES = 0.04, 0.05, 4, 0.5
-"""A drive's work is told by speeds smoothed over so many s, of a joint that turns round so often (by speeds of more than this
-share of its highest), and where it takes more than this share of what it exchanges. Friction makes it give; of real joints whose
-torques were right none that turned round so often took more than a tenth."""
-
 STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
 PACE, CLEAR, ALIKE = 0.05, 0.95, 1.15
@@ -224,27 +219,6 @@ def torque_suspicion(name: str, beside: signals.Relation, unit: str) -> tuple[st
             certain,
         )
     return None
-
-
-def power_suspicion(name: str, torque: Array, position: Array, step_s: float) -> str | None:
-    """Whether a drive (torque and position (T,) of its joint) takes more work out of a motion to and fro than it puts in, by
-    whatever masses: friction takes work, gravity gives back what it took, and no robot without another motor has any to
-    give. Speeds are smoothed; from the first time that the joint is in the middle to the last, so that what its weight did on
-    the way there is not counted."""
-    width = max(3, round(SMOOTHED_S / step_s))
-    speed = np.gradient(signals.smooth(position[:, None], width)[:, 0], step_s)
-    at = np.flatnonzero(np.diff(np.sign(position - np.median(position))))
-    quick = np.sign(speed[np.abs(speed) > SLOW * np.abs(speed).max()])
-    if len(at) < 2 or np.count_nonzero(np.diff(quick)) < REVERSALS:
-        return None
-    work = (torque * speed)[at[0] : at[-1]] * step_s
-    most, total = float(np.abs(work).sum()), float(work.sum())
-    if not np.isfinite(most) or most == 0 or total > -TAKES * most:
-        return None
-    return (
-        f"{name}: takes {-work[work < 0].sum():.3g} J out of the motion and gives it {work[work > 0].sum():.3g}, where a joint "
-        "that goes to and fro needs some, whatever the masses: a swapped sign, another joint's column, or no torque?"
-    )
 
 
 def torques_suspicion(names: Sequence[str], found: Sequence[signals.Relation]) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
     command_suspicion,
-    power_suspicion,
     repeat_suspicion,
     speed_suspicion,
     suspicions,
@@ -21,6 +21,9 @@ from ee_dist.measurements.suspicious import (
     torques_suspicion,
     unit_suspicion,
 )
+from ee_dist.measurements.taking import power_suspicion, taking
+from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.trials.log import SensorLog
 
 T = np.arange(2000) * 0.01
 WAVE = np.sin(2 * T)
@@ -166,3 +169,22 @@ def test_a_drive_that_takes_work_out_of_what_goes_to_and_fro_is_told_without_a_m
     note = power_suspicion("torque of j", -friction, position, 0.01) or ""
     assert "takes" in note and "swapped sign" in note
     assert power_suspicion("torque of j", -friction[:150], position[:150], 0.01) is None, "it does not come back"
+
+
+def test_a_log_whose_torque_takes_work_is_told_when_it_is_compared() -> None:
+    t = np.arange(0, 20, 0.01)
+    position = 0.5 * np.sin(1.7 * t) + 0.2 * np.sin(3.1 * t)
+    torque = 0.2 * np.gradient(np.gradient(position, t), t) + np.sign(np.gradient(position, t))
+    robot = servo_pendulum()
+
+    def log(sign: float, **more: object) -> SensorLog:
+        nothing = np.zeros((len(t), len(robot.sensors)))
+        names, motors = robot.sensor_names, robot.motor_names
+        return SensorLog(t, nothing, position[:, None], names, tuple(s.unit for s in robot.sensors), motors,
+                         joints=position[:, None], torques=sign * torque[:, None], **more)  # type: ignore[arg-type]  # fmt: skip
+
+    assert taking(robot, [("a", log(1.0))]) == []
+    (line,) = taking(robot, [("a", log(1.0)), ("b", log(-1.0))])
+    assert "during b" in line and robot.motor_names[0] in line
+    assert taking(robot, [("b", log(-1.0, external=np.zeros((len(t), 1))))]) == [], "what pushes may give work"
+    assert taking(replace(robot, free_base=True), [("b", log(-1.0))]) == []
