@@ -22,8 +22,15 @@ DRY_SHARE = 0.5
 """Of its torque limit, how much a drive may lose to dry friction in the range worth trying: at 1 it would not move."""
 
 
+BRAKED = 10.0
+"""How many times lower than what is stated a torque drive's highest speed may be for friction: a motor led by its voltage is
+braked by back-EMF too, of which nothing is taken off a torque that it is told."""
+
+
 def _viscous(robot: Robot, target: str) -> float:
-    return scales.torque(robot, target) / scales.speed(robot, target)
+    drive = drive_of(robot, target)
+    slower = BRAKED if drive.command == "torque" and 0 < drive.speed_limit < math.inf else 1.0
+    return slower * scales.torque(robot, target) / scales.speed(robot, target)
 
 
 def _viscous_range(robot: Robot, target: str) -> dict[str, Range]:

@@ -196,7 +196,8 @@ class _Import:
         raw = own.table.numbers(column.column, gaps=column.gaps == "interpolate")
         size = factor(column.unit, unit, f"{self.where}: {name}")
         good = np.flatnonzero(np.isfinite(raw))
-        if len(good) < min(len(raw), 2):
+        # A goal that was sent once holds from then on.
+        if len(good) < min(len(raw), 1 if step_like else 2):
             spared = f": leave out the {name}, which may stay unknown" if name.startswith(TORQUE) else ""
             raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty{spared}")
         if not quiet and not column.signed_bits:

@@ -10,7 +10,7 @@ from ee_dist.basics.names import listed
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.confidence import confidence
-from ee_dist.discrepancy.explain import EFFECT, Explanation, explain
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation, explain
 from ee_dist.discrepancy.measured_trial import reading_s
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
 from ee_dist.discrepancy.problem import Problem
@@ -87,9 +87,10 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))
     following = []
-    if found.verdict == EFFECT:
+    if found.verdict != NOTHING_MISSING:
         # Where more than this is missing, the rest is looked for beside it.
-        effect = setting("effect", typed(found.best.terms) if found.best and not account.more else "auto")
+        alone = found.verdict == EFFECT and found.best is not None and not account.more
+        effect = setting("effect", typed(found.best.terms) if alone and found.best else "auto")
         following = asked("improve", config, options.by, effect)
     story = links(out, measured.files, config.model)
     write_page(explain_page(problem, measured, found, account, following, story), out / "report.html")

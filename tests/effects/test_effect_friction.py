@@ -9,6 +9,8 @@ import pytest
 from effect_robots import ARM_M, MASS_KG, Bench, G, lever, slider
 
 from ee_dist.effects import Term, apply, term
+from ee_dist.effects.catalogue import find
+from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import Array
 
 PULL_N = 10.0
@@ -191,3 +193,15 @@ def test_frictions_add_up(bench: Bench) -> None:
     )
     log = bench.run(slider(), *terms, steps=3, speed=1.0)
     assert acceleration(log.channel("velocity"), steps=1) == pytest.approx(-5.0 / MASS_KG, rel=0.01)
+
+
+def test_a_torque_drive_may_be_braked_far_below_the_speed_that_is_stated() -> None:
+    """A motor led by its voltage and described by its data sheet: back-EMF is friction to one that is told torques."""
+    robot = servo_pendulum()
+    (drive,) = robot.drives
+    most = {}
+    for command, limit in (("position", 8.0), ("torque", 8.0), ("torque", math.inf)):
+        altered = robot.with_drive(drive.joint, command=command, speed_limit=limit)
+        most[command, limit] = find("viscous_friction").bounds(altered, drive.joint)["damping_nm_s_rad"][1]
+    assert most["torque", 8.0] == pytest.approx(10 * most["position", 8.0])
+    assert most["torque", math.inf] < most["torque", 8.0]

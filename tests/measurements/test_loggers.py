@@ -84,6 +84,41 @@ def test_a_column_that_is_mostly_empty_is_no_channel(tmp_path: Path) -> None:
     assert any("no columns are called the positions" in q for q in proposal.questions)
 
 
+@pytest.mark.parametrize("sent", ["often", "once"])
+def test_topics_that_are_written_in_turn_into_one_table_come_in(tmp_path: Path, sent: str) -> None:
+    """As plotting programs export them: each row has the numbers of one topic. A goal that was sent once holds."""
+    frame = telemetry().interpolate().bfill()[["time_s", "q_cmd_rad", "q_present_rad"]]
+    commands = np.arange(ROWS) % 2 == 0
+    if sent == "once":
+        # The state's rows follow one another then, and the mapping is that of a file that tells more.
+        commands = np.arange(ROWS) == 5
+        frame.loc[5, "q_cmd_rad"] = 0.25
+    frame.loc[~commands, "q_cmd_rad"] = np.nan
+    frame.loc[commands, "q_present_rad"] = np.nan
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    if sent == "often":
+        proposal, path = proposed([tmp_path / "log.csv"], tmp_path)
+        assert not proposal.questions
+        entries = {c.name: c.entry for c in proposal.choices}
+        assert entries["position"] == {"column": "q_present_rad", "unit": "rad", "gaps": "interpolate"}
+        assert entries["servo"] == {"column": "q_cmd_rad", "unit": "rad", "gaps": "interpolate"}
+        mapping = read_mapping(path)
+    else:
+        (tmp_path / "mapping.yaml").write_text(
+            "robot: servo_pendulum\ntime: {column: time_s, unit: s}\n"
+            "sensors:\n  position: {column: q_present_rad, unit: rad, gaps: interpolate}\n  speed: {speed_of: position}\n"
+            "commands: {servo: {column: q_cmd_rad, unit: rad, gaps: interpolate}}\n"
+        )
+        mapping = read_mapping(tmp_path / "mapping.yaml")
+    ((record, report),) = import_files([tmp_path / "log.csv"], mapping, ROBOT)
+    if sent == "once":
+        assert np.array_equal(np.unique(record.log.commands), [0.25])
+        assert any("before the first command" in d for d in report.done)
+    else:
+        truth = np.interp(record.log.times_s, frame["time_s"], telemetry()["q_present_rad"].interpolate().bfill())
+        assert np.abs(record.log.sensors[:, 0] - truth).max() < 0.01
+
+
 def runs(folder: Path) -> list[str]:
     """A folder of folders: in each the telemetry, the events and a remark on how it was made."""
     names = []

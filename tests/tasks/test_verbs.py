@@ -195,6 +195,15 @@ def test_a_log_of_torques_without_commands_is_compared_and_explained(cli, record
     assert outcome.status == 2 and outcome.err.count("\n") == 1 and "import it with its commands" in outcome.err
 
 
+def test_what_no_effect_explains_alone_leads_on_to_improve(cli, imported):
+    """Several may be off together, which explain does not try."""
+    useless = "task.only=[sensor_noise@position]"
+    found, said = run(cli, "task=explain", f"measured={imported}", useless, "task.by=open_loop", *QUICK)
+    assert json.loads((found / "summary.json").read_text())["verdict"] == "unexplained"
+    assert "several may be off together" in " ".join(said.out.split())
+    assert "Next: python -m ee_dist task=improve" in said.out and "effect=auto" in said.out
+
+
 @pytest.mark.parametrize("by", WAYS)
 def test_a_sealed_trial_is_explained_improved_and_revealed(cli, by):
     plan = "task.excitations=['multisine:seconds=1.6,amplitude=0.2,seed=1','steps:seconds=1.6,amplitude=0.15,seed=2']"

@@ -42,6 +42,10 @@ ONE_EACH = (
     "Most joints move in one motion of their own, or each way in one: what is found at a joint is judged on other windows of "
     "that motion. Record each joint, both ways, in two motions or more to have it judged on one that was not fitted."
 )
+SEVERAL = (
+    "No effect does it alone: several may be off together, joint by joint, which improve looks for (below). Else try other "
+    "motions, or write the effect that is missing (docs/own_effect.md)."
+)
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
 

@@ -12,7 +12,7 @@ from ee_dist.discrepancy.accounts.account import (
     CONTENT,
     NO_MOTION_TRIED,
     NOTHING_ELSE,
-    STUCK,
+    SEVERAL,
     THAT_NOISE,
     TWINS,
     Account,
@@ -114,7 +114,7 @@ def explain_account(
             f"How sure: {counted(places, 'curve')} differ{'s' if places == 1 else ''} by more than noise; noise floor: "
         )
         sure += f"{found.floor_source}."
-        advice = STUCK
+        advice = SEVERAL
         lines += [f"Nearest, but not good enough: {phrase(c.terms, robot)}; {c.why_not}." for c in found.candidates[:1]]
     lines += beside_floor(last, found.noise_floor, bool(found.left))
     if rest:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.by_sensor import called_as_sensors
@@ -28,10 +30,13 @@ from ee_dist.measurements.table import Recorded, Table
 from ee_dist.robots.model import Sensor
 from ee_dist.trials.log import Array
 
+Mask = NDArray[np.bool_]
 BY_NAME, BY_SENSOR, BY_NUMBER, BY_PLACE, ONLY = "by name", "by sensor", "by number", "by place", "only one"
-EMPTY = 0.2
-"""Share of a column's cells that may be empty and yet be filled by straight lines: what a logger skips now and then, or reads
-in turn with something else."""
+EMPTY, IN_TURN = 0.2, 10
+"""Share of a column's cells that may be empty and yet be filled by straight lines: what a logger skips now and then; and how
+many in a row, of columns that are written in turn with others, as topics are that go into one table."""
+APART = 0.1
+"""Share of a column's rows in which one that is written in turn with it may have a number too."""
 SILENT = Reading(None, None, None, None, "", False, False)
 """What a name says that says nothing."""
 _GENERAL = frozenset(["joint", "link", "motor", "axis", "drive", "servo", "arm", "robot", "j"])
@@ -78,17 +83,23 @@ def series_of(table: Table, filled: bool = False) -> dict[str, Array]:
     """Every column of finite numbers, by address; ``filled``: with those of which a few cells are empty, on lines between."""
     found: dict[str, Array] = {}
     for address in table.addresses():
-        try:
-            values = table.numbers(address, gaps=filled)
-        except MeasurementError:
+        with contextlib.suppress(MeasurementError):
+            found[address] = table.numbers(address, gaps=filled)
+    there = {address: np.isfinite(values) for address, values in found.items()}
+    for address, good in there.items():
+        if good.all():
             continue
-        good = np.isfinite(values)
-        if not good.all():
-            if good.mean() < 1 - EMPTY or good.sum() < 2:
-                continue
-            values = np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
-        found[address] = values
+        rows, few = np.flatnonzero(good), good.mean() < 1 - EMPTY
+        if len(rows) < 2 or (few and (np.diff(rows).max() > IN_TURN or not _in_turn(good, there.values()))):
+            del found[address]
+            continue
+        found[address] = np.interp(np.arange(len(good)), rows, found[address][good])
     return found
+
+
+def _in_turn(good: Mask, others: Iterable[Mask]) -> bool:
+    """Whether some other column has its numbers in the rows (T,) in which this one has none."""
+    return any(other.any() and (good & other).sum() <= APART * other.sum() for other in others)
 
 
 def empty_cells(table: Table, column: str) -> int:

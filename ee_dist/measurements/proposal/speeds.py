@@ -21,6 +21,8 @@ from ee_dist.measurements.proposal.words import SPEED
 
 AGREES = 0.8
 """Correlation from which a speed is the change of a position."""
+USUAL = 0.05
+"""Share by which a count of the positions may be off a radian and be one;"""
 OFF = 0.1
 """Share by which speeds may be off the change of the positions and still be said to agree with the time."""
 SPEEDS = {"hinge": ("rad/s", "deg/s", "rpm"), "slide": ("m/s", "mm/s")}
@@ -143,6 +145,8 @@ def _of_a_count(v: View, block: Block) -> str:
         return ""
     (kind,) = kinds
     unit = (ANGLES if kind == "hinge" else LENGTHS)[0]
+    if kind == "hinge" and abs(r.slope - 1) < USUAL:
+        return f"; in {SPEEDS[kind][0]} they are the change of positions in {unit}, and in deg/s of positions in deg"
     turn = f", {2 * math.pi / r.slope:.4g} to a turn" if kind == "hinge" else ""
     return f"; in {SPEEDS[kind][0]} one of their numbers is {r.slope:.4g} {unit}{turn}: 'unit: {unit}, scale: {r.slope:.4g}'"
 
