@@ -99,12 +99,20 @@ def supply_sag(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.with_world(supply_sag=robot.world.supply_sag + values["share"])
 
 
+def _gains(robot: Robot, target: str) -> dict[str, Range]:
+    """Of torques, that of a motor whose constant nobody knew: several times off. A position that is so is another unit."""
+    torque = scales.drive_of(robot, target).command == "torque"
+    return {"change": (-0.8, 4.0) if torque else (-0.5, 0.5)}
+
+
 @effect(
     "command_gain",
     family="drive",
     targets=powered,
-    parameters=(Parameter("change", "1", -0.5, 0.5, 0.0, "change of the commanded position, as a share of it", 0.01),),
-    physics="The drive reads a larger or smaller position than was sent: a wrong scale between command and angle.",
+    parameters=(Parameter("change", "1", -0.9, 9.0, 0.0, "change of what was commanded, as a share of it", 0.01),),
+    ranges=_gains,
+    physics="The drive reads a larger or smaller position (speed, torque) than was sent: a wrong scale between the two, or, "
+    "of torques a motor whose constant is another.",
     signature="The joint's position is a scaled copy of the prediction, at any speed and load; nothing shows at zero.",
     everywhere=True,
 )
