@@ -236,5 +236,15 @@ def _complain(text: str, status: int = MISTAKE) -> int:
     return status
 
 
+def _end(status: int) -> None:
+    """Ends the process; at once where rerun would wait for ever for a file that it could not write."""
+    stream = sys.modules.get("ee_dist.viewing.stream")
+    if stream is not None and stream.GIVEN_UP:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    _end(main())

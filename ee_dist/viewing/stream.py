@@ -6,6 +6,7 @@ import errno
 import hashlib
 import os
 import re
+import threading
 import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -22,6 +23,10 @@ RUN_TIME = "run_time"
 """The timeline of every scene: seconds, trials one after another."""
 _SYSTEM = re.compile(r"([^:]*)\(os error (\d+)\)")
 """How rerun words an error of the system."""
+STALLED_S = 5.0
+"""After so long without a byte written a file is given up."""
+GIVEN_UP: list[rr.RecordingStream] = []
+"""Recordings that could not be ended: kept, for what is dropped would be waited for, as would be at the end of the process."""
 _IDS = uuid.UUID("6b1f3a52-7c1e-5d0a-9f57-1d2c0f6e8a34")
 
 
@@ -47,15 +52,51 @@ def recording(
         stream.send_recording_name(title)
         yield stream
         with _writing(target):
-            stream.flush()
-            stream.disconnect()
+            _flushed(stream, part)
+            _ended(stream)
         os.replace(part, target)
     except BaseException:
         with suppress(RuntimeError):
-            stream.disconnect()
+            _ended(stream)
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+def _flushed(stream: rr.RecordingStream, part: Path) -> None:
+    """Waits until all is in the file, as long as it grows: rerun's writer may have ended at a full disk without a word, and who
+    waits for it then waits for ever. Raises RuntimeError."""
+    size = -1
+    while True:
+        try:
+            stream.flush(timeout_sec=STALLED_S)
+            return
+        except RuntimeError:
+            before, size = size, part.stat().st_size if part.exists() else 0
+            if size == before:
+                raise
+
+
+def _ended(stream: rr.RecordingStream) -> None:
+    """Lets go of the file, which rerun may wait for ever to do, too. Raises RuntimeError."""
+    failed: list[RuntimeError] = []
+
+    def end() -> None:
+        try:
+            stream.disconnect()
+        except RuntimeError as error:
+            failed.append(error)
+
+    if stream in GIVEN_UP:
+        return
+    ending = threading.Thread(target=end, daemon=True)
+    ending.start()
+    ending.join(STALLED_S)
+    if ending.is_alive():
+        GIVEN_UP.append(stream)
+        raise RuntimeError("rerun does not let go of the file")
+    if failed:
+        raise failed[0]
 
 
 @contextmanager
