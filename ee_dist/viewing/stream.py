@@ -23,7 +23,7 @@ RUN_TIME = "run_time"
 """The timeline of every scene: seconds, trials one after another."""
 _SYSTEM = re.compile(r"([^:]*)\(os error (\d+)\)")
 """How rerun words an error of the system."""
-STALLED_S = 5.0
+STALLED_S = 20.0
 """After so long without a byte written a file is given up."""
 GIVEN_UP: list[rr.RecordingStream] = []
 """Recordings that could not be ended: kept, for what is dropped would be waited for, as would be at the end of the process."""
