@@ -26,6 +26,7 @@ from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, 
 from ee_dist.measurements.suspicious import (
     pace_suspicion,
     repeat_suspicion,
+    runs_against,
     speed_suspicion,
     suspicions,
     time_suspicion,
@@ -34,7 +35,7 @@ from ee_dist.measurements.suspicious import (
     unit_suspicion,
 )
 from ee_dist.measurements.table import LARGEST, Recorded
-from ee_dist.measurements.taking import power_suspicion
+from ee_dist.measurements.taking import power_suspicion, takers
 from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.trials import trials_of
 from ee_dist.measurements.units import TURN, UNITS, factor
@@ -402,12 +403,12 @@ class _Import:
         if note := torques_suspicion(names, judged):
             self.report.suspicious.append(note)
         assert torques is not None
-        for k, m in enumerate(self.robot.motor_names):
-            # What pushes or pulls from outside may give work.
-            against = any(s.startswith(f"{TORQUE} {m}: runs against") for s in self.report.suspicious)
-            if known[k] and not self.mapping.external and not against:
-                note = power_suspicion(f"{TORQUE} {m}", torques[:, k], joints[:, k], self.step_s)
-                self.report.suspicious += [note] if note else []
+        if self.mapping.external:  # what pushes or pulls from outside may give work
+            return
+        told = {m for m, relation in zip(names, judged, strict=True) if runs_against(relation)}
+        for m, work in takers(self.robot, torques, joints, self.step_s).items():
+            if m not in told:
+                self.report.suspicious.append(power_suspicion(f"{TORQUE} {m}", work))
 
     def _judge(self, found: tuple[str, bool] | None, column: Column | Estimated | None) -> None:
         if found is None:

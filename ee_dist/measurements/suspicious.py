@@ -206,7 +206,7 @@ def torque_suspicion(name: str, beside: signals.Relation, unit: str) -> tuple[st
     """Whether a torque or force in ``unit`` is one, by how it goes with what the motion needs: a sentence, and whether it is
     certain (a thousand times too much or too little) enough to stop. A model may be off by a lot."""
     size = abs(beside.slope)
-    if beside.correlation < -AGAINST and 1 / OTHER_UNIT < size < OTHER_UNIT:
+    if runs_against(beside):
         return (
             f"{name}: runs against what the motion needs (correlation {beside.correlation:.2f}): a swapped sign? "
             "set 'sign: -1' wherever the column is named, that of the torque or that of the joint's position"
@@ -219,6 +219,11 @@ def torque_suspicion(name: str, beside: signals.Relation, unit: str) -> tuple[st
             certain,
         )
     return None
+
+
+def runs_against(beside: signals.Relation) -> bool:
+    """Whether a torque goes against what the motion needs, by about as much."""
+    return beside.correlation < -AGAINST and 1 / OTHER_UNIT < abs(beside.slope) < OTHER_UNIT
 
 
 def torques_suspicion(names: Sequence[str], found: Sequence[signals.Relation]) -> str | None:

@@ -21,7 +21,7 @@ from ee_dist.measurements.suspicious import (
     torques_suspicion,
     unit_suspicion,
 )
-from ee_dist.measurements.taking import power_suspicion, taking
+from ee_dist.measurements.taking import power_suspicion, taking, work_taken
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import SensorLog
 
@@ -164,11 +164,12 @@ def test_a_drive_that_takes_work_out_of_what_goes_to_and_fro_is_told_without_a_m
         0.2 * np.gradient(speed, t) + 3.0 * np.cos(position) + 1.0 * np.sign(speed) + 0.3 * rng.standard_normal(len(t))
     )
     position = position + 1e-4 * rng.standard_normal(len(t))
-    assert power_suspicion("torque of j", torque, position, 0.01) is None
+    assert work_taken(torque, position, 0.01) is None
     friction = torque - 3.0 * np.cos(position)
-    note = power_suspicion("torque of j", -friction, position, 0.01) or ""
-    assert "takes" in note and "swapped sign" in note
-    assert power_suspicion("torque of j", -friction[:150], position[:150], 0.01) is None, "it does not come back"
+    taken = work_taken(-friction, position, 0.01)
+    assert taken is not None and taken.taken_j > taken.given_j >= 0
+    assert "swapped sign" in power_suspicion("torque of j", taken)
+    assert work_taken(-friction[:150], position[:150], 0.01) is None, "it does not come back"
 
 
 def test_a_log_whose_torque_takes_work_is_told_when_it_is_compared() -> None:

@@ -29,6 +29,11 @@ VAGUE = "none of its numbers is told from neutral; a plainer effect explains as 
 FEW_SHOW = "only some of the {kinds} tell its value: record more that show it"
 
 
+def does_nothing(values: Array) -> bool:
+    """Whether all values (shares of their ranges, neutral at 0) of an effect are at neutral; one that is no number counts so."""
+    return not np.abs(values).max() > NONE
+
+
 @dataclass(eq=False)
 class Judged:
     """One proposal on top of a model, both fitted together. Errors are root mean squares of residual values; ``gain`` and
@@ -94,7 +99,7 @@ class Judged:
     def none_in_it(self) -> bool:
         """Whether an effect of it does nothing by its values: without that it is the same."""
         places = [p for p in Model(self.proposal.parts).places if p.stop > p.start]
-        return any(not np.abs(self.own[p]).max() > NONE for p in places)
+        return any(does_nothing(self.own[p]) for p in places)
 
     @property
     def name(self) -> str:
