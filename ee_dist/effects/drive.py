@@ -112,7 +112,7 @@ def _gains(robot: Robot, target: str) -> dict[str, Range]:
     parameters=(Parameter("change", "1", -0.9, 9.0, 0.0, "change of what was commanded, as a share of it", 0.01),),
     ranges=_gains,
     physics="The drive reads a larger or smaller position (speed, torque) than was sent: a wrong scale between the two, or, "
-    "of torques a motor whose constant is another.",
+    "of torques, a motor whose constant is another.",
     signature="The joint's position is a scaled copy of the prediction, at any speed and load; nothing shows at zero.",
     everywhere=True,
 )
