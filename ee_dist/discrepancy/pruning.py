@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, cross_fit, held_by_slopes
+from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, HeldOut, cross_fit, held_by_slopes
 from ee_dist.discrepancy.evidence.judge import does_nothing
 from ee_dist.discrepancy.evidence.rule import WORTH, least_energy
 from ee_dist.discrepancy.examine import Current
@@ -14,7 +14,7 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.discrepancy.search.slopes import NEAR, WIDTHS
 from ee_dist.discrepancy.search.valley import LARGE, follow_valley
 from ee_dist.trials.log import Array
 
@@ -79,13 +79,22 @@ def as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: 
     data are foretold as well as by the whole model, give or take luck once, or for ``each`` of them. Far from the noise a term
     must be worth more than luck to come in; to stay, where nothing else tells it, no more than that. Slopes may mislead where
     a joint sticks; and where much is left at one joint, luck is taken to be large at all that moves it. 0: none."""
-    todo = list(fewer)
-    for some in (todo[:1], todo[1:]):
-        if some:
-            known, *others = held_by_slopes(search, [whole, *(fewer[n] for n in some)], cut)
-            for n, held in zip(some, others, strict=True):
-                if held.energy - known.energy <= _may_cost(search.problem, known.energy, cut, tried, n, each):
-                    return n
+    if not fewer:
+        return 0
+    most, *rest = fewer
+    known, first = held_by_slopes(search, [whole, fewer[most]], cut)
+
+    def may_go(n: int, without: HeldOut) -> bool:
+        return without.energy - known.energy <= _may_cost(search.problem, known.energy, cut, tried, n, each)
+
+    if may_go(most, first):
+        return most
+    # Far from the noise each may be fitted anew in every turn, which takes long; near it they cost little, and less together.
+    far = known.energy > NEAR * float(search.problem.floor.sum())
+    for some in [[n] for n in rest] if far else [rest]:
+        for n, without in zip(some, held_by_slopes(search, [fewer[n] for n in some], cut), strict=True):
+            if may_go(n, without):
+                return n
     return 0
 
 

@@ -47,7 +47,7 @@ def without_motion(noise: Array, times_s: Array, values: Array) -> Array:
     found = np.where(least < MOTION * noise, least, noise)
     for k, column in enumerate(values.T):
         new = np.r_[True, np.diff(column) != 0]
-        if HELD < 1 - new.mean() and np.count_nonzero(new) >= FRESH:
+        if 1 - new.mean() > HELD and np.count_nonzero(new) >= FRESH:
             fresh = float(slow_noise(times_s[new], column[new][:, None])[0])
             found[k] = max(fresh, reading_step(column) / np.sqrt(12))
     return found
