@@ -136,6 +136,11 @@ def is_arm(robot: Robot) -> bool:
     return not robot.free_base and len(robot.drives) > 1
 
 
+def takes_torques(robot: Robot) -> bool:
+    """Whether some motor is told a torque, or a voltage in its place."""
+    return any(d.command == "torque" for d in robot.drives)
+
+
 def gains_are_known(robot: Robot) -> bool:
     """Whether somebody said what the robot's controllers do: a torque is too weak only beside one that is known."""
     return not robot.assumed_joints("kp")
