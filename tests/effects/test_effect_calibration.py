@@ -99,3 +99,17 @@ def test_on_stand_nothing_is_touched_and_the_body_stays(bench: Bench) -> None:
     assert (log.base_pose == log.base_pose[0]).all()
     assert (log.sensors[:, :4] == -1).all()
     assert abs(log.channel("angle_front_left")[-1]) > 0.1
+
+
+def test_axis_reversed_lets_the_same_weight_pull_the_other_way(bench: Bench) -> None:
+    robot = lever(kp=100.0, kd=10.0)
+    down, up = (bench.run(robot, *terms, steps=2000) for terms in ((), (term("axis_reversed", "joint"),)))
+    angle = float(up.channel("position")[-1])
+    assert 100.0 * angle == pytest.approx(-HOLD_NM * math.cos(angle), rel=1e-3)
+    assert angle == pytest.approx(-float(down.channel("position")[-1]), rel=1e-6)
+
+
+def test_a_joint_that_counts_the_other_way_reaches_as_far_as_it_did_and_as_it_would() -> None:
+    robot = lever().with_joint("joint", lower=-0.5, upper=2.0)
+    joint = apply(robot, (term("axis_reversed", "joint"),)).joint("joint")
+    assert (joint.lower, joint.upper) == (-2.0, 2.0)

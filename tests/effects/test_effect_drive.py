@@ -96,6 +96,15 @@ def test_command_gain_scales_where_the_joint_goes(bench: Bench) -> None:
     )
 
 
+def test_command_reversed_pushes_the_other_way(bench: Bench) -> None:
+    robot = slider(**(SERVO | {"command": "torque"}))
+    pushed, back = (
+        bench.run(robot, *terms, steps=100, command=0.3) for terms in ((), (term("command_reversed", "joint"),))
+    )
+    assert pushed.channel("position")[-1] > 0.0
+    np.testing.assert_allclose(back.channel("position"), -pushed.channel("position"), atol=1e-12)
+
+
 @pytest.mark.parametrize("steps", [7, 50])
 def test_command_delay_shifts_the_motion_by_its_time(bench: Bench, steps: int) -> None:
     command = np.concatenate([np.zeros(5), np.full(395, 0.2)])

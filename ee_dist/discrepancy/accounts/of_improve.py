@@ -76,6 +76,12 @@ def improve_account(
     lines = []
     if len(steps) > 1:
         lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
+    # Which way a joint counts is mended in a file, not carried along in a model.
+    lines += [
+        f"{plain(placed(t.name)).capitalize()}: {CATALOGUE[t.effect].physics}"
+        for t in found.terms
+        if CATALOGUE[t.effect].reverses
+    ]
     names = {t.name for t in found.terms}
     ties = {
         r.name: [n for n in r.tied_with if not has(names, n, robot)] for r in steps if names & {t.name for t in r.added}

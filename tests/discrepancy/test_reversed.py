@@ -1,0 +1,51 @@
+"""A joint that turns the other way than described is named by every way of comparing, and nothing stands in for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from way_samples import measure, problem_by, samples
+
+from ee_dist.discrepancy.draw import draw
+from ee_dist.discrepancy.examine import Effort
+from ee_dist.discrepancy.explain import EFFECT, explain
+from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.effects.catalogue import CATALOGUE, term
+
+QUICK = Effort(first=8, second=4, final=4, starts=1)
+RIVALS = ("axis_reversed", "part_mass", "parallel_spring", "offset_torque", "coulomb_friction", "com_shifted")
+
+
+@pytest.mark.parametrize("way", ["open_loop", "free_run", "force_balance"])
+def test_a_joint_that_turns_the_other_way_is_named(way: str) -> None:
+    sample = samples()["arm"]
+    p = problem_by(way, measure(sample, (term("axis_reversed", "elbow"),), seed=5), sample.robot)
+    p.effort = 0.4
+    found = explain(p, pool_of(p, only=RIVALS), effort=QUICK)
+    assert found.verdict == EFFECT and found.best is not None
+    assert found.best.name == "axis_reversed@elbow"
+    assert found.best.explained > 0.9
+
+
+@pytest.mark.parametrize("way", ["open_loop", "free_run", "force_balance"])
+def test_no_sign_is_turned_where_a_heavy_part_is_what_is_missing(way: str) -> None:
+    sample = samples()["arm"]
+    p = problem_by(way, measure(sample, (term("part_mass", "lower", change=0.8),), seed=6), sample.robot)
+    p.effort = 0.4
+    found = explain(p, pool_of(p, only=RIVALS), effort=QUICK)
+    assert found.best is not None and found.best.name == "part_mass@lower"
+    assert not any("axis_reversed" in name for name in found.best.tied_with)
+
+
+def test_whether_a_motor_turns_round_is_asked_of_those_that_are_told_torques() -> None:
+    robot = samples()["arm"].robot
+    told = replace(robot, drives=tuple(replace(d, command="torque") for d in robot.drives))
+    entry = CATALOGUE["command_reversed"]
+    assert entry.proposed(told) == told.motor_names and entry.proposed(robot) == ()
+
+
+def test_no_robot_catches_a_mistake_of_its_description() -> None:
+    rng, robot = np.random.default_rng(0), samples()["arm"].robot
+    assert not any(draw(robot, rng)[0].effect.reverses for _ in range(300))
