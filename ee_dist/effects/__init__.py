@@ -8,6 +8,7 @@ from ee_dist.effects import (  # noqa: F401
     fixture,
     friction,
     genes,
+    mistakes,
     sensing,
     transmission,
     wiring,

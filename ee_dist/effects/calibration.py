@@ -332,23 +332,6 @@ def axis_tilt(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.with_joint(target, axis=(x, y, z))
 
 
-@effect(
-    "axis_reversed",
-    family="body",
-    targets=motors,
-    physics="A joint turns the other way than the description says: its axis points backwards in the file, or its encoder counts "
-    "the other way. Where position zero is stays, and the stops are those of both ways. Mend the axis in the description, or "
-    "put 'sign: -1' on the joint's columns in the mapping: position, speed, torque and command.",
-    signature="The weight of what the joint carries, and what it does to the joints before it, come with the other sign.",
-    reverses=True,
-)
-def axis_reversed(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    joint = robot.joint(target)
-    x, y, z = (0.0 - a for a in joint.axis)
-    ends = min(joint.lower, -joint.upper), max(joint.upper, -joint.lower)
-    return robot.with_joint(target, axis=(x, y, z), lower=ends[0], upper=ends[1])
-
-
 def _times(a: Quat, b: Quat) -> Quat:
     ax, ay, az, aw = a
     bx, by, bz, bw = b

@@ -113,9 +113,9 @@ class Effect:
     seen_in: Callable[[Array], Mapping[str, float]] | None = None
     """Its values as readings (T,) of a sensor show them without a model: a search looks there too, for no slope may lead there.
     Empty where they show none."""
-    reverses: bool = False
-    """Whether it says no more than which way something counts: a mistake of a description or a mapping, that no robot catches
-    and any way of comparing tells."""
+    mistake: bool = False
+    """Whether it says no more than which way round something is, or which is which: a mistake of a description or a mapping, that
+    no robot catches and any way of comparing tells."""
 
     def shared(self, robot: Robot) -> tuple[str, ...]:
         """Groups of joints or sensors that it can act on with one set of values (see groups.py). What is wrong with a part is
@@ -267,7 +267,7 @@ def effect(
     of: type = Robot,
     guesses: Callable[[Robot], tuple[str, ...]] | None = None,
     seen_in: Callable[[Array], Mapping[str, float]] | None = None,
-    reverses: bool = False,
+    mistake: bool = False,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
 
@@ -302,7 +302,7 @@ def effect(
             of,
             guesses,
             seen_in,
-            reverses,
+            mistake,
         )
         return transform
 

@@ -20,7 +20,6 @@ from ee_dist.effects.targets import (
     position_drives,
     powered,
     supply,
-    takes_torques,
 )
 from ee_dist.robots.model import Drive, Robot
 
@@ -126,21 +125,6 @@ def command_gain(robot: Robot, target: str, values: Mapping[str, float]) -> Robo
 
 def _delays(robot: Robot, target: str) -> dict[str, Range]:
     return {"delay_s": (0.0 - scales.drive_of(robot, target).delay_s, scales.longest_delay(robot))}
-
-
-@effect(
-    "command_reversed",
-    family="drive",
-    targets=powered,
-    physics="The motor turns the other way than it is told to: its two wires are swapped, or the command was logged with the "
-    "other sign. Put 'sign: -1' on the joint's command in the mapping. Which way a joint goes that is told a position or a speed "
-    "is seen without a model.",
-    signature="Whatever the commands do to the motion they do the other way round.",
-    worth_proposing=takes_torques,
-    reverses=True,
-)
-def command_reversed(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    return robot.map_drive(target, lambda d: altered(d, command_gain=-d.command_gain))
 
 
 @effect(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import combinations
 
 from ee_dist.robots.model import Robot
 
@@ -116,6 +117,13 @@ def motor_pairs(robot: Robot) -> tuple[str, ...]:
     return tuple(f"{a.joint}+{b.joint}" for a, b in pairs if a.command == b.command)
 
 
+def joint_pairs(robot: Robot) -> tuple[str, ...]:
+    """``a+b``: two different joints with a drive that both turn, or both slide, in the order of the robot."""
+    kinds = {n: robot.joint(n).kind for n in robot.motor_names}
+    pairs = combinations(robot.motor_names, 2)
+    return tuple(f"{a}+{b}" for a, b in pairs if kinds[a] == kinds[b])
+
+
 def floor(robot: Robot) -> tuple[str, ...]:
     return ("floor",) if robot.world.has_floor else ()
 
@@ -139,6 +147,14 @@ def is_arm(robot: Robot) -> bool:
 def takes_torques(robot: Robot) -> bool:
     """Whether some motor is told a torque, or a voltage in its place."""
     return any(d.command == "torque" for d in robot.drives)
+
+
+MOST_JOINTS = 8
+
+
+def has_few_joints(robot: Robot) -> bool:
+    """Bolted down, with two to MOST_JOINTS joints: pairs of more are too many to ask for each."""
+    return not robot.free_base and 2 <= len(robot.drives) <= MOST_JOINTS
 
 
 def gains_are_known(robot: Robot) -> bool:

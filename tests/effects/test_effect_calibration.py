@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,3 +114,30 @@ def test_a_joint_that_counts_the_other_way_reaches_as_far_as_it_did_and_as_it_wo
     robot = lever().with_joint("joint", lower=-0.5, upper=2.0)
     joint = apply(robot, (term("axis_reversed", "joint"),)).joint("joint")
     assert (joint.lower, joint.upper) == (-2.0, 2.0)
+
+
+@pytest.mark.parametrize(("side", "pull"), [("x_up", 1.0), ("x_down", -1.0)])
+def test_base_turned_lets_gravity_come_from_another_side(bench: Bench, side: str, pull: float) -> None:
+    """An arm along x that stands on end falls over, and hanging comes back: m g r sin(q)."""
+    log = bench.run(lever(kp=100.0, kd=10.0), term("base_turned", side), steps=3000, command=0.5)
+    angle = float(log.channel("position")[-1])
+    assert 100.0 * (angle - 0.5) == pytest.approx(pull * HOLD_NM * math.sin(angle), rel=1e-3)
+
+
+@pytest.mark.parametrize("side", ["y_up", "y_down", "upside_down"])
+def test_a_base_may_be_turned_any_way(bench: Bench, side: str) -> None:
+    log = bench.run(lever(kp=100.0, kd=10.0), term("base_turned", side), steps=3000)
+    angle = float(log.channel("position")[-1])
+    # About an axis along gravity nothing weighs; upside down it pulls the other way.
+    pull = -HOLD_NM * math.cos(angle) if side == "upside_down" else 0.0
+    assert 100.0 * angle == pytest.approx(pull, rel=1e-3, abs=1e-6)
+
+
+def test_joints_swapped_gives_each_the_place_and_the_drive_of_the_other() -> None:
+    robot = quadruped()
+    one, two = robot.motor_names[:2]
+    swapped = apply(robot, (term("joints_swapped", f"{one}+{two}"),))
+    assert swapped.motor_names == robot.motor_names
+    assert swapped.joint(one).child == robot.joint(two).child and swapped.joint(two).child == robot.joint(one).child
+    assert swapped.drives[0] == replace(robot.drives[1], joint=one)
+    assert apply(swapped, (term("joints_swapped", f"{one}+{two}"),)) == robot

@@ -80,7 +80,7 @@ def improve_account(
     lines += [
         f"{plain(placed(t.name)).capitalize()}: {CATALOGUE[t.effect].physics}"
         for t in found.terms
-        if CATALOGUE[t.effect].reverses
+        if CATALOGUE[t.effect].mistake
     ]
     names = {t.name for t in found.terms}
     ties = {

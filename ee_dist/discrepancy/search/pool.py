@@ -15,7 +15,7 @@ from ee_dist.effects.groups import JOIN
 def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] = ()) -> list[Candidate]:
     """Candidates at all places and groups, less those left out. Raises EffectError for names that do not exist."""
     found = candidates(problem.robot, without, only or None, problem.families)
-    told = (c for c in found if c.size or problem.switches or c.effect.reverses)
+    told = (c for c in found if c.size or problem.switches or c.effect.mistake)
     able = (c for c in told if problem.shows(c.effect.name, c.target))
     judged = (as_long(problem, c) for c in (_judged(problem, c) for c in able) if c is not None)
     # Several groups may be one where joints that nothing is known of are left out.
