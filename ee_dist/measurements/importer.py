@@ -33,6 +33,7 @@ from ee_dist.measurements.suspicious import (
     torque_suspicion,
     torques_suspicion,
     unit_suspicion,
+    unlike_suspicion,
 )
 from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.measurements.taking import power_suspicion, takers
@@ -400,8 +401,8 @@ class _Import:
         units, names = torque_units(self.robot), [m for m in self.robot.motor_names if m in self.mapping.torques]
         for m, relation in zip(names, judged, strict=True):
             self._judge(torque_suspicion(f"{TORQUE} {m}", relation, units[m]), self.mapping.torques[m])
-        if note := torques_suspicion(names, judged):
-            self.report.suspicious.append(note)
+        for note in (torques_suspicion(names, judged), unlike_suspicion(names, judged)):
+            self.report.suspicious += [note] if note else []
         assert torques is not None
         if self.mapping.external:  # what pushes or pulls from outside may give work
             return

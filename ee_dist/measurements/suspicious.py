@@ -25,6 +25,8 @@ POSITION_RATIOS = tuple(r**k for r in (180 / np.pi, 1000.0) for k in (1, -1))
 """Between units of position that are taken for one another: degrees and radians, milli and one."""
 AGAINST = 0.7
 """Correlation from which torques run against what a motion needs, or go with it."""
+UNLIKE = 0.4
+"""Correlation below which they go with it as chance has it."""
 OTHER_UNIT, OTHER_SIZE = 4.0, 20.0
 """A soft drive goes only part of the way to its command, and a model may be off by a lot: beyond these it is another unit."""
 
@@ -219,6 +221,18 @@ def torque_suspicion(name: str, beside: signals.Relation, unit: str) -> tuple[st
             certain,
         )
     return None
+
+
+def unlike_suspicion(names: Sequence[str], found: Sequence[signals.Relation]) -> str | None:
+    """Whether the torques of two joints or more go with what the motion needs at none of them."""
+    if len(found) < 2 or max(abs(r.correlation) for r in found) >= UNLIKE:
+        return None
+    best = max(range(len(found)), key=lambda k: abs(found[k].correlation))
+    return (
+        f"torques: at no joint do they go with what the motion needs by this model (best at {names[best]}, correlation "
+        f"{found[best].correlation:.2f}): all friction, or is the base bolted on by another side than described, or do joints "
+        "turn the other way, or have each other's columns? explain asks for each of these"
+    )
 
 
 def runs_against(beside: signals.Relation) -> bool:

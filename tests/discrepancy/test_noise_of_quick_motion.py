@@ -86,3 +86,17 @@ def test_the_floor_of_both_simulations_is_the_readings_own() -> None:
     assert channel_scale(robot, [trial]).noise[position] == pytest.approx(1e-4, rel=1.0)
     floor = FreeRun((trial,), robot, evaluator_for(robot), windows_s=0.5).noise
     assert (floor < 3e-4).all()
+
+
+def test_a_sensor_that_rests_all_through_a_trial_tells_no_noise_there() -> None:
+    robot = samples()["arm"].robot
+    robot = replace(robot, time_step_s=STEP_S, sensors=tuple(replace(s, noise=0.0) for s in robot.sensors))
+    moving = swinging(robot, 1e-4)
+    read = moving.log.sensors.copy()
+    read[:, 0] = 0.3
+    resting = replace(moving, name="rest", log=replace(moving.log, sensors=read))
+    alone, both = (channel_scale(robot, trials).noise for trials in ([moving], [moving, resting]))
+    assert both == pytest.approx(alone)
+    assert channel_scale(robot, [resting]).noise[0] == 0.0
+    one, two = (FreeRun(t, robot, evaluator_for(robot), windows_s=0.5).noise for t in ((moving,), (moving, resting)))
+    assert two == pytest.approx(one, rel=0.5)

@@ -14,6 +14,7 @@ from ee_dist.measurements.proposal.torque_shares import FAR, Share, tell_shares
 from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.view import View
 from ee_dist.measurements.proposal.words import CURRENT, TORQUE
+from ee_dist.measurements.suspicious import UNLIKE
 from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
 
@@ -143,12 +144,16 @@ def torque_units(v: View, block: Block) -> UnitChoice:
         if v.hints.gains == FIT
         else f"{what} times the gain you said"
     )
-    why = said if current else f"{entries[0]['unit']}" + (
-        ", as large as the motion needs" if checked else ", the usual unit; not checked")  # fmt: skip
+    # That they fit nowhere is no check that was left out.
+    fits = [abs(relations[k].correlation) for k in telling] if relations is not None else []
+    unlike = len(fits) > 1 and max(fits) < UNLIKE
+    usual = ", the usual unit; " + ("they go with what the motion needs at no joint" if unlike else "not checked")
+    why = said if current else entries[0]["unit"] + (", as large as the motion needs" if checked else usual)
     if turned:
         why += f"; sign turned at {', '.join(turned)}: it was against what the motion needs"
     if unclear:
         why += f"; sign at {', '.join(unclear)} not clear, kept as it is: the model needs the other, but not this much"
+        why += " (or the joint turns the other way than described, which explain asks for)"
     stated_all = all(u in ("N.m", "mN.m", "N", "mN") for u in block.units) if block.units else False
     stated_all = stated_all or (current and v.hints.gains != FIT)
     return UnitChoice(tuple(entries), SURE if stated_all and not turned and not unclear else LIKELY, why)
