@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.lost import without_lost
 from ee_dist.measurements.readers.arrays import read_npz
 from ee_dist.measurements.readers.bags import is_bag, read_bag, read_mcap
 from ee_dist.measurements.readers.hdf5 import read_hdf5
@@ -99,4 +101,4 @@ def read(path: str | Path, options: Options = Options()) -> tuple[Recorded, ...]
     found = tuple(r for r in found if any(len(t) for t in r.tables))
     if not found:
         raise MeasurementError(f"{file}: no rows in it (zero length)")
-    return found
+    return tuple(replace(r, tables=tuple(map(without_lost, r.tables))) for r in found)
