@@ -14,6 +14,8 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 FEWEST_ROWS = 10
+MANY = 3.0
+"""Times what a drive can give from which a command is in another unit."""
 
 
 def command_flaws(
@@ -37,6 +39,19 @@ def command_flaws(
             unit = "rad" if robot.joint(joint).kind == "hinge" else "m"
             found = (f"{joint} does not move although it is commanded by {np.ptp(asked):.2g} {unit}", False)
         yield joint, found
+
+
+def beyond_the_drive(robot: Robot, commands: Array) -> Iterator[str]:
+    """A line on joints that are told torques of which their drives can give a part only: another unit, or volts. ``commands``
+    (T, M) are NaN where drives are released."""
+    for k, drive in enumerate(robot.drives):
+        most = float(np.nanmax(np.abs(commands[:, k]))) if np.isfinite(commands[:, k]).any() else 0.0
+        if command_kind(drive) == "torque" and most > MANY * drive.torque_limit > 0:
+            unit = "N.m" if robot.joint(drive.joint).kind == "hinge" else "N"
+            yield (
+                f"command of {drive.joint}: reaches {most:.3g} {unit}, {most / drive.torque_limit:.2g} times what its drive can "
+                f"give ({drive.torque_limit:.3g}): another unit, or volts, which need a scale ('scale:' at the column)?"
+            )
 
 
 def _alike(robot: Robot, mapping: Mapping, one: str, other: str) -> bool:

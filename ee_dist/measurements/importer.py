@@ -16,7 +16,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.clocks import Clocked, check_grid
-from ee_dist.measurements.commanded import command_flaws
+from ee_dist.measurements.commanded import beyond_the_drive, command_flaws
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.need import torques_beside_need
@@ -24,6 +24,7 @@ from ee_dist.measurements.report import Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import (
+    exchanged_suspicions,
     pace_suspicion,
     repeat_suspicion,
     runs_against,
@@ -366,8 +367,10 @@ class _Import:
             elif s.kind == "velocity" and s.target in position_of:
                 self._judge(speed_suspicion(s.name, self.channels[s.name], position_of[s.target], self.step_s), column)
         self._look_at_pace()
+        self._look_for_exchanged(position_of)
         for name, flaw in command_flaws(self.robot, self.mapping, commands, position_of, self.step_s):
             self._judge(flaw, self.mapping.commands.get(name))
+        self.report.suspicious += beyond_the_drive(self.robot, commands)
 
     def _look_at_repeats(self) -> None:
         """Rows in which nothing was read anew: what sensors say in one table, as the file has it."""
@@ -391,6 +394,21 @@ class _Import:
         note = pace_suspicion(speed, position, self.step_s, self.report.rate_read_hz)
         if note:
             self.report.suspicious.append(note)
+
+    def _look_for_exchanged(self, position_of: dict[str, Array]) -> None:
+        """Measured speeds that are the change of another joint's positions."""
+        own = [
+            s for s in self.robot.sensors if s.kind == "velocity" and isinstance(self.mapping.sensors[s.name], Column)
+        ]
+        read = [s for s in own if s.target in position_of]
+        if len(read) > 1:
+            speed, position = (
+                np.stack([self.channels[s.name] for s in read], 1),
+                np.stack([position_of[s.target] for s in read], 1),
+            )
+            self.report.suspicious += exchanged_suspicions(
+                [s.name for s in read], [s.target for s in read], speed, position, self.step_s
+            )
 
     def _look_at_torques(self, torques: Array | None, joints: Array) -> None:
         """Torques beside what the motion needs. Raises MeasurementError for a unit that cannot be."""

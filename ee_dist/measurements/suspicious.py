@@ -186,6 +186,23 @@ def pace_suspicion(speed: Array, position: Array, step_s: float, rate_hz: float)
     )
 
 
+def exchanged_suspicions(
+    names: Sequence[str], joints: Sequence[str], speed: Array, position: Array, step_s: float
+) -> list[str]:
+    """Lines on speeds (T, J), called ``names``, that are the change of the position (T, J) of another of the ``joints`` and not
+    of their own."""
+    changes, found = signals.change(position, step_s), []
+    for k in signals.lively(speed, position):
+        fits = [abs(signals.relation(changes[:, [j]], speed[:, [k]]).correlation) for j in range(len(joints))]
+        other = int(np.argmax(fits))
+        if fits[k] < UNLIKE and fits[other] > CLEAR:
+            found.append(
+                f"{names[k]}: is the change of the position of {joints[other]}, not of {joints[k]}: exchanged columns, of the "
+                "positions or of the speeds?"
+            )
+    return found
+
+
 def command_suspicion(name: str, command: Array, position: Array, step_s: float) -> tuple[str, bool] | None:
     """Whether a joint runs away from its commands, or they are in another unit than its position: a sentence, and whether it
     is certain (a ratio between two units) enough to stop. Beyond the bandwidth of its drive a joint in order comes half a period

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from ee_dist.measurements.commanded import beyond_the_drive
 from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
     command_suspicion,
+    exchanged_suspicions,
     repeat_suspicion,
     speed_suspicion,
     suspicions,
@@ -20,6 +22,7 @@ from ee_dist.measurements.suspicious import (
     torque_suspicion,
     torques_suspicion,
     unit_suspicion,
+    unlike_suspicion,
 )
 from ee_dist.measurements.taking import power_suspicion, taking, work_taken
 from ee_dist.robots.servo_pendulum import servo_pendulum
@@ -189,3 +192,35 @@ def test_a_log_whose_torque_takes_work_is_told_when_it_is_compared() -> None:
     assert "during b" in line and robot.motor_names[0] in line
     assert taking(robot, [("b", log(-1.0, external=np.zeros((len(t), 1))))]) == [], "what pushes may give work"
     assert taking(replace(robot, free_base=True), [("b", log(-1.0))]) == []
+
+
+def test_speeds_of_another_joint_are_told() -> None:
+    t = np.arange(0, 10, 0.01)
+    position = np.stack([np.sin(1.3 * t), 0.8 * np.sin(2.9 * t + 1), 0.5 * np.cos(4.1 * t)], axis=1)
+    speed = np.gradient(position, 0.01, axis=0) + 0.01 * np.random.default_rng(0).standard_normal(position.shape)
+    names, joints = ["v_a", "v_b", "v_c"], ["a", "b", "c"]
+    assert exchanged_suspicions(names, joints, speed, position, 0.01) == []
+    lines = exchanged_suspicions(names, joints, speed[:, [1, 0, 2]], position, 0.01)
+    assert [line.split(":")[0] for line in lines] == ["v_a", "v_b"]
+    assert "position of b, not of a" in lines[0]
+
+
+def test_torques_that_go_with_the_motion_nowhere_are_told() -> None:
+    far, near = Relation(0.2, 1.0), Relation(0.8, 1.0)
+    assert unlike_suspicion(["a", "b"], [far, near]) is None
+    assert unlike_suspicion(["a"], [far]) is None, "one joint alone may be all friction"
+    assert "base" in (unlike_suspicion(["a", "b"], [far, far]) or "")
+
+
+def test_a_command_that_no_drive_can_give_is_told() -> None:
+    robot = servo_pendulum()
+    (drive,) = robot.drives
+    told = replace(robot, drives=(replace(drive, command="torque"),))
+    commands = np.full((50, 1), np.nan)
+    assert list(beyond_the_drive(told, commands)) == []
+    commands[10:] = 2.0 * drive.torque_limit
+    assert list(beyond_the_drive(told, commands)) == []
+    commands[20] = -40.0 * drive.torque_limit
+    (line,) = beyond_the_drive(told, commands)
+    assert "40 times" in line and "volts" in line
+    assert list(beyond_the_drive(robot, commands)) == [], "a position is none"

@@ -46,6 +46,10 @@ SEVERAL = (
     "No effect does it alone: several may be off together, joint by joint, which improve looks for (below). Else try other "
     "motions, or write the effect that is missing (docs/own_effect.md)."
 )
+MEND = (
+    "Next: mend the description or the mapping, which has that the wrong way round (below), and begin again with it: what is "
+    "fitted on top can be no surer than that."
+)
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
 

@@ -10,6 +10,7 @@ from ee_dist.basics.names import counted
 from ee_dist.discrepancy.accounts.account import (
     BEYOND,
     CONTENT,
+    MEND,
     NO_MOTION_TRIED,
     NOTHING_ELSE,
     SEVERAL,
@@ -96,7 +97,7 @@ def explain_account(
         error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor)
         sure = f"How sure: it explains {taken_off(best)}{unexplained_rest(best.explained, not found.left)}. "
         sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}.{_at_bounds(best, robot)}"
-        advice = slower(unsure) if unsure else ""
+        advice = slower(unsure) if unsure else MEND if entry.mistake else ""
         guessed = best.proposal.label == LABEL
         lines.append(GUESSED if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""

@@ -11,6 +11,7 @@ from ee_dist.basics.names import counted
 from ee_dist.discrepancy.accounts.account import (
     BEYOND,
     CONTENT,
+    MEND,
     NOTHING_ELSE,
     STUCK,
     TWINS,
@@ -77,11 +78,8 @@ def improve_account(
     if len(steps) > 1:
         lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
     # Which way a joint counts is mended in a file, not carried along in a model.
-    lines += [
-        f"{plain(placed(t.name)).capitalize()}: {CATALOGUE[t.effect].physics}"
-        for t in found.terms
-        if CATALOGUE[t.effect].mistake
-    ]
+    wrong = [t for t in found.terms if CATALOGUE[t.effect].mistake]
+    lines += [f"{plain(placed(t.name)).capitalize()}: {CATALOGUE[t.effect].physics}" for t in wrong]
     names = {t.name for t in found.terms}
     ties = {
         r.name: [n for n in r.tied_with if not has(names, n, robot)] for r in steps if names & {t.name for t in r.added}
@@ -99,7 +97,7 @@ def improve_account(
     gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in told)
     lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]
     # What may be nothing is no news, whatever depends on it together with others.
-    parts = sorted(shares(found, robot), key=lambda s: may_be_nothing(found, s.terms))
+    parts = sorted(shares(found, robot), key=lambda s: (s.terms[0] not in wrong, may_be_nothing(found, s.terms)))
     lines += doubt_text([s for s in parts if s.doubted])
     vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
     if vague:
@@ -137,7 +135,7 @@ def improve_account(
     if word is not None:
         error = f"{error} {word.text}"
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
-    advice = slower(unsure) if unsure else advice
+    advice = slower(unsure) if unsure else MEND if wrong else advice
     tied = bool(found.twins) or any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
     good = settled and not warnings and not unsure and not any(ties.values())
