@@ -13,6 +13,7 @@ from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import circumstances, compare
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.effects import apply, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.need import torques_needed
 from ee_dist.recording.records import HARDWARE, TrialRecord
@@ -48,6 +49,17 @@ def test_torques_that_carry_no_weight_are_told_before_anything_is_believed() -> 
     assert any(line.startswith("Before this is believed: the measured torques do not carry") for line in told.first)
     floating = replace(robot, world=replace(robot.world, gravity_m_s2=0.0))
     assert not ForceBalance(light, floating).doubts
+
+
+def test_a_base_bolted_on_by_another_side_is_told_before_anything_is_believed() -> None:
+    robot, trials = samples()["arm"].robot, measured("arm")
+    for side in ("x_up", "x_down", "upside_down"):
+        hung = apply(robot, (term("base_turned", side),))
+        p = ForceBalance(trials, hung)
+        assert "bolted on by another side" in p.doubts
+        # Turned by that, it carries what it should.
+        at = p.doubts.split("base_turned@")[1].split("'")[0]
+        assert not ForceBalance(trials, apply(hung, (term("base_turned", at),))).doubts
 
 
 @pytest.mark.parametrize(("at", "name"), [((1.0, 0.0), "shoulder"), ((0.0, 1.0), "elbow")])

@@ -93,8 +93,9 @@ class Account:
 
 
 def advised(problem: Problem, advice: str) -> str:
-    """The advice, and before it what is to be put right first."""
-    return " ".join(t for t in (problem.doubts and f"Before this is believed: {problem.doubts}", advice) if t)
+    """The advice, and before it what is to be put right first: what was found to be the wrong way round, where that was found."""
+    doubts = "" if advice == MEND else problem.doubts
+    return " ".join(t for t in (doubts and f"Before this is believed: {doubts}", advice) if t)
 
 
 def held_out_notes(problem: Problem) -> list[str]:

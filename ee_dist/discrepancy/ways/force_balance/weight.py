@@ -3,13 +3,16 @@ joint reports may be no torque."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ee_dist.basics.names import listed
 from ee_dist.discrepancy.ways.force_balance.balance import Balance
+from ee_dist.effects import apply, term
+from ee_dist.effects.catalogue import find
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -20,6 +23,9 @@ MOSTLY = 0.5
 """and of what it leaves over with its weight that it may leave at most without."""
 HEAVY = 0.1
 """Share of a joint's measured torque (root mean square) from which it carries weight by the model."""
+
+TURNED = 0.5
+"""Share of what is left upright, and of what is left without weight, that may be left of a base bolted on by another side."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,12 @@ def weightless(models: Sequence[Robot], balances: Sequence[Balance], scale: Arra
     if all(m.world.gravity_m_s2 == 0 for m in models):
         return ""
     heavy = {n: w for n, w in _weighed(models, balances, scale, names).items() if w.weight > HEAVY**2}
+    side = _side_that_fits(models, balances, scale) if heavy else ""
+    if side:
+        return (
+            "the measured torques do not carry the weight that the model has, but would with its base bolted on by another side: "
+            f"{side.replace('_', ' ')}. Is it described upright? 'effect=base_turned@{side}' turns it."
+        )
     none = [n for n, w in heavy.items() if w.left_out]
     if not none:
         return ""
@@ -69,6 +81,22 @@ def weightless(models: Sequence[Robot], balances: Sequence[Balance], scale: Arra
         f"does a counterweight or a spring carry it, or {column}, or in another unit? What the mapping leaves out of the "
         "torques is not compared, and all else is."
     )
+
+
+def _side_that_fits(models: Sequence[Robot], balances: Sequence[Balance], scale: Array) -> str:
+    """By which side the base would have to be bolted on for the torques to fit much better than upright, or without any weight;
+    empty for none."""
+
+    def left(change: Callable[[Robot], Robot]) -> float:
+        found = [balance(change(model)) for model, balance in zip(models, balances, strict=True)]
+        return sum(math.inf if f is None else float(np.sum((f[1] / scale) ** 2)) for f in found)
+
+    def turned(side: str) -> Callable[[Robot], Robot]:
+        return lambda model: apply(model, (term("base_turned", side),))
+
+    sides = {side: left(turned(side)) for side in find("base_turned").targets(models[0])}
+    best = min(sides, key=lambda side: sides[side], default="")
+    return best if best and sides[best] < TURNED * min(left(lambda m: m), left(without_weight)) else ""
 
 
 def _weighed(
