@@ -265,13 +265,19 @@ LIGHTER, LIGHTER_AT_LEAST = 0.9, 0.25
 the smaller share only where the joint stays slow enough for its controller."""
 
 
+GEARED = 10.0
+"""How many times what a joint feels the rotor behind the gear of a torque drive may weigh: seen through a gear of 50 it counts
+2500 times. One that obeys positions goes where it is led all the same, and is looked for nearer by."""
+
+
 def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     drive, felt, dt = scales.drive_of(robot, target), scales.inertia(robot, target), robot.time_step_s
     stiff, damping = (drive.kp, drive.kd) if drive.command == "position" else (0.0, drive.kp)
     spare = felt - max(stiff * (scales.STEPS * dt) ** 2, 2.0 * damping * dt)
     rotor = drive.rotor_inertia
     less = max(LIGHTER_AT_LEAST * rotor, min(LIGHTER * rotor, spare))
-    return {"added_kg_m2": (0.0 - less, max(4.0 * rotor, felt))}
+    more = GEARED * felt if drive.command == "torque" else felt
+    return {"added_kg_m2": (0.0 - less, max(4.0 * rotor, more))}
 
 
 @effect(

@@ -172,10 +172,22 @@ def prepared(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processin
         worst = models[0].motor_names[found.judged[int(np.argmax(_shares(found, models)))]]
         raise MeasurementError(
             f"the noise of the measured positions, differentiated twice, makes forces of {100 * share:.0f} % of those "
-            f"measured at {worst}: too much for a balance of forces; compare by task.by=free_run or task.by=open_loop, or record "
-            "finer positions"
+            f"measured at {worst}: too much for a balance of forces; {_instead(trials, models[0], worst)}"
         )
     return found
+
+
+def _instead(trials: Sequence[MeasuredTrial], model: Robot, worst: str) -> str:
+    """What to do where the noise at a joint hides its force."""
+    rotor = model.drives[model.motor_names.index(worst)].rotor_inertia
+    cures = []
+    if (worst, "rotor_inertia") in model.assumed and rotor > 0:
+        cures.append(
+            f"say a lighter 'rotor_inertia' of {worst} in the description, which only assumed {rotor:.3g} kg.m^2"
+        )
+    if all(np.isfinite(t.log.commands).any() for t in trials):
+        cures.append("compare by task.by=free_run or task.by=open_loop")
+    return ", or ".join([*cures, "record finer positions, or leave its torque out of the mapping"])
 
 
 def _tried(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
