@@ -90,7 +90,7 @@ def explain_account(
         less = is_less(best.terms)
         rest = left_beside_noise(found.left, best.terms, robot)
         head = f"{'Too much' if less else 'Missing'}{', among other things' if rest else ''}: "
-        head += f"{told_all(best.terms, robot)}{_twins(best, more)}."
+        head += f"{told_all(best.terms, robot)}{_twins(best, more, bool(rest))}."
         nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
         nothing = BEYOND if unsure else nothing
         head += " More than noise is left with it." if rest else f" {THAT_NOISE if found.left else nothing}"
@@ -171,14 +171,19 @@ def _counted_right(confidence: float | None) -> str:
     return f"In {100 * confidence:.0f} of 100 simulated cases that looked like this one, the verdict was right"
 
 
-def _twins(best: Judged, more: str) -> str:
-    """What it may be instead: by name, where there are few."""
+def _twins(best: Judged, more: str, left: bool) -> str:
+    """What it may be instead: by name, where there are few. Where much is ``left`` they do as well, and do not look the same."""
     others = best.tied_with
     if not others:
         return ""
+    alike = (
+        f"{'do' if len(others) > 1 else 'does'} as well"
+        if left
+        else f"look{'' if len(others) > 1 else 's'} the same here"
+    )
     if len(others) > TWINS:
-        return f", or one of {more}{len(others)} others that look the same here"
-    return f", or {' or '.join(map(placed, others))}, which look{'s' if len(others) == 1 else ''} the same here"
+        return f", or one of {more}{len(others)} others that {alike}"
+    return f", or {' or '.join(map(placed, others))}, which {alike}"
 
 
 def above(c: Judged) -> tuple[float, float]:
