@@ -53,7 +53,10 @@ def check_names(mapping: Mapping, robot: Robot) -> None:
     missing = [m for m in command_units(robot) if m not in mapping.commands]
     # A log without any command is of use to a balance of forces, which needs torques, of whichever joints.
     if missing and (mapping.commands or not mapping.torques):
-        raise MeasurementError(f"{where}: commands: no column for joint {quoted(missing[0])} of {robot.name}")
+        raise MeasurementError(
+            f"{where}: commands: no column for joint {quoted(missing[0])} of {robot.name}; a joint that "
+            "no motor moves is described by 'command: none' in its drive"
+        )
     absent = [s for s in robot.sensor_names if s not in mapping.sensors]
     if absent:
         raise MeasurementError(

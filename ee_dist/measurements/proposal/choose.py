@@ -105,7 +105,8 @@ def _add_times(v: View) -> list[str]:
 def _tell_flaws(v: View, flaws: list[str]) -> None:
     """What could not be read comes first where something is open, as it may be why; else it is a note."""
     if v.out.questions:
-        v.out.questions[:0] = [f"{flaw}; mend that row or drop it" for flaw in flaws]
+        # A flaw that says itself what to do is of no row.
+        v.out.questions[:0] = [flaw if "say which" in flaw else f"{flaw}; mend that row or drop it" for flaw in flaws]
     else:
         v.out.notes += [f"not read: {flaw}" for flaw in flaws]
 
