@@ -47,8 +47,8 @@ SEVERAL = (
     "motions, or write the effect that is missing (docs/own_effect.md)."
 )
 MEND = (
-    "First mend the description or the mapping, which has that the wrong way round, and begin again with it: what is fitted on top "
-    "can be no surer than that."
+    "First mend the description or the mapping, which has that the wrong way round, and begin again with it: what is fitted on "
+    "top can be no surer than that."
 )
 STUCK = "Next: try other motions, or write the effect that is missing (docs/own_effect.md)."
 
