@@ -29,6 +29,12 @@ def stopped_joints(robot: Robot) -> tuple[str, ...]:
     return tuple(name for name in robot.motor_names if math.isfinite(robot.joint(name).ends[1]))
 
 
+def sprung_joints(robot: Robot) -> tuple[str, ...]:
+    """Joints that a spring may pull back: what turns without end and without a motor would wind it up."""
+    free = {d.joint for d in robot.drives if d.command == "none"}
+    return tuple(n for n in robot.motor_names if n not in free or math.isfinite(robot.joint(n).ends[1]))
+
+
 def powered(robot: Robot) -> tuple[str, ...]:
     """Joints that a motor moves."""
     return tuple(d.joint for d in robot.drives if d.command != "none")

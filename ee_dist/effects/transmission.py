@@ -10,7 +10,7 @@ from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
 from ee_dist.effects.catalogue import Parameter, effect
 from ee_dist.effects.scales import Range
-from ee_dist.effects.targets import controlled, motors, powered, stopped_joints
+from ee_dist.effects.targets import controlled, motors, powered, sprung_joints, stopped_joints
 from ee_dist.robots.model import Drive, Robot
 
 
@@ -83,7 +83,7 @@ def _springs(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "parallel_spring",
     family="drive",
-    targets=motors,
+    targets=sprung_joints,
     parameters=(
         Parameter("stiffness_nm_rad", "N.m/rad", 0.0, math.inf, 0.0, "torque for each rad away from rest", 0.02),
         Parameter("rest_rad", "rad", -math.inf, math.inf, 0.0, "position at which the spring pulls nothing", 0.02),

@@ -18,7 +18,7 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Network, weight_count
 from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.robots.linear_stage import linear_stage
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import CONTINUOUS_RAD, Robot
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import SensorLog
@@ -177,3 +177,15 @@ def test_every_effect_is_measured() -> None:
     text = "".join(f.read_text() for f in here.glob("test_effect_*.py"))
     missing = [n for n in NAMES if not re.search(rf"^def test_{n}_", text, re.MULTILINE)]
     assert not missing
+
+
+def test_no_spring_pulls_back_what_turns_without_end_and_without_a_motor() -> None:
+    """Fitted within a turn, it would throw a free pendulum that goes round."""
+    robot, spring = quadruped(), CATALOGUE["parallel_spring"]
+    first = robot.motor_names[0]
+    assert spring.targets(robot) == robot.motor_names
+    endless = robot.with_joint(first, lower=-CONTINUOUS_RAD, upper=CONTINUOUS_RAD)
+    assert first in spring.targets(endless), "a motor's joint may have a cable"
+    free = endless.with_drive(first, command="none")
+    assert first not in spring.targets(free)
+    assert first in spring.targets(robot.with_drive(first, command="none"))
