@@ -154,3 +154,41 @@ def test_one_evaluation_serves_all_dampings() -> None:
     search = Search(problem)
     follow_valley(search, [(MODEL, np.zeros(P))], search.everything, iterations=1)
     assert problem.asked == 1 + P + len(DAMPINGS) + 3
+
+
+def test_slopes_go_finer_in_the_end_where_the_narrowest_step_changes_more_than_is_left() -> None:
+    """A play known to a thousandth of a radian is not told by slopes over two; what the data tell less keeps its step."""
+    search = Search(Linear(()))
+    mask, rows = search.everything, len(search.everything)
+    run = _Run(MODEL, np.zeros(P), NARROWEST, search.problem.data, 100.0)
+    run.smooth, run.weights = np.full(rows, 10.0 / np.sqrt(rows)), np.ones(rows)
+    slopes = np.random.default_rng(0).standard_normal((rows, P))
+    run.slopes = slopes / np.linalg.norm(slopes, axis=0) * np.array([1e5, *[1.0] * (P - 1)])
+    run.before = (100.0, run.u)
+    _next(run, 0.0, False, True)
+    assert not run.done and run.reach is not None
+    assert run.reach[0] == pytest.approx(max(10.0 / 1e5, valley.FINEST * NARROWEST))
+    assert (run.reach[1:] >= NARROWEST).all()
+    asked: list[Array] = []
+
+    class Asked(Linear):
+        def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+            asked.extend(np.array([dict(t.values)["damping_nm_s_rad"] for t in h]) for h in hypotheses)
+            return super().residuals(hypotheses, trials)
+
+    valley._slopes([run], Search(Asked(())), mask)
+    steps = np.array([u[k] for k, u in enumerate(asked)]) / [MODEL.parts[k].bounds[0][1] for k in range(P)]
+    assert steps[0] == pytest.approx(run.reach[0]) and steps[1] == pytest.approx(0.2 * NARROWEST)
+    # Where that brings nothing either it ends.
+    run.before = (100.0, run.u)
+    _next(run, 0.0, False, True)
+    assert run.done
+
+
+def test_slopes_stay_as_they_are_where_no_step_changes_as_much_as_is_left() -> None:
+    rows = len(Search(Linear(())).everything)
+    run = _Run(MODEL, np.zeros(P), NARROWEST, np.zeros(rows), 100.0)
+    run.smooth, run.weights, run.slopes = np.ones(rows), np.ones(rows), np.ones((rows, P))
+    run.before = (100.0, run.u)
+    _next(run, 0.0, False, True)
+    assert run.done

@@ -28,6 +28,9 @@ LARGE = 10
 ITERATIONS = 30
 WIDEST, NARROWEST = 0.12, 0.006
 """Finite differences, as shares of a value's room: wide while the fit is far off, narrow in the end."""
+FINEST = 0.05
+"""Share of the narrowest step over which slopes are taken at least, of values of which it changes more than is left: a play
+that is known to a thousandth of a radian is not told by slopes over two."""
 DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)
 """Tried at once, relative to the one that did best before;"""
 PLAIN = (0.1, 1.0, 10.0)
@@ -67,6 +70,8 @@ class _Run:
     """Whether the same slopes are tried again with shorter steps,"""
     still: bool = False
     """and whether the last slopes led next to nowhere."""
+    reach: Array | None = None
+    """(P,) the step of each value at most that slopes are taken over in the end: by so much it changes what is left."""
     done: bool = False
 
     def weighed_slopes(self, rows: int) -> Array:
@@ -140,6 +145,7 @@ def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
     for run in runs:
         for k in range(len(run.u)):
             h = min(run.width, 0.3 * abs(run.u[k]) + 0.2 * run.width)
+            h = h if run.reach is None else min(h, float(run.reach[k]))
             v = run.u.copy()
             v[k] += h if run.u[k] + h <= run.model.upper[k] else -h
             points.append((run, v))
@@ -198,12 +204,23 @@ def _next(run: _Run, far: float, settled: bool, more: bool) -> None:
         return
     run.still = not run.followed and gained < GAIN * before
     if run.still:
-        run.done = settled or run.width <= NARROWEST
+        run.done = settled or (run.width <= NARROWEST and not _goes_finer(run))
         run.width = max(0.5 * run.width, NARROWEST) if run.energy <= far else NARROWEST
     elif not run.followed and not run.rounds % 2:
         run.width = max(0.7 * run.width, NARROWEST)
     pays = more and gained > PAYS * before and run.followed < FOLLOWED
     run.followed = run.followed + 1 if pays else 0
+
+
+def _goes_finer(run: _Run) -> bool:
+    """Whether slopes are to be taken once more, of values of which the narrowest step changes more than is left, over steps
+    that do not: those told nothing of what is left."""
+    if run.reach is not None or run.smooth is None or run.slopes is None or run.weights is None:
+        return False
+    left = float(np.linalg.norm(run.smooth * run.weights))
+    reach = left / np.maximum(np.linalg.norm(run.weighed_slopes(len(run.smooth)), axis=0), 1e-12)
+    run.reach = np.maximum(reach, FINEST * NARROWEST)
+    return bool((reach < NARROWEST).any())
 
 
 def _give_up(runs: Sequence[_Run]) -> None:
