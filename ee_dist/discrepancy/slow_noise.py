@@ -14,8 +14,6 @@ DIFFERENCES = (2, 3, 4, 5)
 MOTION = 0.5
 """Share of what second differences find below which those of higher orders say that the rest of it was motion: of noise alone
 all find the same."""
-HELD, FRESH = 0.4, 20
-"""Readings that are held in more than this share of the rows are looked at where they are new, if that many are."""
 
 
 def slow_noise(times_s: Array, values: Array) -> Array:
@@ -41,13 +39,6 @@ def slow_noise(times_s: Array, values: Array) -> Array:
 
 def without_motion(noise: Array, times_s: Array, values: Array) -> Array:
     """(C,) standard deviations that second differences of readings (R, C) found, where it was not quick motion that they found:
-    of a joint that turns by a tenth of a radian from row to row they find hundreds of times what its encoder leaves open.
-    Where many rows hold the reading before they found that, or nothing, and it is looked for between the rows that do not."""
+    of a joint that turns by a tenth of a radian from row to row they find hundreds of times what its encoder leaves open."""
     least = slow_noise(times_s, values)
-    found = np.where(least < MOTION * noise, least, noise)
-    for k, column in enumerate(values.T):
-        new = np.r_[True, np.diff(column) != 0]
-        if 1 - new.mean() > HELD and np.count_nonzero(new) >= FRESH:
-            fresh = float(slow_noise(times_s[new], column[new][:, None])[0])
-            found[k] = max(fresh, reading_step(column) / np.sqrt(12))
-    return found
+    return np.where(least < MOTION * noise, least, noise)

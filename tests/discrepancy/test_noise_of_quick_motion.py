@@ -40,23 +40,6 @@ def test_noise_stays_what_second_differences_find() -> None:
         assert np.array_equal(without_motion(second(read), t, read), second(read))
 
 
-@pytest.mark.parametrize("held", [2, 3, 5, 10])
-@pytest.mark.parametrize("noise", [1e-3, 1e-2])
-def test_of_readings_that_are_held_the_new_ones_tell_the_noise(held: int, noise: float) -> None:
-    """Of rows that mostly repeat the last one the median second difference is nothing; of every other one it is the motion."""
-    t = np.arange(0, 20, STEP_S)
-    read = 0.5 * np.sin(2 * t) + 0.2 * np.sin(5 * t) + noise * np.random.default_rng(3).standard_normal(len(t))
-    read = read[np.arange(len(t)) // held * held][:, None]
-    assert 0.7 * noise < without_motion(second(read), t, read)[0] < 1.4 * noise
-
-
-@pytest.mark.parametrize("step", [1e-3, 5e-3, 2e-2])
-def test_coarse_steps_leave_as_much_open_as_they_do(step: float) -> None:
-    t = np.arange(0, 20, STEP_S)
-    read = np.round((0.5 * np.sin(2 * t) + 0.2 * np.sin(5 * t)) / step)[:, None] * step
-    assert 0.25 * step < without_motion(second(read), t, read)[0] < 0.7 * step
-
-
 def swinging(robot: Robot, noise: float) -> MeasuredTrial:
     t = np.arange(0, 6, robot.time_step_s)
     joints = np.stack([np.sin(2 * np.pi * f * t) for f in (2.0, 3.1)], axis=1)
@@ -86,17 +69,3 @@ def test_the_floor_of_both_simulations_is_the_readings_own() -> None:
     assert channel_scale(robot, [trial]).noise[position] == pytest.approx(1e-4, rel=1.0)
     floor = FreeRun((trial,), robot, evaluator_for(robot), windows_s=0.5).noise
     assert (floor < 3e-4).all()
-
-
-def test_a_sensor_that_rests_all_through_a_trial_tells_no_noise_there() -> None:
-    robot = samples()["arm"].robot
-    robot = replace(robot, time_step_s=STEP_S, sensors=tuple(replace(s, noise=0.0) for s in robot.sensors))
-    moving = swinging(robot, 1e-4)
-    read = moving.log.sensors.copy()
-    read[:, 0] = 0.3
-    resting = replace(moving, name="rest", log=replace(moving.log, sensors=read))
-    alone, both = (channel_scale(robot, trials).noise for trials in ([moving], [moving, resting]))
-    assert both == pytest.approx(alone)
-    assert channel_scale(robot, [resting]).noise[0] == 0.0
-    one, two = (FreeRun(t, robot, evaluator_for(robot), windows_s=0.5).noise for t in ((moving,), (moving, resting)))
-    assert two == pytest.approx(one, rel=0.5)

@@ -323,10 +323,7 @@ def _noise_by_unit(pieces: Sequence[Piece], robot: Robot, columns: Sequence[int]
         own = [k for k in columns if robot.sensors[k].unit == unit]
         # Of one unit it is a scale and no more. Beside another it decides which of them counts.
         least = FINEST * np.mean([channel_range(robot, robot.sensors[k]) for k in own]) if len(units) > 1 else 0.0
-        # A joint that rests all through a piece tells no noise there: the others do, and itself elsewhere.
-        moved = [(p, [k for k in own if np.ptp(p.log.sensors[:, k]) > 0]) for p in pieces]
-        told = [_noise(p, some) for p, some in moved if some]
-        found[unit] = max(float(np.mean(told)) if told else 0.0, float(least), 1e-9)
+        found[unit] = max(float(np.mean([_noise(p, own) for p in pieces])), float(least), 1e-9)
     return found
 
 

@@ -41,10 +41,7 @@ def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
         if between is not None:
             noise, source = between, "measured: differences between repeated trials"
         else:
-            # Of a sensor that rests all through a trial, or is dead, that trial tells no noise: the others do.
-            told = np.array([np.ptp(t.log.sensors, axis=0) > 0 for t in trials])
-            found = np.where(told, [_variance(t.log) for t in trials], 0.0)
-            noise = np.sqrt(found.sum(axis=0) / np.maximum(told.sum(axis=0), 1))
+            noise = np.sqrt(np.mean([_variance(t.log) for t in trials], axis=0))
             seldom = any(t.log.filled is not None for t in trials)
             source = f"estimated: {'divided' if seldom else 'second'} differences of the logs"
     scale = np.maximum(noise, RESOLUTION * spans)
