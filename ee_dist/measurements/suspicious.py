@@ -242,7 +242,7 @@ def torque_suspicion(name: str, beside: signals.Relation, unit: str) -> tuple[st
 
 def unlike_suspicion(names: Sequence[str], found: Sequence[signals.Relation]) -> str | None:
     """Whether the torques of two joints or more go with what the motion needs at none of them."""
-    if len(found) < 2 or max(abs(r.correlation) for r in found) >= UNLIKE:
+    if not fit_nowhere(found):
         return None
     best = max(range(len(found)), key=lambda k: abs(found[k].correlation))
     return (
@@ -250,6 +250,11 @@ def unlike_suspicion(names: Sequence[str], found: Sequence[signals.Relation]) ->
         f"{found[best].correlation:.2f}): all friction, or is the base bolted on by another side than described, or do joints "
         "turn the other way, or have each other's columns? explain asks for each of these"
     )
+
+
+def fit_nowhere(found: Sequence[signals.Relation]) -> bool:
+    """Whether torques of two joints or more go with what the motion needs at none of them."""
+    return len(found) > 1 and max(abs(r.correlation) for r in found) < UNLIKE
 
 
 def runs_against(beside: signals.Relation) -> bool:

@@ -14,7 +14,7 @@ from ee_dist.measurements.proposal.torque_shares import FAR, Share, tell_shares
 from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.view import View
 from ee_dist.measurements.proposal.words import CURRENT, TORQUE
-from ee_dist.measurements.suspicious import UNLIKE
+from ee_dist.measurements.suspicious import fit_nowhere
 from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
 
@@ -145,8 +145,7 @@ def torque_units(v: View, block: Block) -> UnitChoice:
         else f"{what} times the gain you said"
     )
     # That they fit nowhere is no check that was left out.
-    fits = [abs(relations[k].correlation) for k in telling] if relations is not None else []
-    unlike = len(fits) > 1 and max(fits) < UNLIKE
+    unlike = relations is not None and fit_nowhere([relations[k] for k in telling])
     usual = ", the usual unit; " + ("they go with what the motion needs at no joint" if unlike else "not checked")
     why = said if current else entries[0]["unit"] + (", as large as the motion needs" if checked else usual)
     if turned:
