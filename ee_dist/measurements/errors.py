@@ -12,6 +12,10 @@ class MeasurementError(LogError):
     """A measurement that cannot be used; one line: what, where, and what would be right."""
 
 
+class SeveralColumnsError(MeasurementError):
+    """A name that several columns have, which says itself which there are: no row of the file is wrong."""
+
+
 def nearest(name: str, allowed: Iterable[str]) -> str:
     """A hint for a name that does not exist."""
     return did_you_mean(name, allowed)

@@ -16,38 +16,21 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.clocks import Clocked, check_grid
-from ee_dist.measurements.commanded import beyond_the_drive, command_flaws
 from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.measurements.looking import Looked, repeats
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
-from ee_dist.measurements.need import torques_beside_need
-from ee_dist.measurements.report import Report
+from ee_dist.measurements.report import TORQUE, Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
-from ee_dist.measurements.suspicious import (
-    exchanged_suspicions,
-    pace_suspicion,
-    repeat_suspicion,
-    runs_against,
-    speed_suspicion,
-    suspicions,
-    time_suspicion,
-    torque_suspicion,
-    torques_suspicion,
-    unit_suspicion,
-    unlike_suspicion,
-)
+from ee_dist.measurements.suspicious import suspicions, time_suspicion
 from ee_dist.measurements.table import LARGEST, Recorded
-from ee_dist.measurements.taking import power_suspicion, takers
 from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.trials import trials_of
 from ee_dist.measurements.units import TURN, UNITS, factor
 from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.robots.model import Robot
-from ee_dist.robots.reached import told
 from ee_dist.trials.log import Array, SensorLog
 
-TORQUE = "torque of"
-"""How the report names what a drive gave, before its joint."""
 SAME_RATE = 1e-3
 """A record whose even step is within this share of the wanted one is taken sample by sample."""
 DENSER = 1.1
@@ -89,7 +72,7 @@ class _Import:
     def run(self) -> tuple[TrialRecord, Report]:
         self._time()
         positions = self._sensors()
-        self._look_at_repeats()
+        self.report.suspicious += repeats(self.mapping, self.clocks)
         torques = self._torques()
         commands = self._commands(torques)
         self._on_one_turn(commands)
@@ -98,11 +81,13 @@ class _Import:
             supply = self._column(self.mapping.supply, "V", "supply", step_like=True)
         external = self._external()
         self._released(commands)
-        self._look(commands)
         joints = None
         if all(m in positions for m in self.robot.motor_names):
             joints = np.stack([positions[m] for m in self.robot.motor_names], axis=1)
-            self._look_at_torques(torques, joints)
+        looked = Looked(
+            self.robot, self.mapping, self.channels, commands, torques, joints, self.step_s, self.report.rate_read_hz
+        )
+        self.report.suspicious += looked.found()
         log = SensorLog(
             times_s=self.at_s,
             sensors=np.stack([self.channels[n] for n in self.robot.sensor_names], axis=1),
@@ -349,93 +334,6 @@ class _Import:
         if not on.all():
             commands[~on] = math.nan
             self.report.done.append(f"drives released in {int((~on).sum())} rows ({self.mapping.enabled.column})")
-
-    def _look(self, commands: Array) -> None:
-        """Raises MeasurementError for a channel that can only be in another unit; the rest goes into the report."""
-        position_of = {s.target: self.channels[s.name] for s in self.robot.sensors if s.kind == "position"}
-        for s in self.robot.sensors:
-            column = self.mapping.sensors[s.name]
-            if s.kind == "position":
-                joint = self.robot.joint(s.target)
-                unit = column.unit if isinstance(column, Column) and column.scale == 1 else s.unit
-                self._judge(unit_suspicion(s.name, self.channels[s.name], *joint.ends, s.unit, unit), column)
-                at = self.channels[s.name]
-                self.report.suspicious += [
-                    f"{s.name}: {words}: is the description's zero another one, or its stop elsewhere?"
-                    for words in told(joint, float(at.min()), float(at.max()), s.noise)
-                ]
-            elif s.kind == "velocity" and s.target in position_of:
-                self._judge(speed_suspicion(s.name, self.channels[s.name], position_of[s.target], self.step_s), column)
-        self._look_at_pace()
-        self._look_for_exchanged(position_of)
-        for name, flaw in command_flaws(self.robot, self.mapping, commands, position_of, self.step_s):
-            self._judge(flaw, self.mapping.commands.get(name))
-        self.report.suspicious += beyond_the_drive(self.robot, commands)
-
-    def _look_at_repeats(self) -> None:
-        """Rows in which nothing was read anew: what sensors say in one table, as the file has it."""
-        by_table: dict[str, list[str]] = {}
-        for column in self.mapping.sensors.values():
-            if isinstance(column, Column):
-                by_table.setdefault(column.table, []).append(column.column)
-        for table, names in by_table.items():
-            own = self.clocks[table].table
-            if note := repeat_suspicion(np.stack([own.numbers(n, gaps=True) for n in names], axis=1)):
-                self.report.suspicious.append(note)
-
-    def _look_at_pace(self) -> None:
-        """Measured speeds of all joints beside the change of their positions."""
-        of = {(s.kind, s.target): s.name for s in self.robot.sensors}
-        pairs = [(of.get(("velocity", m)), of.get(("position", m))) for m in self.robot.motor_names]
-        both = [p for p in pairs if all(n and isinstance(self.mapping.sensors.get(n), Column) for n in p)]
-        if not both:
-            return
-        speed, position = (np.stack([self.channels[str(p[k])] for p in both], axis=1) for k in (0, 1))
-        note = pace_suspicion(speed, position, self.step_s, self.report.rate_read_hz)
-        if note:
-            self.report.suspicious.append(note)
-
-    def _look_for_exchanged(self, position_of: dict[str, Array]) -> None:
-        """Measured speeds that are the change of another joint's positions."""
-        own = [
-            s for s in self.robot.sensors if s.kind == "velocity" and isinstance(self.mapping.sensors[s.name], Column)
-        ]
-        read = [s for s in own if s.target in position_of]
-        if len(read) > 1:
-            speed, position = (
-                np.stack([self.channels[s.name] for s in read], 1),
-                np.stack([position_of[s.target] for s in read], 1),
-            )
-            self.report.suspicious += exchanged_suspicions(
-                [s.name for s in read], [s.target for s in read], speed, position, self.step_s
-            )
-
-    def _look_at_torques(self, torques: Array | None, joints: Array) -> None:
-        """Torques beside what the motion needs. Raises MeasurementError for a unit that cannot be."""
-        known = [m in self.mapping.torques for m in self.robot.motor_names]
-        judged = None if torques is None else torques_beside_need(self.robot, torques, joints, self.step_s, known)
-        if judged is None:
-            return
-        units, names = torque_units(self.robot), [m for m in self.robot.motor_names if m in self.mapping.torques]
-        for m, relation in zip(names, judged, strict=True):
-            self._judge(torque_suspicion(f"{TORQUE} {m}", relation, units[m]), self.mapping.torques[m])
-        for note in (torques_suspicion(names, judged), unlike_suspicion(names, judged)):
-            self.report.suspicious += [note] if note else []
-        assert torques is not None
-        if self.mapping.external:  # what pushes or pulls from outside may give work
-            return
-        told = {m for m, relation in zip(names, judged, strict=True) if runs_against(relation)}
-        for m, work in takers(self.robot, torques, joints, self.step_s).items():
-            if m not in told:
-                self.report.suspicious.append(power_suspicion(f"{TORQUE} {m}", work))
-
-    def _judge(self, found: tuple[str, bool] | None, column: Column | Estimated | None) -> None:
-        if found is None:
-            return
-        note, certain = found
-        if certain and not (isinstance(column, Column) and column.sure):
-            raise MeasurementError(f"{self.where}: {note}; if it is right as it stands, add 'sure: true' to it")
-        self.report.suspicious.append(note)
 
     def _settings(self) -> Hypothesis:
         found = []

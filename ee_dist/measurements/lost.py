@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.table import Table
 from ee_dist.trials.log import Array
 
@@ -41,15 +42,17 @@ def without_lost(table: Table) -> Table:
 
 
 def _numbers(table: Table) -> tuple[list[str], Array]:
-    """Names and values (T, C) of the columns that are numbers as they stand."""
+    """Names and values (T, C) of the columns that can be read as numbers, in most rows."""
     names, found = [], []
-    for name, cells in table.columns.items():
-        if not isinstance(cells, np.ndarray) or cells.dtype.kind != "f" or cells.ndim > 2:
+    for address in table.addresses():
+        try:
+            read = table.numbers(address, gaps=True)
+        except MeasurementError:  # a text, or one name for several columns
             continue
-        own = cells.reshape(len(cells), -1)
-        names += [name] if cells.ndim == 1 else [f"{name}[{k}]" for k in range(own.shape[1])]
-        found.append(own.astype(np.float64))
-    return names, np.concatenate(found, axis=1) if found else np.zeros((len(table), 0))
+        if np.isfinite(read).mean() > 0.5:  # of others no two rows need follow one another
+            names.append(address)
+            found.append(read)
+    return names, np.stack(found, axis=1) if found else np.zeros((len(table), 0))
 
 
 def _lost_rows(values: Array) -> tuple[np.ndarray, list[int]]:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+TORQUE = "torque of"
+"""How the report names what a drive gave, before its joint."""
 ROUNDING = 1e-12
 """Share of the larger end of a range below which the other end is what rounding left."""
 

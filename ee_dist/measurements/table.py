@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.basics.quoted import quoted
-from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.measurements.errors import MeasurementError, SeveralColumnsError, nearest
 from ee_dist.trials.log import Array
 
 _PLACE = re.compile(r"^(?P<name>.+)\[(?P<part>[^\[\]]+)\]$")
@@ -100,7 +100,7 @@ class Table:
         """
         if column in self.twice:
             places = [f"'#{i + 1}'" for i, c in enumerate(self.columns) if c == column or c.startswith(f"{column} #")]
-            raise MeasurementError(
+            raise SeveralColumnsError(
                 f"{self}: {len(places)} columns are named {quoted(column)}; say which: {' or '.join(places)}"
             )
         cells = self._cells(column)

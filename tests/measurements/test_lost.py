@@ -75,3 +75,11 @@ def test_a_file_is_read_without_them(tmp_path: Path) -> None:
     (recorded,) = read(tmp_path / "a.csv")
     assert len(recorded.tables[0]) == len(T) - 1
     assert "row 502" in recorded.tables[0].notes[0]
+
+
+def test_rows_are_left_out_of_lists_in_cells_as_of_columns() -> None:
+    values = motion(4)
+    values[500] = -np.pi
+    cells = [list(row) for row in values]
+    found = without_lost(Table(Path("a.jsonl"), {"time": T, "q": cells, "name": ["arm"] * len(T)}))
+    assert len(found) == len(T) - 1 and "q[0]" in found.notes[0]

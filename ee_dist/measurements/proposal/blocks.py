@@ -146,7 +146,7 @@ def blocks_of(
     return [b for b in found if b.reading.kind != OTHER]
 
 
-def unreadable(table: Table, joints: Sequence[str]) -> list[str]:
+def unreadable(table: Table, joints: Sequence[str]) -> list[MeasurementError]:
     """What is wrong with columns called as others of the same quantity are that can be read."""
     words = joint_words(joints)
     read, failed = set(), []
@@ -159,7 +159,7 @@ def unreadable(table: Table, joints: Sequence[str]) -> list[str]:
             table.numbers(address, gaps=True)
             read.add(reading.family)
         except MeasurementError as error:
-            failed.append((reading.family, str(error)))
+            failed.append((reading.family, error))
     return [error for family, error in failed if family in read]
 
 

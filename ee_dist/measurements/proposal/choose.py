@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.measurements.errors import MeasurementError, SeveralColumnsError, nearest
 from ee_dist.measurements.proposal.asked_for import plans_of
 from ee_dist.measurements.proposal.blocks import unreadable
 from ee_dist.measurements.proposal.commands import add_commands
@@ -70,7 +70,7 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     return v.out
 
 
-def _without_time(v: View, flaws: list[str]) -> Proposal:
+def _without_time(v: View, flaws: list[MeasurementError]) -> Proposal:
     """All that can be found if rows come as often as speeds say, which is asked; else what is to be written."""
     rate = None if flaws else rate_by_speeds(v.recorded, v.robot, v.hints)
     if rate is None:
@@ -90,9 +90,9 @@ def _without_time(v: View, flaws: list[str]) -> Proposal:
     return out
 
 
-def _add_times(v: View) -> list[str]:
+def _add_times(v: View) -> list[MeasurementError]:
     """Fills the times; what is wrong with those that could not be read."""
-    flaws = []
+    flaws: list[MeasurementError] = []
     for table in v.recorded.tables:
         found = time_of(table, v.hints)
         if found is not None:
@@ -102,11 +102,13 @@ def _add_times(v: View) -> list[str]:
     return flaws
 
 
-def _tell_flaws(v: View, flaws: list[str]) -> None:
+def _tell_flaws(v: View, flaws: list[MeasurementError]) -> None:
     """What could not be read comes first where something is open, as it may be why; else it is a note."""
     if v.out.questions:
-        # A flaw that says itself what to do is of no row.
-        v.out.questions[:0] = [flaw if "say which" in flaw else f"{flaw}; mend that row or drop it" for flaw in flaws]
+        v.out.questions[:0] = [
+            f"{flaw}" if isinstance(flaw, SeveralColumnsError) else f"{flaw}; mend that row or drop it"
+            for flaw in flaws
+        ]
     else:
         v.out.notes += [f"not read: {flaw}" for flaw in flaws]
 

@@ -56,7 +56,7 @@ def time_of(table: Table, hints: Hints) -> TimeChoice | None:
     return _chosen(table, candidates, rising, bool(named))
 
 
-def time_flaw(table: Table) -> str | None:
+def time_flaw(table: Table) -> MeasurementError | None:
     """What is wrong with the column that is called a time, where it is one but for some rows."""
     for address in table.addresses():
         if _reading(address).kind != TIME:
@@ -66,7 +66,7 @@ def time_flaw(table: Table) -> str | None:
             if len(values) > 2 and (np.diff(values) > 0).mean() > MOSTLY:
                 check_times(values, table, address)
         except MeasurementError as error:
-            return str(error)
+            return error
     return None
 
 

@@ -1,0 +1,135 @@
+"""What is looked at once a trial is read: units that cannot be, speeds of another joint, torques that do not fit the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Mapping as AnyMapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ee_dist.measurements.clocks import Clocked
+from ee_dist.measurements.commanded import beyond_the_drive, command_flaws
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.mapping import Column, Estimated, Mapping
+from ee_dist.measurements.need import torques_beside_need
+from ee_dist.measurements.report import TORQUE
+from ee_dist.measurements.robot_channels import torque_units
+from ee_dist.measurements.suspicious import (
+    exchanged_suspicions,
+    pace_suspicion,
+    repeat_suspicion,
+    runs_against,
+    speed_suspicion,
+    torque_suspicion,
+    torques_suspicion,
+    unit_suspicion,
+    unlike_suspicion,
+)
+from ee_dist.measurements.taking import power_suspicion, takers
+from ee_dist.robots.model import Robot, Sensor
+from ee_dist.robots.reached import told
+from ee_dist.trials.log import Array
+
+
+@dataclass(frozen=True)
+class Looked:
+    """A trial as it was read, in the robot's units. ``channels`` are its sensors by name, (T,) each; ``commands`` and ``torques``
+    are (T, M), and ``joints``, where all positions are known, too. Whatever is found is a line for the report; a unit that
+    can only be another one raises MeasurementError, unless the mapping is sure of it."""
+
+    robot: Robot
+    mapping: Mapping
+    channels: AnyMapping[str, Array]
+    commands: Array
+    torques: Array | None
+    joints: Array | None
+    step_s: float
+    rate_read_hz: float
+
+    def found(self) -> Iterator[str]:
+        """A line for everything that looks wrong."""
+        for s in self.robot.sensors:
+            if s.kind == "position":
+                yield from self._position(s)
+            elif s.kind == "velocity" and s.target in self._positions:
+                flaw = speed_suspicion(s.name, self.channels[s.name], self._positions[s.target], self.step_s)
+                yield from self._judged(flaw, self.mapping.sensors[s.name])
+        yield from self._speeds()
+        for name, flaw in command_flaws(self.robot, self.mapping, self.commands, self._positions, self.step_s):
+            yield from self._judged(flaw, self.mapping.commands.get(name))
+        yield from beyond_the_drive(self.robot, self.commands)
+        if self.torques is not None and self.joints is not None:
+            yield from self._torques(self.torques, self.joints)
+
+    @property
+    def _positions(self) -> dict[str, Array]:
+        return {s.target: self.channels[s.name] for s in self.robot.sensors if s.kind == "position"}
+
+    def _position(self, sensor: Sensor) -> Iterator[str]:
+        joint, at, column = (
+            self.robot.joint(sensor.target),
+            self.channels[sensor.name],
+            self.mapping.sensors[sensor.name],
+        )
+        unit = column.unit if isinstance(column, Column) and column.scale == 1 else sensor.unit
+        yield from self._judged(unit_suspicion(sensor.name, at, *joint.ends, sensor.unit, unit), column)
+        for words in told(joint, float(at.min()), float(at.max()), sensor.noise):
+            yield f"{sensor.name}: {words}: is the description's zero another one, or its stop elsewhere?"
+
+    def _speeds(self) -> Iterator[str]:
+        """Measured speeds beside the change of positions: of all joints together, and each beside those of the others."""
+        positions = self._positions
+        read = [
+            s
+            for s in self.robot.sensors
+            if s.kind == "velocity" and s.target in positions and isinstance(self.mapping.sensors[s.name], Column)
+        ]
+        if not read:
+            return
+        speed = np.stack([self.channels[s.name] for s in read], axis=1)
+        position = np.stack([positions[s.target] for s in read], axis=1)
+        if note := pace_suspicion(speed, position, self.step_s, self.rate_read_hz):
+            yield note
+        if len(read) > 1:
+            names, joints = [s.name for s in read], [s.target for s in read]
+            yield from exchanged_suspicions(names, joints, speed, position, self.step_s)
+
+    def _torques(self, torques: Array, joints: Array) -> Iterator[str]:
+        """Torques beside what the motion needs, and beside the work that they may take out of it."""
+        known = [m in self.mapping.torques for m in self.robot.motor_names]
+        judged = torques_beside_need(self.robot, torques, joints, self.step_s, known)
+        if judged is None:
+            return
+        units, names = torque_units(self.robot), [m for m in self.robot.motor_names if m in self.mapping.torques]
+        for m, relation in zip(names, judged, strict=True):
+            yield from self._judged(torque_suspicion(f"{TORQUE} {m}", relation, units[m]), self.mapping.torques[m])
+        yield from (note for note in (torques_suspicion(names, judged), unlike_suspicion(names, judged)) if note)
+        if self.mapping.external:  # what pushes or pulls from outside may give work
+            return
+        against = {m for m, relation in zip(names, judged, strict=True) if runs_against(relation)}
+        for m, work in takers(self.robot, torques, joints, self.step_s).items():
+            if m not in against:
+                yield power_suspicion(f"{TORQUE} {m}", work)
+
+    def _judged(self, flaw: tuple[str, bool] | None, column: Column | Estimated | None) -> Iterator[str]:
+        if flaw is None:
+            return
+        note, certain = flaw
+        if certain and not (isinstance(column, Column) and column.sure):
+            raise MeasurementError(
+                f"{self.mapping.source}: {note}; if it is right as it stands, add 'sure: true' to it"
+            )
+        yield note
+
+
+def repeats(mapping: Mapping, clocks: AnyMapping[str, Clocked]) -> Iterator[str]:
+    """Rows in which nothing was read anew: what sensors say in one table, as the file has it."""
+    by_table: dict[str, list[str]] = {}
+    for column in mapping.sensors.values():
+        if isinstance(column, Column):
+            by_table.setdefault(column.table, []).append(column.column)
+    for table, names in by_table.items():
+        own = clocks[table].table
+        if note := repeat_suspicion(np.stack([own.numbers(n, gaps=True) for n in names], axis=1)):
+            yield note
