@@ -81,7 +81,7 @@ def test_a_reversed_elbow_is_told_first_with_where_to_mend_it(cli, tmp_path, by)
     assert again["error"] < 0.3 * compared["error"]
 
 
-@pytest.mark.parametrize("wrong, jump, told", [
+@pytest.mark.parametrize(("wrong", "jump", "told"), [
     ("base_turned@x_up", False, "Is it described upright?"),
     ("axis_reversed@elbow", True, "Whole turns are jumped by"),
 ])  # fmt: skip
