@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,8 +55,8 @@ def placeholders(body: Body, inertia: Mapping[str, float]) -> dict[str, Placehol
     return {p.joint.name: p for p in stated if p.limit > PLACEHOLDER * p.needed or (one and p.joint.kind == "hinge")}
 
 
-def told(found: Mapping[str, Placeholder], body: Body) -> list[str]:
-    """A line for each limit that is none, of all joints that have it."""
+def told(found: Mapping[str, Placeholder], body: Body, swinging: Collection[str] = ()) -> list[str]:
+    """A line for each limit that is none, of all joints that have it, and one on those that are taken to be ``swinging``."""
     lines = []
     for limit, kind in dict.fromkeys((p.limit, p.joint.kind) for p in found.values()):
         alike = [p for p in found.values() if (p.limit, p.joint.kind) == (limit, kind)]
@@ -65,10 +65,14 @@ def told(found: Mapping[str, Placeholder], body: Body) -> list[str]:
             f"effort {limit:g} of {listed(p.joint.name for p in alike)} is no real limit: to hold all of the robot, stretched "
             f"out, and to speed it up takes {most:.2g} {unit}; drives are guessed from what it needs"
         )
-    if body.unlimited:
+    if swinging:
         lines.append(
-            f"effort 0 of {listed(body.unlimited)} is no real limit: drives are guessed from what the robot needs"
+            f"{listed(swinging)}: taken to swing freely, as {'they turn' if len(swinging) > 1 else 'it turns'} without end "
+            "and no effort is stated, where other joints state one; what a motor drives needs 'command: position' (speed, torque)"
         )
+    unlimited = [name for name in body.unlimited if name not in swinging]
+    if unlimited:
+        lines.append(f"effort 0 of {listed(unlimited)} is no real limit: drives are guessed from what the robot needs")
     return lines
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -68,7 +68,11 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
     )
     inertia = _inertia(body)
     blank = placeholders(body, inertia)
-    drives = {j.name: _drive(j, body, inertia[j.name], j.name in blank) for j in body.moving}
+    swinging = _swinging(body, blank)
+    drives = {
+        j.name: _free(j, body) if j.name in swinging else _drive(j, body, inertia[j.name], j.name in blank)
+        for j in body.moving
+    }
     lines.append("drives:" if drives else "drives: {}")
     for name, (entry, guessed) in drives.items():
         known = [g for g in guessed if g in entry]
@@ -76,7 +80,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         line(f"  {_plain(name)}: {_flow(marked)}", ", ".join(guessed) or None, known != guessed)
     assumed += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if names[3:] else ''}: {mark}"
                 for mark, names in by_mark.items()]  # fmt: skip
-    assumed += told(blank, body)
+    assumed += told(blank, body, swinging)
     if body.sensors:
         lines.append(f"# sensors: the file's own {len(body.sensors)}; a list here takes their place")
     else:
@@ -115,6 +119,22 @@ def _inertia(body: Body) -> Mapping[str, float]:
         entries[joint.name] = {"command": "none", "rotor_inertia": rotor}
     robot, _ = robot_of_body(body, {"drives": entries, "free_base": bool(body.free_base)}, body.name)
     return dict(zip(robot.motor_names, (float(v) for v in felt_inertia(robot)), strict=True))
+
+
+def _swinging(body: Body, blank: Collection[str]) -> tuple[str, ...]:
+    """Joints that nothing drives, by all that a file without drives can say: they turn without end and state no effort, where
+    another joint states one that is its motor's."""
+    efforts = {name for name, known in body.drives.items() if "torque_limit" in known} - set(blank)
+    if not efforts or body.driven:
+        return ()
+    return tuple(j.name for j in body.moving if j.kind == "hinge" and math.isinf(j.ends[1]) and j.name not in efforts)
+
+
+def _free(joint: Joint, body: Body) -> tuple[dict[str, Any], list[str]]:
+    """The same of a joint that swings freely."""
+    known = dict(body.drives.get(joint.name, {}))
+    known.pop("torque_limit", None)
+    return {"command": "none", **known}, ["command"]
 
 
 def _drive(joint: Joint, body: Body, inertia: float, blank: bool) -> tuple[dict[str, Any], list[str]]:

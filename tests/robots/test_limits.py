@@ -97,3 +97,23 @@ def test_one_large_number_at_all_joints_is_none(tmp_path: Path, efforts: list[fl
     assert bool([line for line in found.assumed if "no real limit" in line]) is none
     if none:
         assert all(d.torque_limit < 0.2 * efforts[0] for d in found.robot.drives)
+
+
+def test_a_joint_that_turns_without_end_and_states_no_effort_is_taken_to_swing_freely(tmp_path: Path) -> None:
+    def pendulum(first: str, second: str) -> Starter:
+        begun(tmp_path, first, second)
+        file = tmp_path / "arm.urdf"
+        head, tail = file.read_text().split('<joint name="b" type="revolute">')
+        file.write_text(f'{head}<joint name="b" type="continuous">{tail}')
+        return starter(read_urdf(file), "urdf", "arm.urdf", "arm.urdf")
+
+    for unstated in ("", 'effort="0"'):
+        found = pendulum('effort="3"', unstated)
+        arm, swinging = found.robot.drives
+        assert (arm.command, swinging.command) == ("position", "none")
+        (said,) = [line for line in found.assumed if line.startswith("b: taken to swing freely")]
+        assert "\n" not in said and not [line for line in found.assumed if "effort 0" in line]
+        assert "b: {command: none" in found.text
+    # Where no joint states one, or this one does, there is nothing to tell it by.
+    for first, second in (("", ""), ('effort="3"', 'effort="3"')):
+        assert [d.command for d in pendulum(first, second).robot.drives] == ["position", "position"]
