@@ -21,6 +21,7 @@ from ee_dist.measurements.suspicious import (
     repeat_suspicion,
     runs_against,
     speed_suspicion,
+    stall_suspicion,
     torque_suspicion,
     torques_suspicion,
     unit_suspicion,
@@ -89,7 +90,9 @@ class Looked:
             return
         speed = np.stack([self.channels[s.name] for s in read], axis=1)
         position = np.stack([positions[s.target] for s in read], axis=1)
-        if note := pace_suspicion(speed, position, self.step_s, self.rate_read_hz):
+        # Where it stood still speeds are off for that.
+        note = stall_suspicion(speed, position, self.step_s)
+        if note := note or pace_suspicion(speed, position, self.step_s, self.rate_read_hz):
             yield note
         if len(read) > 1:
             names, joints = [s.name for s in read], [s.target for s in read]

@@ -36,6 +36,9 @@ positions of the same time from which it is within."""
 
 STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
+QUICK, STALLED, FEW_STALLS, MOST_STALLS = 0.3, 4.0, 3, 0.1
+"""Share of a joint's higher speeds from which a row tells how long it took, times its own that a row takes before which a logger
+stood still, and of how few and of what share of all rows that is told."""
 PACE, CLEAR, ALIKE = 0.05, 0.95, 1.15
 """Share by which speeds must be off the change of their positions to be told (clocks and encoders are ten times as good);
 correlation from which a joint tells it, and the largest ratio between two joints that are off by the same."""
@@ -154,6 +157,31 @@ def repeat_suspicion(readings: Array) -> str | None:
     return (
         f"{100 * share:.0f} % of the rows repeat the row before in all {readings.shape[1]} columns of sensors, while these move: "
         "they were written before anything new was read, and count as readings all the same; drop them from the file if you can"
+    )
+
+
+def stall_suspicion(speed: Array, position: Array, step_s: float) -> str | None:
+    """Whether a logger stood still now and then and its times do not say so: at a few rows positions (T, J) go many times as far
+    as speeds say, at all others as far."""
+    moving = signals.lively(speed, position)
+    if len(speed) < 3 or not moving:
+        return None
+    mean = 0.5 * np.abs(speed[1:, moving] + speed[:-1, moving])
+    quick = mean > QUICK * np.quantile(mean, 0.95, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(quick, np.abs(np.diff(position[:, moving], axis=0)) / (mean * step_s), np.nan)
+    rows = quick.any(axis=1)
+    times = np.nanmedian(ratio[rows], axis=1)
+    late = times > STALLED
+    if late.sum() < FEW_STALLS or late.mean() > MOST_STALLS or not 1 / ALIKE < np.median(times) < ALIKE:
+        return None
+    missing = float((times[late] - 1).sum()) * step_s
+    if missing < PACE * len(times) * step_s:
+        return None
+    return (
+        f"time: at {int(late.sum())} rows positions go {np.median(times[late]):.0f} times as far as the speeds say (median), at "
+        f"the others as far: the logger stood still before them, {missing:.3g} s in all, and the times do not say so. Speeds by "
+        "these times and forces there are wrong: log the time of each reading, or add what is missing to the times"
     )
 
 

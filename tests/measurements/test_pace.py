@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import small_logs as logs
 
-from ee_dist.measurements.suspicious import pace_suspicion
+from ee_dist.measurements.suspicious import pace_suspicion, stall_suspicion
 
 STEP_S = 0.01
 T = np.arange(3000) * STEP_S
@@ -70,3 +70,15 @@ def test_speeds_that_are_estimated_are_of_that_pace(tmp_path: Path) -> None:
     frame = pd.DataFrame({"t": m["t"]} | {f"{k}{j}": m[k][:, j] for k in "qg" for j in (0, 1)})
     _, report = logs.imported(tmp_path, logs.written(tmp_path, frame))
     assert not any("speeds" in s for s in report.suspicious)
+
+
+def test_a_logger_that_stood_still_is_told_and_not_its_speeds() -> None:
+    at = T + 0.08 * np.floor(T / 0.5)  # every fiftieth row is nine times as late
+    position, speed = (np.stack([np.interp(at, T, c) for c in values.T], axis=1) for values in (POSITION, SPEED))
+    rows = slice(0, 1600)
+    note = stall_suspicion(speed[rows], position[rows], STEP_S)
+    assert note is not None and note.startswith("time: at ") and "the logger stood still" in note
+    assert stall_suspicion(SPEED, POSITION, STEP_S) is None
+    assert stall_suspicion(1.2 * SPEED, POSITION, STEP_S) is None
+    noisy = POSITION + 1e-3 * np.random.default_rng(0).standard_normal(POSITION.shape)
+    assert stall_suspicion(SPEED, noisy, STEP_S) is None

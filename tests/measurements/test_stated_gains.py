@@ -104,3 +104,33 @@ def test_gains_that_the_time_step_does_not_resolve_are_remarked(tmp_path: Path) 
     mapping = mapping_of({"sensors": {}, "gains": {"all_joints": {"kp": 200}}}, tmp_path / "m.yaml")
     (remark,) = with_gains(robot, mapping)[1]
     assert "too coarse for its controllers" in remark
+
+
+def listed_gains(folder: Path, robot: Robot, order: tuple[int, int], **stated: object) -> Proposal:
+    """Of a log whose positions, speeds and commands are lists, in an order of its columns, and whose gains are lists too."""
+    m = samples.motion()
+    places = list(order)
+    np.savez(folder / "log.npz", time=m["t"], dof_pos=m["q"][:, places], dof_vel=m["w"][:, places],
+             des_dof_pos=m["g"][:, places], **{k: np.asarray(v) for k, v in stated.items()})  # fmt: skip
+    hints = Hints(joints=tuple(robot.motor_names[p] for p in places))
+    return proposal_for([folder / "log.npz"], robot, hints)
+
+
+def test_gains_in_a_list_are_those_of_the_joints_in_the_order_of_the_positions(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, ASSUMED, ASSUMED)
+    found = listed_gains(tmp_path, robot, (1, 0), kp=[20.0, 30.0], kd=[0.5, 0.5])
+    made, _ = with_gains(robot, mapped(tmp_path, found))
+    assert [(d.kp, d.kd) for d in made.drives] == [(30.0, 0.5), (20.0, 0.5)]
+    assert any("the log states kp 20, 30 and kd 0.5" in n for n in found.notes)
+
+
+def test_gains_in_rows_of_a_list_are_read_and_told_once(tmp_path: Path) -> None:
+    rows = np.ones((len(samples.motion()["t"]), 2))
+    robot = robot_of(tmp_path, ASSUMED, ASSUMED)
+    found = listed_gains(tmp_path, robot, (0, 1), kp=20.0 * rows, kd=0.5 * rows)
+    assert found.head["gains"] == {"all_joints": {"kp": 20.0, "kd": 0.5}}
+    (note,) = (n for n in found.notes if "kp" in n and "not used" not in n)
+    assert "at every drive" in note
+    vouched = robot_of(tmp_path, "kp: 20, kd: 1", "kp: 20, kd: 1")
+    told = [n for n in listed_gains(tmp_path, vouched, (0, 1), kp=[20.0, 20.0]).notes if "kp" in n]
+    assert told == [n for n in told if n.startswith("kp is 20 in all trials")] and len(told) == 1

@@ -16,6 +16,7 @@ from ee_dist.basics.names import listed
 from ee_dist.measurements import signals
 from ee_dist.measurements.need import beside_need, torques_needed
 from ee_dist.measurements.proposal.blocks import Block
+from ee_dist.measurements.proposal.limbs import Exchanged, exchanged
 from ee_dist.measurements.proposal.model import LIKELY, SHARE, UNKNOWN, Hints, Told
 from ee_dist.measurements.proposal.torques import CLEARLY, WELL
 from ee_dist.measurements.proposal.units import ANGLES, LENGTHS
@@ -108,6 +109,13 @@ def told_by_data(v: View) -> Hints | None:
             f"say {ways_out}, or another"
         )
         return replace(v.hints, joints=held[0].names, told=Told(UNKNOWN, "in an order that is open", question))
+    if (wrong := _against_weight(v, held[0])) is not None:
+        question = (
+            f"joints: {block.name} are only numbered. Taken {held[0].called} ({listed(held[0].names)}), what controllers hold "
+            f"would not go with the weight (cosine {wrong.went:.2f}); with limbs that are alike exchanged it does "
+            f"({wrong.goes:.2f}): say 'task.joints=[{','.join(wrong.names)}]', or task.joints=[...] in the order that is right"
+        )
+        return replace(v.hints, joints=wrong.names, told=Told(UNKNOWN, "by the weight that is held", question))
     others = [o for o in orders if o is not held[0]]
     named = " and ".join(o.called for o in others)
     far = max((w for w in ways if w.order not in left), key=lambda w: w.beyond, default=None)
@@ -123,7 +131,7 @@ def told_by_data(v: View) -> Hints | None:
         told=Told(
             LIKELY, why,
             note=f"numbered columns are taken for the joints {held[0].called} ({listed(held[0].names)}){note}; which of limbs "
-            "that are alike comes first cannot be seen: say task.joints=[...] if it is another",
+            "that are alike comes first is not seen: say task.joints=[...] if it is another",
         ),
     )  # fmt: skip
 
@@ -210,6 +218,21 @@ def _by_need(v: View, orders: list[Order]) -> list[Order]:
         left.append(float(np.mean([1 - r.correlation**2 for r in beside_need(given, needed, step)])))
     best, second = np.sort(left)[:2]
     return [orders[int(np.argmin(left))]] if best < min(CLEARLY * second, WELL) else orders
+
+
+def _against_weight(v: View, order: Order) -> Exchanged | None:
+    """Whether position controllers hold the weight with limbs in another order."""
+    commands = [b for b in v.blocks if b.numbered and b.reading.command and b.reading.kind in (POSITION, None)]
+    if len(commands) != 1 or not v.position.block.numbered or any(d.command != "position" for d in v.robot.drives):
+        return None
+    places = [v.robot.motor_names.index(n) for n in order.names]
+    asked = v.on(v.position.block, commands[0])
+    if asked is None:
+        return None
+    position = _metric(v, order)[:, places]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.nanmedian(position / v.position.block.values, axis=0)
+    return exchanged(v.robot, order.names, position, asked * np.where(np.isfinite(size), size, 1.0))
 
 
 def _metric(v: View, order: Order) -> Array:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,16 +33,18 @@ FILLING = frozenset(["gain", "gains", "position", "joint", "motor", "servo", "dr
 LEAST, MOST = 1e-9, 1e9
 """What a gain may be, in whatever unit a file states it."""
 LEAST_ROWS = 20
+_AT = re.compile(r"\[(\d+)\]$")
+"""The place of a number in a list of them."""
 SHOWN = 4
 
 
 def add_stated(proposal: Proposal, files: Sequence[Path], first: Recorded, robot: Robot) -> None:
     """Settings for gains that differ between the trials of ``files``, a note for one that does not, and for whatever else
     differs. Raises MeasurementError for a file that cannot be read."""
-    used = {(c.entry or {}).get("column") for c in proposal.choices}
+    used, order = {(c.entry or {}).get("column") for c in proposal.choices}, _order(proposal, robot)
     named = [key for key in dict(_numbers(first)) if key[1] not in used]
     # Other files are read for what may differ only: columns that stand still are many, and mostly mean nothing.
-    named = [(place, name) for place, name in named if place == HEADER or _gain(name, robot) is not None]
+    named = [(place, name) for place, name in named if place == HEADER or _gain(name, robot, order) is not None]
     if not named or "split" in proposal.head:
         return
     trials = [
@@ -49,26 +53,35 @@ def add_stated(proposal: Proposal, files: Sequence[Path], first: Recorded, robot
     differ = []
     known: dict[str, dict[str, float]] = {}
     for place, name in named:
-        values, found = [t.get((place, name), math.nan) for t in trials], _gain(name, robot)
+        values, found = [t.get((place, name), math.nan) for t in trials], _gain(name, robot, order)
         if not np.isfinite(values).all():
             continue
         if len(set(values)) == 1:
             if found is not None and not _known(known, proposal, robot, found, name, values[0]):
-                proposal.notes.append(
-                    f"{name} is {values[0]:g} in all trials: the description's gain is taken for it; say it as settings of the "
-                    "mapping where it is not, or where other files, with other gains, are to be compared with the same model"
+                _tell(
+                    proposal,
+                    f"{_AT.sub('', name)} is {values[0]:g} in all trials: the description's gain is taken for it; say it as "
+                    "settings of the mapping where it is not, or where other files, with other gains, are to be compared with "
+                    "the same model",
                 )
-        elif found is None or not LEAST <= min(values) <= max(values) <= MOST:
+        elif found is None or not LEAST <= min(values) <= max(values) <= MOST or (place == HEADER and _AT.search(name)):
             differ.append(f"{name} ({_listed(values)})")
         else:
             proposal.choices.append(_setting(found, place, name, values))
     if known:
+        known = _together(known, robot)
         proposal.head["gains"] = known
         proposal.notes.append(_offered(known, robot))
     if differ:
         proposal.notes.append(
             f"differs between trials, and is not used: {', '.join(differ)}; settings of the mapping can say what it changes"
         )
+
+
+def _tell(proposal: Proposal, note: str) -> None:
+    """Once, if it is the same of several joints."""
+    if note not in proposal.notes:
+        proposal.notes.append(note)
 
 
 def _known(
@@ -90,10 +103,11 @@ def _known(
     if not guessed:
         return False
     if not all(FARTHEST[0] <= value / g <= FARTHEST[1] for g in guessed.values()):
-        proposal.notes.append(
-            f"{name} is {value:g} in all trials, where the description only assumes {key} {_listed([*guessed.values()])}: too "
-            f"far off to be taken for the same unit; if it is, write '{key}: {value:g}' at the drives of the description and "
-            f"take {key} off 'assumed'"
+        _tell(
+            proposal,
+            f"{_AT.sub('', name)} is {value:g} in all trials, where the description only assumes {key} "
+            f"{_listed([*guessed.values()])}: too far off to be taken for the same unit; if it is, write '{key}: {value:g}' at "
+            f"the drives of the description and take {key} off 'assumed'",
         )
         return True
     for joint in [ALL_JOINTS] if len(guessed) == len(robot.drives) else guessed:
@@ -137,8 +151,10 @@ def _numbers(recorded: Recorded) -> Iterator[tuple[tuple[str, str], float]]:
     for table in recorded.tables:
         for name, value in table.header.items():
             # A whole number of JSON may have hundreds of digits.
-            if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST:
+            if _is_number(value):
                 yield (HEADER, name), float(value)
+            elif isinstance(value, list) and value and all(map(_is_number, value)) and _gain_words(name):
+                yield from (((HEADER, f"{name}[{k}]"), float(v)) for k, v in enumerate(value))
     if len(recorded.tables) != 1 or len(recorded.tables[0]) < LEAST_ROWS:
         return
     (table,) = recorded.tables
@@ -153,6 +169,25 @@ def _numbers(recorded: Recorded) -> Iterator[tuple[tuple[str, str], float]]:
             yield (COLUMN, name), float(seen[0])
 
 
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
+
+
+def _order(proposal: Proposal, robot: Robot) -> dict[int, str]:
+    """The joint of each place in a list of one number a joint: that of the positions, where these were found in one; else as the
+    robot has them."""
+    joints = {s.name: s.target for s in robot.sensors if s.kind == "position"}
+    places = [(_AT.search(c.column), joints.get(c.name)) for c in proposal.choices if c.group == "sensors"]
+    found = {int(at[1]): joint for at, joint in places if at is not None and joint is not None}
+    return found if len(found) == len(robot.drives) else dict(enumerate(robot.motor_names))
+
+
+def _together(known: dict[str, dict[str, float]], robot: Robot) -> dict[str, dict[str, float]]:
+    """The same said once where it is of all joints."""
+    every = [known.get(m) for m in robot.motor_names]
+    return {ALL_JOINTS: every[0]} if every[0] and all(gains == every[0] for gains in every) else known
+
+
 def _gain_words(name: str) -> tuple[str, list[str]] | None:
     """What a gain is called by, and the words of the name that are left."""
     words = tokens(name)
@@ -165,9 +200,11 @@ def _gain_words(name: str) -> tuple[str, list[str]] | None:
     return None
 
 
-def _gain(name: str, robot: Robot) -> tuple[str, str] | None:
-    """(effect, target) of a number that is called a gain of one drive, or of all; None where it is not, or no drive has one."""
-    found = _gain_words(name)
+def _gain(name: str, robot: Robot, order: Mapping[int, str]) -> tuple[str, str] | None:
+    """(effect, target) of a number that is called a gain of one drive, or of all; None where it is not, or no drive has one.
+    ``order``: the joint of each place in a list."""
+    at = _AT.search(name)
+    found = _gain_words(name[: at.start()] if at else name)
     if found is None:
         return None
     key, rest = found
@@ -175,6 +212,9 @@ def _gain(name: str, robot: Robot) -> tuple[str, str] | None:
     able = [
         d.joint for d in robot.drives if d.command == "position" and (d.kp if effect == "position_gain" else d.kd) > 0
     ]
+    if at and not rest:
+        joint = order.get(int(at[1]))
+        return (effect, joint) if joint in able else None
     if not rest:
         if len(robot.drives) == 1:
             return (effect, able[0]) if able else None
