@@ -68,6 +68,13 @@ def inertia(robot: Robot, joint: str) -> float:
     return float(felt_inertia(robot)[robot.motor_names.index(joint)])
 
 
+def spare_inertia(robot: Robot, joint: str) -> float:
+    """How much less inertia a joint may feel for its controller to be steady in the robot's time step, kg.m^2 (kg)."""
+    drive, dt = drive_of(robot, joint), robot.time_step_s
+    stiff, damping = (drive.kp, drive.kd) if drive.command == "position" else (0.0, drive.kp)
+    return inertia(robot, joint) - max(stiff * (STEPS * dt) ** 2, 2.0 * damping * dt)
+
+
 def torque(robot: Robot, joint: str) -> float:
     """The torque limit of a drive, or what its controller asks at half the range of the joint; N.m (N)."""
     return ranges.top_torque(robot, drive_of(robot, joint))

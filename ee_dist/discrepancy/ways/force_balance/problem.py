@@ -28,10 +28,15 @@ from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
 from ee_dist.effects.catalogue import Hypothesis, applied, apply, find, term
+from ee_dist.engines.friction import LOADED as LOADS
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
+LOADED = 0.1
+"""Share of a drive's torque that its load must be in some motion, for friction by load to be looked for."""
+BY_LOAD = (*LOADS, "stribeck_load_speed")
+"""Fields of a drive that are friction by load."""
 LEAST_NOISE = 0.002
 """Share of the force below which no difference counts, noise or not."""
 
@@ -196,12 +201,33 @@ class ForceBalance(Problem):
 
     def shows(self, effect: str, target: str) -> bool:
         """A controller's gain, a delay or play in a gear would be proposed for nothing, and named beside what is found; so would
-        whatever changes nothing but at joints whose torques are not known."""
+        whatever changes nothing but at joints whose torques are not known, and friction by load where there is none."""
         limits = find(effect).bounds(self.robot, target)
         corners = [{name: float(ends[end]) for name, ends in limits.items()} for end in (0, 1)]
         changed = [apply(self.robot, (term(effect, target, **values),)) for values in corners]
-        as_it_is = told_by(self.robot, self.judged)
-        return any(told_by(robot, self.judged) != as_it_is for robot in changed)
+        return any(self._tells(robot) for robot in changed)
+
+    def _tells(self, robot: Robot) -> bool:
+        """Whether anything is told from the robot as it is described."""
+        as_it_is, own = told_by(self.robot, self.judged), self.robot.drives
+        if told_by(robot, self.judged) == as_it_is:
+            return False
+        drives = tuple(
+            replace(d, **{n: getattr(o, n) for n in BY_LOAD}) for d, o in zip(robot.drives, own, strict=True)
+        )
+        if told_by(replace(robot, drives=drives), self.judged) != as_it_is:
+            return True
+        return any(d != o and d.joint in self._loaded for d, o in zip(robot.drives, own, strict=True))
+
+    @cached_property
+    def _loaded(self) -> frozenset[str]:
+        """Joints through whose gears goes what tells friction by load: of a motor that gives ten times as much, it is a share
+        of the motor's own torque, and stands in for any friction, or a rotor, that is larger by one factor."""
+        needed = np.zeros(len(self.judged))
+        for model, motion in zip(self.models, self.motions, strict=True):
+            load = motion.of_judged(motion.needed(model)[1])
+            needed = np.maximum(needed, np.sqrt(np.mean((load / self.size) ** 2, axis=0)))
+        return frozenset(name for name, share in zip(self.channels, needed, strict=True) if share >= LOADED)
 
     @cached_property
     def doubts(self) -> str:
