@@ -29,6 +29,7 @@ TOGETHER = ("position_gain", "speed_gain", "torque_limit", "rotor_inertia", "cou
 """The limit is among them although files state one: it is often what a CAD program writes where nobody entered any."""
 GAINS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Shares of the assumed gains to look from: a guess may be off by an order of magnitude."""
+ROTORS = ("rotor_factor", "rotor_inertia")
 LAGS_RAD = (0.0, 0.02, 0.05)
 """Errors (rad, m) at which a joint comes to rest by dry friction, to look from: those of hobby servos."""
 LIMITS = (0.0, 0.7)
@@ -138,11 +139,18 @@ def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:
 
 
 def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
-    """A grid: damping falls with the gain, so that a joint follows as fast, and friction holds as large an error."""
-    stiffness = float(np.median([drive_of(robot, j).kp for j in joints]))
+    """A grid: damping falls with the gain, so that a joint follows as fast, and friction holds as large an error. Rotors are as
+    assumed, or fall with the gain too: who took a motor for ten times as strong as it is took its rotor for as heavy."""
+    drives = [drive_of(robot, j) for j in joints]
+    stiffness, rotor = (float(np.median([getattr(d, n) for d in drives])) for n in ("kp", "rotor_inertia"))
+    scaled = (False, True) if any(c.effect.name in ROTORS for c in model.parts) else (False,)
     found = []
-    for gain, lag, limit in product(GAINS, LAGS_RAD, LIMITS):
+    for gain, lag, limit, lighter in product(GAINS, LAGS_RAD, LIMITS, scaled):
+        if lighter and gain == 1.0:
+            continue
         values = {
+            "rotor_factor": gain if lighter else 1.0,
+            "rotor_inertia": (gain - 1.0) * rotor if lighter else 0.0,
             "position_gain": gain,
             "speed_gain": gain,
             "torque_limit": limit,

@@ -206,12 +206,19 @@ HEAVIEST = 20.0
 """Times the rotors that were guessed: those of an arm for 300 kg (KUKA KR300, by its identified model) have 5 to 16."""
 
 
+LIGHTEST = 1 / 50
+"""The same to the other side, as far as a guessed gain may be off: direct drives (Unitree Aliengo) have 1/15 to 1/70. As far as
+the joint stays slow enough for its controller; where that was guessed, too, it is as far off, and steady with the lighter one."""
+
+
 def _heavier(robot: Robot, target: str) -> dict[str, Range]:
-    """As light as ``rotor_inertia`` goes, and heavier by more: a guess by the size of a motor is an order of magnitude short for
-    the high gears of a large arm."""
+    """Lighter and heavier by more than ``rotor_inertia`` goes: a guess by the size of a motor is an order of magnitude short for
+    the high gears of a large arm, and as much too heavy for direct drives."""
     rotor = scales.drive_of(robot, target).rotor_inertia
     less, more = find("rotor_inertia").bounds(robot, target)["added_kg_m2"]
-    return {"factor": ((rotor + less) / rotor, max((rotor + more) / rotor, HEAVIEST))}
+    steady = 1.0 - scales.spare_inertia(robot, target) / rotor
+    least = LIGHTEST if (target, "kp") in robot.assumed else max(LIGHTEST, steady)
+    return {"factor": (min((rotor + less) / rotor, least), max((rotor + more) / rotor, HEAVIEST))}
 
 
 @effect(

@@ -50,6 +50,32 @@ def the_problem(limit: float = 0.0) -> Problem:
     return problem_by("open_loop", measure(sample, hidden), guessed(sample.robot))
 
 
+TWELVE = 12.0
+"""Times as strong as they are that all drives were taken to be."""
+
+
+def test_drives_that_are_weaker_by_one_factor_in_all_are_found_with_their_lighter_rotors() -> None:
+    sample: Sample = samples()["arm"]
+    hidden = tuple(
+        term("coulomb_friction", j, torque_nm=c) for j, c in zip(sample.robot.motor_names, DRIER, strict=True)
+    )
+    drives = tuple(
+        replace(d, kp=TWELVE * d.kp, kd=TWELVE * d.kd, rotor_inertia=TWELVE * (k + 1) * d.rotor_inertia)
+        for k, d in enumerate(sample.robot.drives)
+    )
+    assumed = tuple((d.joint, f) for d in drives for f in ("kp", "kd", "rotor_inertia"))
+    robot = replace(sample.robot, drives=drives, assumed=assumed)
+    problem = problem_by("open_loop", measure(sample, hidden), robot)
+    proposal, u = assumed_drives(Search(problem), candidates(robot)) or pytest.fail("nothing was proposed")
+    found = {t.effect: dict(t.values) for t in Model(proposal.parts).hypothesis(u)}
+    assert found["position_gain"]["factor"] == pytest.approx(1 / TWELVE, rel=0.1)
+    assert found["speed_gain"]["factor"] == pytest.approx(1 / TWELVE, rel=0.15)
+    assert 0.02 < found["rotor_factor"]["factor"] < 0.1, (
+        "one factor, where the guess at the second joint is twice as far off"
+    )
+    assert found["coulomb_friction"]["torque_nm"] == pytest.approx(np.mean(DRIER), rel=0.2)
+
+
 def test_gains_that_were_assumed_are_found_together_with_friction() -> None:
     problem = the_problem()
     proposal, u = assumed_drives(Search(problem), candidates(problem.robot)) or pytest.fail("nothing was proposed")
