@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -17,6 +19,10 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog, State
+
+MOST_STEPS, FEWEST = 60_000, 6
+"""Steps that a search simulates for each model at most, of windows that start anew; but so many windows of each trial."""
+GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,4 +150,24 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
                 Past(commands, enabled, log.joints, dt, begin) if begin else None,
             )
         )
+    return found
+
+
+def spared(windows: Sequence[Piece]) -> int:
+    """Of how many windows one is enough: 1 where all of them are few steps, or are simulated in one go."""
+    per_trial = Counter(p.trial for p in windows)
+    needed = math.ceil(sum(len(p.log) for p in windows) / MOST_STEPS)
+    return max(1, min(needed, min(per_trial.values()) // FEWEST))
+
+
+def thinned(windows: Sequence[Piece], one_in: int) -> list[Piece]:
+    """One of so many windows of each trial, at places that no period of a motion falls together with."""
+    of_trial: dict[int, list[Piece]] = {}
+    for p in windows:
+        of_trial.setdefault(p.trial, []).append(p)
+    found = []
+    for own in of_trial.values():
+        for k, first in enumerate(range(0, len(own), one_in)):
+            some = own[first : first + one_in]
+            found.append(some[int((k * GOLDEN) % 1.0 * len(some))])
     return found

@@ -25,7 +25,7 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import TIMES_NOISE, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.slow_noise import slow_noise, without_motion
 from ee_dist.discrepancy.starting import speeds_off
-from ee_dist.discrepancy.ways.free_run.pieces import Piece, pieces
+from ee_dist.discrepancy.ways.free_run.pieces import Piece, pieces, spared, thinned
 from ee_dist.effects.catalogue import Hypothesis, applied, apply
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
@@ -67,7 +67,8 @@ class FreeRun(Problem):
 
     ``every``: rows of a log from one residual value to the next; where sensors were read more seldom than rows are simulated,
     their readings are taken instead. ``windows_s`` starts the model anew from the measured
-    state so often, and makes segments of the windows; None runs each trial through, in BLOCKS segments.
+    state so often, and makes segments of the windows; None runs each trial through, in BLOCKS segments. ``one_in``: of so many
+    windows one is simulated.
     """
 
     way = "free_run"
@@ -82,8 +83,9 @@ class FreeRun(Problem):
         evaluator: Evaluator,
         every: int = 3,
         windows_s: float | None = None,
+        one_in: int = 1,
     ) -> None:
-        self.windows_s = windows_s
+        self.windows_s, self.one_in = windows_s, one_in
         self.robot, self.measured, self.evaluator, self.every = robot, tuple(trials), evaluator, every
         columns = [k for k, s in enumerate(robot.sensors) if s.kind == "position"]
         if not columns:
@@ -93,6 +95,8 @@ class FreeRun(Problem):
         self.setups = [noiseless(apply(robot, t.setup)) for t in trials]
         self.pieces = [p for k, t in enumerate(trials) for p in pieces(k, t, robot, windows_s, every)]
         by_unit = _noise_by_unit(self.pieces, robot, columns)
+        if one_in > 1:
+            self.pieces = thinned(self.pieces, one_in)
         self.noise = np.array([by_unit[robot.sensors[k].unit] for k in columns])
         """(C,) mean absolute error that noise alone would leave, in the unit of each channel."""
         self._lay_out(BLOCKS if windows_s is None else 1)
@@ -256,16 +260,35 @@ class FreeRun(Problem):
     @cached_property
     def searched(self) -> FreeRun:
         """The same by windows. Over a whole record errors jump where a joint sticks or slips: fits are caught, and what is
-        foretold of another motion depends on which of many equal ones was found."""
-        return self if self.windows_s is not None else self._by(RESTART_S)
+        foretold of another motion depends on which of many equal ones was found. Of long records in fine steps some of them: a
+        search simulates them ten thousand times."""
+        found = self if self.windows_s is not None else self._in_windows
+        one_in = spared(found.pieces)
+        return found if one_in == 1 else self._by(found.windows_s, one_in)
+
+    @cached_property
+    def _in_windows(self) -> FreeRun:
+        """The same by windows, all of them."""
+        return self._by(RESTART_S)
 
     @cached_property
     def _whole(self) -> FreeRun:
         """The same run through."""
         return self if self.windows_s is None else self._by(None)
 
-    def _by(self, windows_s: float | None) -> FreeRun:
-        return FreeRun(self.measured, self.robot, self.evaluator, self.every, windows_s)
+    def _by(self, windows_s: float | None, one_in: int = 1) -> FreeRun:
+        return FreeRun(self.measured, self.robot, self.evaluator, self.every, windows_s, one_in)
+
+    @property
+    def notes(self) -> list[str]:
+        lines = super().notes
+        if self.one_in > 1:
+            whole = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)
+            lines.append(
+                f"So that the search ends, one in {self.one_in} of the windows is simulated, of {whole:.0f} s in steps of "
+                f"{1e3 * self.robot.time_step_s:g} ms; compare takes all of them."
+            )
+        return lines
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         return self.other_errors(hypothesis)
@@ -275,7 +298,7 @@ class FreeRun(Problem):
         if len(self.units) > 1:
             out += [f"Mean absolute position error: {_listed([self.told_by_unit(r) for r in self.residuals(models)])}."]
         if led(self.robot):
-            other = self.searched if self.windows_s is None else self._whole
+            other = self._in_windows if self.windows_s is None else self._whole
             how = "Run through without starting anew"
             if other.windows_s is not None:
                 how = f"Started anew from the measured state every {other.windows_s:g} s"
