@@ -26,6 +26,7 @@ from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, E
 from ee_dist.discrepancy.exchanges import exchanged, nearest, refitted, strictest, twins_of
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung, Twin
+from ee_dist.discrepancy.plainer import in_plain_terms
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import without_neutral, without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of
@@ -194,6 +195,12 @@ def _last_steps(
     its place here, it is fitted anew beside that, ``often`` times at most."""
     problem, robot, asked = search.problem, search.problem.robot, frozenset[str]()
     while True:
+        plain = in_plain_terms(search.doing(NOT_TOLD), current, own, pool, strictest(problem))
+        if plain.came:
+            current, terms = plain.then, plain.then.hypothesis
+            plainer = refitted(search, current, " + ".join(plain.came), plain.gone)
+            plainer.added = terms[len(terms) - len(plain.came) :]
+            climb(plainer)
         if spread or len(current.parts) - own > 1:
             # Of two that leave the same mark the values may be anything, and one of them says it all.
             told = told_only(search.doing(NOT_TOLD), current, own, strictest(problem), len(pool), not spread)
@@ -248,15 +255,18 @@ def _offered(robot: Robot, pool: Sequence[Candidate], current: Current, ladder: 
 
 
 def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
-    """Whether much is left although the search had its chance with few effects; or, where it is known to be ``spread`` over
-    many places, anything when no single one is left that stands out."""
-    best = found.best
+    """Whether much is left although the search had its chance with few effects; or, when no single one is left that stands out,
+    anything that counts, and where that is known to be ``spread`` over many places whatever is above the noise."""
+    best, problem = found.best, search.problem
     # Windows of a single motion say nothing about so many values.
-    if not travelling(search.problem) or (best is not None and added < FEW):
+    if not travelling(problem) or (best is not None and added < FEW):
         return False
-    energy = float((found.base**2).sum()) if best is None else float(best.held.sum())
-    enough = NEAR if spread and best is None else FAR
-    return energy > enough**2 * float(search.problem.floor.sum())
+    energy, noise = float((found.base**2).sum() if best is None else best.held.sum()), float(problem.floor.sum())
+    if best is not None:
+        return energy > FAR**2 * noise
+    if spread:
+        return energy > NEAR**2 * noise
+    return not _settled(leftovers(problem, found.base), error(found.base), problem.noise_floor()[0])
 
 
 def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:

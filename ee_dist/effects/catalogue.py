@@ -113,6 +113,8 @@ class Effect:
     seen_in: Callable[[Array], Mapping[str, float]] | None = None
     """Its values as readings (T,) of a sensor show them without a model: a search looks there too, for no slope may lead there.
     Empty where they show none."""
+    plainer: str = ""
+    """The effect that says most of it with fewer numbers: what a search asks for in its place, once all else is known."""
     mistake: bool = False
     """Whether it says no more than which way round something is, or which is which: a mistake of a description or a mapping, that
     no robot catches and any way of comparing tells."""
@@ -267,6 +269,7 @@ def effect(
     of: type = Robot,
     guesses: Callable[[Robot], tuple[str, ...]] | None = None,
     seen_in: Callable[[Array], Mapping[str, float]] | None = None,
+    plainer: str = "",
     mistake: bool = False,
 ) -> Callable[[Transform], Transform]:
     """Register a transform as an effect. Raises EffectError where the name is taken or a fact contradicts itself."""
@@ -302,6 +305,7 @@ def effect(
             of,
             guesses,
             seen_in,
+            plainer,
             mistake,
         )
         return transform

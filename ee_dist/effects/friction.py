@@ -124,6 +124,7 @@ def _stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
     signature="Residual torque peaks around zero speed and fades within the scale; slow motions go stick and slip.",
     reference=SURVEY,
     ranges=_stribeck_range,
+    plainer="coulomb_friction",
 )
 def stribeck_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     if values["torque_nm"] == 0:
@@ -206,6 +207,7 @@ def _load_stribeck_range(robot: Robot, target: str) -> dict[str, Range]:
     signature="Like Stribeck friction, but only where there is load: a held weight sticks, an unloaded joint does not.",
     reference=SERVOS,
     ranges=_load_stribeck_range,
+    plainer="load_friction",
 )
 def load_stribeck_friction(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     if values["share"] == 0:
@@ -243,6 +245,7 @@ def _own_friction(robot: Robot, target: str) -> dict[str, Range]:
     reference="Janot, Gautier and Brunot 2019, Data set and reference models of EMPS",
     ranges=_asymmetry_range,
     within=_own_friction,
+    plainer="offset_torque",
 )
 def friction_asymmetry(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     def sided(drive: Drive) -> Drive:

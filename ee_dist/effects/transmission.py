@@ -91,6 +91,7 @@ def _springs(robot: Robot, target: str) -> dict[str, Range]:
     physics="A spring beside the motor: a cable, a hose, a gas spring, a balance spring that the model left out.",
     signature="Residual torque is a straight line against position, whatever the speed; it is there at rest too.",
     ranges=_springs,
+    plainer="offset_torque",
 )
 def parallel_spring(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     stiffness, rest = values["stiffness_nm_rad"], values["rest_rad"]
