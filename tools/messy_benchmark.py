@@ -199,9 +199,18 @@ class Bench:
         found.shared = any(len(self.places(t)) > 1 for t in result.terms)
         for p in result.parameters:
             t = result.terms[p.term]
-            true = [dict(x.values)[p.name] for x in truth if x.effect == t.effect and x.target in self.places(t)]
+            true = [
+                dict(x.values)[p.name] - self.beside(result, t, x.target, p.name)
+                for x in truth
+                if x.effect == t.effect and x.target in self.places(t)
+            ]
             if true and np.isfinite(p.high - p.low) and len(true) == len(self.places(t)):
                 found.held.append(int(p.low <= float(np.mean(true)) <= p.high))
+
+    def beside(self, result: Improvement, term: Term, place: str, name: str) -> float:
+        """What other terms of the same effect say of a place: friction that all joints share counts at each of them."""
+        others = (t for t in result.terms if t is not term and t.effect == term.effect and place in self.places(t))
+        return float(sum(dict(t.values)[name] for t in others))
 
     def places(self, t: Term) -> tuple[str, ...]:
         allowed = tuple({*self.robot.motor_names, *(p.name for p in self.robot.parts), *self.robot.sensor_names})
