@@ -124,8 +124,11 @@ def percent(share: float) -> str:
 
 
 def percents(low: float, high: float) -> str:
-    """An interval of shares: ``76 to 100 %``."""
-    return f"{percent(low).removesuffix(' %')} to {percent(high)}"
+    """An interval of shares: ``76 to 100 %``; one that is less than a per cent wide by more digits, or by the one value."""
+    if percent(low) != percent(high):
+        return f"{percent(low).removesuffix(' %')} to {percent(high)}"
+    narrow = f"{100 * low:.3g}", f"{100 * high:.3g}"
+    return f"{narrow[0]} to {narrow[1]} %" if narrow[0] != narrow[1] else percent(high)
 
 
 def named(term: Term) -> str:

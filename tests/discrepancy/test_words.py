@@ -19,7 +19,7 @@ from ee_dist.discrepancy.ladder import Twin
 from ee_dist.discrepancy.search.candidates import Proposal, candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.words import percent, phrase, plain, span, told, told_all
+from ee_dist.discrepancy.words import percent, percents, phrase, plain, span, told, told_all
 from ee_dist.effects.catalogue import Term, term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped
@@ -351,3 +351,10 @@ def test_explain_says_which_value_ended_at_its_bound() -> None:
     assert said == " Its torque and damping ended at its bound: the range is too small, or the effect is another."
     best.own = np.array([0.2, 0.4, 0.3])
     assert _at_bounds(best, robot) == ""  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("low", "high", "said"), [
+    (0.761, 1.0, "76 to 100 %"), (0.5581, 0.5634, "55.8 to 56.3 %"), (0.56, 0.56, "56 %"), (0.0, 0.0, "0 %"), (1.0, 1.0, "100 %"),
+])  # fmt: skip
+def test_a_narrow_interval_does_not_end_where_it_begins(low: float, high: float, said: str) -> None:
+    assert percents(low, high) == said
