@@ -16,7 +16,7 @@ from ee_dist.trials.log import Array
 GOES, APART = 0.8, 0.4
 """How well the errors of controllers must go with the weight in some order (the cosine between the two, joint by joint), and how
 much less well in the one that is taken for granted, for that to be another."""
-MOST_ORDERS, ROWS = 720, 100
+MOST_ORDERS, ROWS = 720, 40
 """Orders that are tried, those of six limbs, and rows of the log that are looked at."""
 
 

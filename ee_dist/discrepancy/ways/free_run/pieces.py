@@ -157,7 +157,7 @@ def spared(windows: Sequence[Piece]) -> int:
     """Of how many windows one is enough: 1 where all of them are few steps, or are simulated in one go."""
     per_trial = Counter(p.trial for p in windows)
     needed = math.ceil(sum(len(p.log) for p in windows) / MOST_STEPS)
-    return max(1, min(needed, min(per_trial.values()) // FEWEST))
+    return max(1, min(needed, min(per_trial.values(), default=0) // FEWEST))
 
 
 def thinned(windows: Sequence[Piece], one_in: int) -> list[Piece]:
