@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
-from ee_dist.discrepancy.everywhere import everywhere, stands_out
+from ee_dist.discrepancy.everywhere import Everywhere, everywhere, stands_out
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, cross_fit, prior_of, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
@@ -215,7 +215,13 @@ def _last_steps(
         before = {c.name for c in current.parts}
         current, twins, step = nearest(search.doing(IN_PLACE), current, own, pool, asked)
         if step is None:
-            return current, twins
+            found = _beside_a_twin(search, current, own, pool, twins, seen) if often else None
+            if found is None:
+                return current, twins
+            often, current = often - 1, found.current
+            for rung in found.rungs:
+                climb(rung)
+            continue
         climb(step)
         came = [c for c in current.parts if c.name not in before and stands_out(robot, c)]
         if not (spread and often and came):
@@ -229,6 +235,35 @@ def _last_steps(
         often, current = often - 1, found.current
         for rung in found.rungs:
             climb(rung)
+
+
+def _beside_a_twin(
+    search: Search,
+    current: Current,
+    own: int,
+    pool: Sequence[Candidate],
+    twins: Sequence[Twin],
+    seen: Sequence[tuple[Candidate, Array]],
+) -> Everywhere | None:
+    """Far from the noise what does as well as an effect of the model may be what is there, and all the rest stand in for it: what
+    is a little wrong everywhere, fitted beside the first such that stands out; None where that is not better."""
+    problem, by_name = search.problem, {c.name: c for c in (*pool, *current.parts)}
+    able = [t for t in twins if t.term.name in by_name and stands_out(problem.robot, by_name[t.term.name])]
+    left = search.on(current.hypothesis).base()
+    if not able or not travelling(problem) or float(left @ left) <= FAR**2 * float(problem.floor.sum()):
+        return None
+    terms = able[0].terms[len(search.fixed) :]
+    parts = tuple(by_name[t.name] for t in terms if t.name in by_name)
+    if len(parts) < len(terms):
+        return None
+    twin = Current(parts, values_of(parts, terms))
+    found = everywhere(search.doing(AT_ONCE), twin, own, pool, travelling(problem), True, (), seen)
+    now = cross_fit(search, [(Model(current.parts), current.u)], strictest(problem))[0].energy
+    if found is None or found.held >= now:
+        return None
+    step = refitted(search, twin, able[0].term.name, tuple(c.name for c in current.parts if c not in parts))
+    step.added = tuple(t for t in terms if t.name not in {c.name for c in current.parts})
+    return replace(found, rungs=[step, *found.rungs])
 
 
 def _with_room(search: Search, fit: Fit) -> Fit:

@@ -52,3 +52,23 @@ def test_a_stopped_benchmark_makes_only_what_is_left(
     found = {line[:30].strip(): float(line[30:]) for line in said.splitlines() if line.startswith("  ")}
     assert found["hidden within names"] == pytest.approx(2 / 3, abs=1e-3)
     assert (found["error over floor, median"], found["intervals hold"]) == (2.5, 0.875)
+
+
+@pytest.mark.slow
+def test_play_that_all_else_had_stood_in_for_is_found_in_its_place() -> None:
+    import argparse
+
+    import messy_benchmark as messy
+
+    asked = {
+        "robot": messy.ARM,
+        "size": "small",
+        "by": "open_loop",
+        "seed": 48,
+        "noise": 0.001,
+        "seconds": 4.0,
+        "beyond": False,
+    }
+    case = messy.Bench(argparse.Namespace(**asked)).case(2)
+    assert case.truth.startswith("backlash at joint_6") and case.within and not case.wrong
+    assert case.ratio < 0.2 * case.before
