@@ -3,7 +3,6 @@ weight pulls to, and the hips of a left leg are pulled the other way than those 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, islice, permutations
 
@@ -32,21 +31,15 @@ class Exchanged:
 def limbs_of(robot: Robot, names: tuple[str, ...]) -> list[tuple[str, ...]]:
     """Driven joints of each limb, in the order of ``names``: chains that begin at the same part and have as many joints, the most
     numerous kind."""
-    below: dict[str, list[tuple[str, str]]] = {}
+    starts: dict[str, list[str]] = {}
     for j in robot.joints:
-        below.setdefault(j.parent, []).append((j.name, j.child))
-
-    def under(part: str) -> Iterator[str]:
-        for name, child in below.get(part, ()):
-            yield name
-            yield from under(child)
-
+        starts.setdefault(j.parent, []).append(j.child)
     found: list[list[tuple[str, ...]]] = []
-    for starts in below.values():
+    for children in starts.values():
         by_length: dict[int, list[tuple[str, ...]]] = {}
-        for name, child in starts:
-            joints = {name, *under(child)}
-            own = tuple(n for n in names if n in joints)
+        for child in children:
+            carried = set(robot.subtree(child))
+            own = tuple(n for n in names if robot.joint(n).child in carried)
             by_length.setdefault(len(own), []).append(own)
         found += [limbs for length, limbs in by_length.items() if length > 1 and len(limbs) > 1]
     return max(found, key=lambda limbs: sum(map(len, limbs)), default=[])
