@@ -40,6 +40,8 @@ FEWEST = 3
 WIDTHS, MORE_WIDTHS, MANY = (0.12, 0.3), (0.03, 0.12, 0.3), 20
 """Finite differences to begin with: each leads down another side of a ridge, and which is right shows at the end. More of them
 where it costs little, for fewer than MANY values."""
+AT_ONCE = "all small effects at once"
+"""What the search is at, for who waits."""
 TWINS = 2
 """Twins of effects that are tried in their place."""
 TRIED = 20

@@ -14,21 +14,21 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
-from ee_dist.discrepancy.everywhere import Everywhere, everywhere, stands_out
+from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, stands_out
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, cross_fit, prior_of, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
-from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers, may_be_noise
+from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise, settled
 from ee_dist.discrepancy.evidence.rule import LUCK, NEAR, no_more_than_noise
 from ee_dist.discrepancy.evidence.signs import either_sign
 from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
-from ee_dist.discrepancy.exchanges import exchanged, nearest, refitted, strictest, twins_of
+from ee_dist.discrepancy.exchanges import exchanged, refitted, twins_of
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung, Twin
-from ee_dist.discrepancy.plainer import in_plain_terms
+from ee_dist.discrepancy.last_steps import last_steps
 from ee_dist.discrepancy.problem import Problem, error, per_segment
-from ee_dist.discrepancy.pruning import without_neutral, without_useless
+from ee_dist.discrepancy.pruning import without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -38,7 +38,6 @@ from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
 from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.discrepancy.search.valley import LARGE
-from ee_dist.discrepancy.told import told_only
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -65,8 +64,7 @@ WORSE = "with all values fitted anew, data held out are foretold no better"
 NOTHING_LEFT = "nothing is left that counts, above the noise and above the resolution at which channels are compared"
 ASKED = "the effects asked for were added"
 REFITTED = "only the model's own values were to be fitted"
-ONE_MORE, AT_ONCE = "one more effect", "all small effects at once"
-NOT_TOLD, IN_PLACE = "leaving out what is not told", "what does as well in its place"
+ONE_MORE = "one more effect"
 """What the search is at, for who waits."""
 EXPLAINED, BETTER = "explained", "better_not_explained"
 
@@ -149,7 +147,7 @@ def improve(
                     continue
                 why_not = WORSE if worse else last.judged[0].why_not if last.judged else LUCK
                 stopped = NO_MORE.format(why=why_not)
-                if _settled(leftovers(problem, last.base), ladder[-1].error_heldout, problem.noise_floor()[0]):
+                if settled(leftovers(problem, last.base), ladder[-1].error_heldout, problem.noise_floor()[0]):
                     stopped = NOTHING_LEFT
                 break
             model, start = best.model, best.u
@@ -176,94 +174,8 @@ def improve(
                 stopped = NO_MORE.format(why=WORSE)
                 break
             climb(rung)
-        current, twins = _last_steps(search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew)
+        current, twins = last_steps(search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew)
     return _finish(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
-
-
-def _last_steps(
-    search: Search,
-    current: Current,
-    own: int,
-    pool: Sequence[Candidate],
-    climb: Callable[[Rung], None],
-    spread: bool,
-    seen: Sequence[tuple[Candidate, Array]],
-    often: int,
-) -> tuple[Current, list[Twin]]:
-    """The model without what is not told, or the one that does as well and is nearer to the description, or better; and what does
-    as well as an effect of it. Where what is a little wrong everywhere (``spread``) had stood in for an effect that only comes in
-    its place here, it is fitted anew beside that, ``often`` times at most."""
-    problem, robot, asked = search.problem, search.problem.robot, frozenset[str]()
-    while True:
-        plain = in_plain_terms(search.doing(NOT_TOLD), current, own, pool, strictest(problem))
-        if plain.came:
-            current, terms = plain.then, plain.then.hypothesis
-            plainer = refitted(search, current, " + ".join(plain.came), plain.gone)
-            plainer.added = terms[len(terms) - len(plain.came) :]
-            climb(plainer)
-        if spread or len(current.parts) - own > 1:
-            # Of two that leave the same mark the values may be anything, and one of them says it all.
-            told = told_only(search.doing(NOT_TOLD), current, own, strictest(problem), len(pool), not spread)
-            current, none = without_neutral(told.then, own)
-            asked = told.instead
-            if told.gone or none:
-                climb(
-                    refitted(search, current, "without what these data do not tell from neutral", (*told.gone, *none))
-                )
-        if len(current.parts) <= own + 1:
-            return current, []
-        before = {c.name for c in current.parts}
-        current, twins, step = nearest(search.doing(IN_PLACE), current, own, pool, asked)
-        if step is None:
-            found = _beside_a_twin(search, current, own, pool, twins, seen) if often else None
-            if found is None:
-                return current, twins
-            often, current = often - 1, found.current
-            for rung in found.rungs:
-                climb(rung)
-            continue
-        climb(step)
-        came = [c for c in current.parts if c.name not in before and stands_out(robot, c)]
-        if not (spread and often and came):
-            return current, twins
-        left = leftovers(problem, search.on(current.hypothesis).base())
-        if _settled(left, step.error_heldout, problem.noise_floor()[0]):
-            return current, twins
-        found = everywhere(search.doing(AT_ONCE), current, own, pool, travelling(problem), True, (), seen)
-        if found is None:
-            return current, twins
-        often, current = often - 1, found.current
-        for rung in found.rungs:
-            climb(rung)
-
-
-def _beside_a_twin(
-    search: Search,
-    current: Current,
-    own: int,
-    pool: Sequence[Candidate],
-    twins: Sequence[Twin],
-    seen: Sequence[tuple[Candidate, Array]],
-) -> Everywhere | None:
-    """Far from the noise what does as well as an effect of the model may be what is there, and all the rest stand in for it: what
-    is a little wrong everywhere, fitted beside the first such that stands out; None where that is not better."""
-    problem, by_name = search.problem, {c.name: c for c in (*pool, *current.parts)}
-    able = [t for t in twins if t.term.name in by_name and stands_out(problem.robot, by_name[t.term.name])]
-    left = search.on(current.hypothesis).base()
-    if not able or not travelling(problem) or float(left @ left) <= FAR**2 * float(problem.floor.sum()):
-        return None
-    terms = able[0].terms[len(search.fixed) :]
-    parts = tuple(by_name[t.name] for t in terms if t.name in by_name)
-    if len(parts) < len(terms):
-        return None
-    twin = Current(parts, values_of(parts, terms))
-    found = everywhere(search.doing(AT_ONCE), twin, own, pool, travelling(problem), True, (), seen)
-    now = cross_fit(search, [(Model(current.parts), current.u)], strictest(problem))[0].energy
-    if found is None or found.held >= now:
-        return None
-    step = refitted(search, twin, able[0].term.name, tuple(c.name for c in current.parts if c not in parts))
-    step.added = tuple(t for t in terms if t.name not in {c.name for c in current.parts})
-    return replace(found, rungs=[step, *found.rungs])
 
 
 def _with_room(search: Search, fit: Fit) -> Fit:
@@ -301,7 +213,7 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
         return energy > FAR**2 * noise
     if spread:
         return energy > NEAR**2 * noise
-    return not _settled(leftovers(problem, found.base), error(found.base), problem.noise_floor()[0])
+    return not settled(leftovers(problem, found.base), error(found.base), problem.noise_floor()[0])
 
 
 def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:
@@ -403,11 +315,6 @@ def _finish(
 
 
 def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor: float) -> str:
-    if _settled(left, error_after, floor):
+    if settled(left, error_after, floor):
         return EXPLAINED if changed else NOTHING_MISSING
     return BETTER if changed else UNEXPLAINED
-
-
-def _settled(left: Sequence[Leftover], error_after: float, floor: float) -> bool:
-    """Whether no more than noise is left: no curve stands out, nor all of them together."""
-    return not left and error_after <= SETTLED * floor

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,3 +107,8 @@ def _rarity(total: float, each: float, count: float) -> float:
     if each <= 0 or count < 1:
         return math.inf
     return -float(scipy.special.ndtri(scipy.special.chdtrc(count, total / each)))
+
+
+def settled(left: Sequence[Leftover], error: float, floor: float) -> bool:
+    """Whether no more than noise is left: no curve stands out, nor all of them together."""
+    return not left and error <= SETTLED * floor
