@@ -13,6 +13,7 @@ from ee_dist.discrepancy.steps import SPEEDS, between_steps, held
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.effects.fixture import STAND
 from ee_dist.engines.drivers import Commands, Driver, Network
+from ee_dist.engines.halfway import goes_halfway
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array, SensorLog
@@ -37,13 +38,15 @@ class MeasuredTrial:
     setup: Hypothesis = ()
     commands_held: bool | None = False
 
-    def obeyed(self, commands: Array) -> Array:
+    def obeyed(self, commands: Array, robot: Robot) -> Array:
         """Commands (T, M) as the steps of a simulation take them."""
-        return held(commands) if self.commands_held else commands
+        return held(commands) if self.commands_held and not goes_halfway(robot) else commands
 
     def early(self, robot: Robot) -> tuple[int, ...]:
         """The channels that a simulation reads half a step before their row."""
-        return tuple(i for i, s in enumerate(robot.sensors) if s.kind in SPEEDS) if self.commands_held else ()
+        if not self.commands_held or goes_halfway(robot):
+            return ()
+        return tuple(i for i, s in enumerate(robot.sensors) if s.kind in SPEEDS)
 
     def simulated(self, model: Robot) -> Robot:
         """The model as the steps of a simulation take it."""
@@ -125,7 +128,7 @@ def read_every(log: SensorLog, every_s: float) -> SensorLog:
 def speeds_of(log: SensorLog, robot: Robot) -> Array:
     """Measured speeds (T, M); slopes of the positions where a joint has no sensor for it. Of a sensor that is known to
     be noisy, a smooth course: a start that is off by the noise of one row goes on for seconds."""
-    return read_speeds(log, speed_sensors(robot))
+    return read_speeds(log, speed_sensors(robot), goes_halfway(robot))
 
 
 SpeedSensors = tuple[tuple[int, int, float], ...]
@@ -149,11 +152,15 @@ SMOOTH = 0.5
 """Share of half a step's change of a speed by which it differs from row to row: acceleration does by less, noise by more."""
 
 
-def _slopes(joints: Array, step_s: float) -> Array:
-    """(T, M) speeds from positions (T, M). A simulation moves a joint in each step by the speed that it has at its end: where
-    positions are exact enough to tell, that is the speed of a row, and not that about it."""
+def _slopes(joints: Array, step_s: float, halfway: bool) -> Array:
+    """(T, M) speeds from positions (T, M). A simulation moves a joint in each step by the speed that it has at its end, unless
+    it goes by half steps (``halfway``): where positions are exact enough to tell, that is the speed of a row, and not that about
+    it."""
     about = np.gradient(joints, step_s, axis=0)
     if len(joints) < 4:
+        return np.asarray(about)
+    if halfway:
+        about[0] = (4.0 * joints[1] - 3.0 * joints[0] - joints[2]) / (2.0 * step_s)
         return np.asarray(about)
     moved = np.diff(joints, axis=0) / step_s
     # What has the speed of a single step was at rest before it.
@@ -166,10 +173,10 @@ def _slopes(joints: Array, step_s: float) -> Array:
 
 
 @lru_cache(maxsize=32)
-def read_speeds(log: SensorLog, read: SpeedSensors) -> Array:
-    """The same of known sensors. Kept: a search asks for it with every model."""
+def read_speeds(log: SensorLog, read: SpeedSensors, halfway: bool = False) -> Array:
+    """The same of known sensors, of a robot that goes by half steps or not. Kept: a search asks for it with every model."""
     assert log.joints is not None
-    out = _slopes(log.joints, float(np.median(np.diff(log.times_s))))
+    out = _slopes(log.joints, float(np.median(np.diff(log.times_s))), halfway)
     for k, c, noise in read:
         out[:, k] = _course(log.sensors[:, c], noise)
     out.setflags(write=False)

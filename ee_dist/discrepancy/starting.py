@@ -22,6 +22,7 @@ from ee_dist.discrepancy.measured_trial import (
     speed_sensors,
 )
 from ee_dist.discrepancy.slow_noise import slow_noise
+from ee_dist.engines.halfway import goes_halfway
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog, State
 
@@ -38,7 +39,7 @@ def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
     log = trial.log
     if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
         return None
-    speeds, _ = _first_speeds(trial, speed_sensors(robot))
+    speeds, _ = _first_speeds(trial, speed_sensors(robot), goes_halfway(robot))
     return State(log.joints[0].copy(), speeds.copy())
 
 
@@ -48,15 +49,15 @@ def starts_beside(trial: MeasuredTrial, robot: Robot) -> list[State]:
     start = start_of(trial, robot)
     if start is None:
         return []
-    _, off = _first_speeds(trial, speed_sensors(robot))
+    _, off = _first_speeds(trial, speed_sensors(robot), goes_halfway(robot))
     return [State(start.joints, start.speeds + step) for step in np.diag(off) if step.any()]
 
 
 @lru_cache(maxsize=64)
-def _first_speeds(trial: MeasuredTrial, sensors: SpeedSensors) -> tuple[Array, Array]:
+def _first_speeds(trial: MeasuredTrial, sensors: SpeedSensors, halfway: bool) -> tuple[Array, Array]:
     """(M,) with which a simulation begins, and (M,) standard deviations of their noise, of simulated logs as far as it is
     declared. What reads no more than its noise at all joints stood: what noise would make of a start is not simulated."""
-    log, speeds = trial.log, _starting(trial, sensors)[0]
+    log, speeds = trial.log, _starting(trial, sensors, halfway)[0]
     if trial.commands_held:
         return speeds, np.zeros(len(speeds))
     read = [float(log.sensors[0, c]) / noise for _, c, noise in sensors if noise]
@@ -67,23 +68,26 @@ def _first_speeds(trial: MeasuredTrial, sensors: SpeedSensors) -> tuple[Array, A
 
 def starting_speeds(trial: MeasuredTrial, robot: Robot) -> Array:
     """(T, M) with which a simulation from each row is to begin. Of a simulated log, what its sensors read. Of a robot, the best
-    that is known, half a step before: the speed that a step begins with is that of half a step ago (see ``steps``)."""
-    return _starting(trial, speed_sensors(robot))
+    that is known, half a step before: the speed that a step begins with is that of half a step ago (see ``steps``), but for
+    robots that go by half steps."""
+    return _starting(trial, speed_sensors(robot), goes_halfway(robot))
 
 
 @lru_cache(maxsize=64)
-def _starting(trial: MeasuredTrial, read: SpeedSensors) -> Array:
-    speeds = read_speeds(trial.log, read)
+def _starting(trial: MeasuredTrial, read: SpeedSensors, halfway: bool) -> Array:
+    speeds = read_speeds(trial.log, read, halfway)
     if not trial.commands_held or len(trial.log) < 2:
         return speeds
     known = _through_positions(trial, read, speeds)
+    if halfway:
+        return known
     return np.concatenate([known[:1] - (known[1:2] - known[:1]) / 2, (known[:-1] + known[1:]) / 2])
 
 
 def speeds_off(trial: MeasuredTrial, robot: Robot) -> Array:
     """(M,) standard deviations of ``starting_speeds``: of the noise that a sensor shows, or of the curve through positions."""
     sensors, even = speed_sensors(robot), evenly_read(trial.log)
-    sensed = _at(even, trial.log, read_speeds(trial.log, sensors))
+    sensed = _at(even, trial.log, read_speeds(trial.log, sensors, goes_halfway(robot)))
     noise = slow_noise(even.times_s, sensed)
     curve = _curve(even) if trial.commands_held else None
     return noise if curve is None else np.where(curve.better(sensors, sensed), curve.noise, noise)

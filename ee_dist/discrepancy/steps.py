@@ -2,7 +2,8 @@
 
 Engines take a force at the start of a step, then speed, then position. That is a leapfrog (Hairer, Lubich and Wanner, Acta
 Numerica 2003): a force counts from half a step before its row to half a step after, and the speed that a step begins with is
-that of half a step ago. Of what is as fast as a few steps that is an error as large as a late sensor or a heavier rotor.
+that of half a step ago. Of what is as fast as a few steps that is an error as large as a late sensor or a heavier rotor. Robots
+that no controller holds go by half steps (``engines.halfway``): there only damping is made up for.
 """
 
 from __future__ import annotations

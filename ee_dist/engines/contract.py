@@ -95,6 +95,9 @@ class Bodies(Protocol):
         others are not asked to.
         """
 
+    def move(self, joints: Array, speeds: Array) -> None:
+        """Joint positions and speeds (B, M) of all of them, from here on. Joints that they lost stay lost."""
+
     def put(self, row: int, state: State) -> None:
         """Joint positions and speeds of one of them, from here on. Joints that it lost stay lost."""
 

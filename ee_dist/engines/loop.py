@@ -14,6 +14,7 @@ from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import Bodies, Rollout, Truth
 from ee_dist.engines.drive import DrivePath
 from ee_dist.engines.drivers import Controllers, command_scaling, scaling
+from ee_dist.engines.halfway import Halfway, goes_halfway
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.sensing import LIFTED, TOUCHING, SensingPath
 from ee_dist.robots.model import Robot, RobotError
@@ -35,6 +36,7 @@ def shape_of(rollout: Rollout) -> tuple[object, ...]:
         rollout.steps,
         rollout.pose,
         robot.free_base,
+        goes_halfway(robot),
         rollout.supply_v is None,
         rollout.enabled is None,
         rollout.external is None,
@@ -49,6 +51,8 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     robots = [r.model for r in rollouts]
     first, steps, pose = robots[0], rollouts[0].steps, rollouts[0].pose
     dt = first.time_step_s
+    halfway = Halfway(bodies, dt) if goes_halfway(first) else None
+    bodies = halfway or bodies
     kinds = {s.kind for s in first.sensors}
     drive = DrivePath(robots, dt, bodies.gives)
     goals = _goals(rollouts)
@@ -89,7 +93,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
         torque = drive.step(
             step * dt,
             command,
-            truth.joints,
+            truth.joints if halfway is None else halfway.middle(),
             truth.speeds,
             None if supply is None else supply[:, step : step + 1],
             None if enabled is None else enabled[:, step : step + 1],

@@ -91,6 +91,9 @@ class OneJointBodies:
         self.qd = self.qd + self.dt * (torques - load) / inertia
         self.q = self.q + self.dt * self.qd
 
+    def move(self, joints: Array, speeds: Array) -> None:
+        self.q, self.qd = joints, speeds
+
     def put(self, row: int, state: State) -> None:
         self.q, self.qd = self.q.copy(), self.qd.copy()
         self.q[row], self.qd[row] = state.joints, state.speeds

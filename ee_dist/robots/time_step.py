@@ -8,10 +8,7 @@ from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.model import Drive, Robot
 
 FINE_S = 0.002
-"""The step of a robot that stands on a floor, or whose joints no controller holds: contacts and free swings are short."""
-SWING_S = 0.0005
-"""That of links that swing from one another and that no controller holds: what such a motion loses by itself in steps of 2 ms
-(centrifugal forces are those of half a step ago) is as much as good bearings take."""
+"""The step of a robot that stands on a floor, or some of whose joints no controller holds: contacts and free swings are short."""
 STEPS_S = (0.01, 0.005, 0.004)
 """Coarser ones, for robots that stand fast and whose controllers are slower than they."""
 TURNED, TAKEN = 0.3, 0.5
@@ -25,12 +22,7 @@ def default_step_s(robot: Robot) -> float:
     obeys = {d.joint: d.command for d in robot.drives}
     moving = {j.name: obeys.get(j.name, "none") for j in robot.joints if j.kind != "fixed"}
     swings = any(moving.get(j.name) == "none" for j in robot.joints if j.kind == "hinge")
-    held = bool({"position", "speed"} & {*moving.values()})
-    if robot.free_base or robot.world.has_floor:
-        return FINE_S
-    if swings and not held and len(moving) > 1:
-        return SWING_S
-    if swings or "torque" in moving.values():
+    if robot.free_base or robot.world.has_floor or swings or "torque" in moving.values():
         return FINE_S
     coarsest = coarsest_step_s(robot)
     return next((s for s in STEPS_S if s <= coarsest), FINE_S)

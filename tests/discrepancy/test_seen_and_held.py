@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
 
-from ee_dist.discrepancy import improve as improving
+from ee_dist.discrepancy import last_steps as ending
 from ee_dist.discrepancy.everywhere import Everywhere
 from ee_dist.discrepancy.evidence.holdout import PRIOR, cross_fit, held_by_slopes, prior_of, travelling
 from ee_dist.discrepancy.examine import Current, _families
@@ -92,15 +92,15 @@ def test_small_values_are_fitted_anew_beside_what_came_in_the_place_of_one(monke
     def nearest(_: Search, now: Current, *more: object) -> tuple[Current, list[object], Rung | None]:
         return (now, [], None) if came in now.parts else (then, [], rung("supply sag"))
 
-    monkeypatch.setattr(improving, "told_only", lambda *given: Told(given[1]))
-    monkeypatch.setattr(improving, "nearest", nearest)
-    monkeypatch.setattr(improving, "everywhere", everywhere)
+    monkeypatch.setattr(ending, "told_only", lambda *given: Told(given[1]))
+    monkeypatch.setattr(ending, "nearest", nearest)
+    monkeypatch.setattr(ending, "everywhere", everywhere)
     climbed: list[Rung] = []
 
     def settled(spread: bool, often: int) -> Current:
         climbed.clear()
         pool: list[Candidate] = []
-        return improving._last_steps(search, current, 0, pool, climbed.append, spread, [], often)[0]
+        return ending.last_steps(search, current, 0, pool, climbed.append, spread, [], often)[0]
 
     assert settled(True, 1).parts == (came,) and [r.name for r in climbed][-2:] == ["supply sag", "all anew"]
     assert asked == [tuple(c.name for c in then.parts)]

@@ -176,6 +176,11 @@ class MuJoCoBodies:
                 group.force[:] = force[rows]
             group.step()
 
+    def move(self, joints: Array, speeds: Array) -> None:
+        for rows, g in self.groups:
+            _scatter(rows, joints, g.qpos_of, g.positions)
+            _scatter(rows, speeds, g.dof_of, g.speeds)
+
     def put(self, row: int, state: State) -> None:
         for rows, group in self.groups:
             for i in np.flatnonzero(rows == row):
@@ -209,12 +214,12 @@ def _gather(
 
 
 @compiled
-def _scatter(rows: Places, torques: Array, dof_of: Places, applied: Array) -> None:
-    """Torques of the batch's ``rows`` to where MuJoCo takes them for a group."""
+def _scatter(rows: Places, values: Array, place_of: Places, into: Array) -> None:
+    """Values of the batch's ``rows``, one a motor, to where MuJoCo takes them for a group."""
     for i in range(len(rows)):
-        for k in range(len(dof_of)):
-            if dof_of[k] >= 0:
-                applied[i, dof_of[k]] = torques[rows[i], k]
+        for k in range(len(place_of)):
+            if place_of[k] >= 0:
+                into[i, place_of[k]] = values[rows[i], k]
 
 
 def _places(members: Sequence[int], at: Sequence[int], count: int) -> Places:

@@ -170,6 +170,15 @@ class BulletBodies:
         for world in self.worlds:
             simulate(world.client)
 
+    def move(self, joints: Array, speeds: Array) -> None:
+        values, rates = joints[:, :, None].tolist(), speeds[:, :, None].tolist()
+        for row, client, body, links, motors in self.robots:
+            q, qd = values[row], rates[row]
+            if motors is not None:
+                q, qd = [q[k] for k in motors], [qd[k] for k in motors]
+            if links:
+                p.resetJointStatesMultiDof(body, links, q, qd, physicsClientId=client)
+
     def put(self, row: int, state: State) -> None:
         world, body = self.places[row]
         world.put(body, state)

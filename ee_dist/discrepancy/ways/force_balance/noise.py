@@ -20,6 +20,7 @@ from ee_dist.discrepancy.ways.force_balance.motion import (
     Processing,
     judged_in,
     motion_of,
+    motor_torques,
     noise_of,
     positions_of,
 )
@@ -27,6 +28,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import LowPass, decimated
 from ee_dist.robots.inverse_dynamics import parameters, regressor
 from ee_dist.robots.model import Robot
+from ee_dist.trials.grid import reading_step
 from ee_dist.trials.log import Array
 
 BEARABLE = 0.2
@@ -39,6 +41,9 @@ BENT = 1.5
 """Standard deviations of the noise beyond which a filter takes away motion, and not noise alone."""
 NOISE, PLAIN = 3.5, 7.0
 """Standard deviations up to which a force may be noise, and from which it is none."""
+RESOLVED = 5.0
+"""Steps of its readings that a force is counted as at least: of a smaller one a relative error says next to nothing, and would
+outweigh all others."""
 MOVING = 2
 """Columns of a noise regressor beside those of the masses: acceleration and speed of the joint itself."""
 
@@ -142,31 +147,49 @@ def _added(trial: MeasuredTrial, model: Robot, motion: Motion, processing: Proce
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """Measured motions, how they were processed, and what noise does to them; ``size`` (J,): root mean square of the force
-    of each of the ``judged`` drives."""
+    of each of the ``judged`` drives, or RESOLVED of the steps (J,) that its readings come in, where that is more."""
 
     processing: Processing
     motions: list[Motion]
     noise: MotionNoise
     size: Array
+    steps: Array
+
+    @property
+    def coarse(self) -> tuple[int, ...]:
+        """Places of the judged drives whose forces are no more than a few steps of their readings."""
+        pairs = enumerate(zip(self.size.tolist(), self.steps.tolist(), strict=True))
+        return tuple(k for k, (size, step) in pairs if size <= RESOLVED * step)
 
     @property
     def judged(self) -> tuple[int, ...]:
         return self.noise.judged
 
 
-def prepared(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
-    """Motions smoothed as much as their noise asks for, and no more than the motion bears, unless a filter is given.
+def torque_steps(trials: Sequence[MeasuredTrial], models: Sequence[Robot]) -> Array:
+    """(M,) steps in which the torques of the drives were read, N.m; 0 where none are seen."""
+    read = [motor_torques(t.log, m) for t, m in zip(trials, models, strict=True)]
+    found = np.array([[reading_step(c[np.isfinite(c)]) for c in r.T] for r in read if r is not None])
+    return np.asarray(found.max(axis=0, initial=0.0))
+
+
+def prepared(
+    trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing, steps: Array | None = None
+) -> Prepared:
+    """Motions smoothed as much as their noise asks for, and no more than the motion bears, unless a filter is given. ``steps``
+    (M,): those in which the torques were read, where they are known.
 
     Raises MeasurementError where noise is all that would be left.
     """
-    found = _tried(trials, models, processing)
+    steps = np.zeros(len(models[0].drives)) if steps is None else steps
+    found = _tried(trials, models, processing, steps)
     if processing.low_pass is not None:
         return found
     while _share(found, models) > BEARABLE:
         more = _smoother(trials, models, found)
         if more is None:
             break
-        found = _tried(trials, models, more)
+        found = _tried(trials, models, more, steps)
     share = _share(found, models)
     if share > HOPELESS:
         worst = models[0].motor_names[found.judged[int(np.argmax(_shares(found, models)))]]
@@ -190,7 +213,7 @@ def _instead(trials: Sequence[MeasuredTrial], model: Robot, worst: str) -> str:
     return ", or ".join([*cures, "record finer positions, or leave its torque out of the mapping"])
 
 
-def _tried(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing) -> Prepared:
+def _tried(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing, steps: Array) -> Prepared:
     judged = judged_in(trials, models[0])
     motions = [motion_of(t, model, processing, judged) for t, model in zip(trials, models, strict=True)]
     # At a joint that is held dry friction may be anything up to its limit, so that its torque tells nothing of a model; and it
@@ -207,7 +230,8 @@ def _tried(trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing:
             f"{silent}: its measured torque is zero throughout: leave it out of the torques of the mapping, and the balance is "
             "judged at the other joints"
         )
-    return Prepared(processing, motions, MotionNoise(trials, models, motions, processing), size)
+    noise, own = MotionNoise(trials, models, motions, processing), steps[list(judged)]
+    return Prepared(processing, motions, noise, np.maximum(size, RESOLVED * own), own)
 
 
 def _share(found: Prepared, models: Sequence[Robot]) -> float:

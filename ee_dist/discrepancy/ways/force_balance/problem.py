@@ -24,7 +24,7 @@ from ee_dist.discrepancy.ways.force_balance.balance import INSTANT_S, Balance, t
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED, left_to_give
 from ee_dist.discrepancy.ways.force_balance.floor import floor_of
 from ee_dist.discrepancy.ways.force_balance.motion import Processing, judged_in
-from ee_dist.discrepancy.ways.force_balance.noise import prepared, resting, with_energy
+from ee_dist.discrepancy.ways.force_balance.noise import RESOLVED, prepared, resting, torque_steps, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
 from ee_dist.effects.catalogue import Hypothesis, applied, apply, find, term
@@ -56,19 +56,21 @@ class ForceBalance(Problem):
 
     def __init__(self, trials: Sequence[MeasuredTrial], robot: Robot, processing: Processing | None = None) -> None:
         # Nothing is simulated, so that no time step but that of the readings is wanted.
-        trials = [replace(t, log=evenly_read(t.log)) for t in trials]
+        as_read, trials = trials, [replace(t, log=evenly_read(t.log)) for t in trials]
         # Nor does a step of a simulation limit what a drive may have: how light a rotor its controller leaves steady.
         robot = replace(robot, time_step_s=INSTANT_S)
         self.robot, self.measured = robot, tuple(trials)
         self.models = [apply(robot, t.setup) for t in trials]
         self.asked = processing or Processing.for_rate(float(np.median(np.diff(trials[0].log.times_s))))
-        ready = prepared(trials, self.models, self.asked)
+        ready = prepared(trials, self.models, self.asked, torque_steps(as_read, self.models))
         self.processing, self.motions, self.size, self.motion_noise = (
             ready.processing,
             ready.motions,
             ready.size,
             ready.noise,
         )
+        self.coarse = ready.coarse
+        """Places of the channels whose forces are no more than a few steps of their readings."""
         self.judged = ready.judged
         """(J,): the drives whose torques are known in every trial, and whose joint slides in one."""
         self.unjudged = tuple(name for k, name in enumerate(robot.motor_names) if k not in self.judged)
@@ -259,6 +261,13 @@ class ForceBalance(Problem):
                     if self.held
                     else ", and no more of it can be told."
                 )
+            )
+        if self.coarse:
+            names, one = [self.channels[k] for k in self.coarse], len(self.coarse) == 1
+            steps = listed(f"{self.size[k] / RESOLVED:.2g} {self.layout.units[k]}" for k in self.coarse)
+            lines.append(
+                f"{listed(names)}: {'its torque is' if one else 'their torques are'} a few steps of the readings ({steps}). "
+                f"What is off there counts beside {RESOLVED:g} steps: a share of so little would outweigh all other joints."
             )
         if self.left_to_give < CANCELLED:
             lines.append(

@@ -118,7 +118,7 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
     # A window is simulated from as long before it as a delay may be: what drives hold within them when it begins (commands on
     # their way, play) comes from there.
     run_up = round(longest_delay(robot) / robot.time_step_s)
-    commands, enabled = released(trial.obeyed(log.commands))
+    commands, enabled = released(trial.obeyed(log.commands, robot))
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
     # An integral is what a controller made of all that came before.
     remembers = any(d.ki > 0 for d in robot.drives)

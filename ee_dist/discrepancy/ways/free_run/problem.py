@@ -58,6 +58,8 @@ GROWN = 10.0
 Below it noise is all of the floor: it is a bound, and hid what was found without it in simulated robots."""
 FINEST = 2.0**-20
 """Share of a joint's range that the finest encoders tell apart: one at rest reads the same all the time, and has noise."""
+HARDLY_BETTER = 0.8
+"""Share of the error of a robot that stays where it is, from which a model says next to nothing of the motion."""
 BLOCKS = 6
 """Segments that a record run through in one go is cut into."""
 
@@ -305,7 +307,29 @@ class FreeRun(Problem):
             rows = other.residuals(models)
             each = [other.told(error(r)) if len(self.units) == 1 else other.told_by_unit(r) for r in rows]
             out += [f"{how}: {_listed(each)}."]
-        return out
+        return out + self._beside_standing(*models[-1:])
+
+    def _beside_standing(self, model: Hypothesis) -> list[str]:
+        """A line where a model does hardly better than one that says nothing: one with enough friction stands still, and most of
+        a record is often rest."""
+        if self.windows_s is None:
+            return []
+        gap = np.concatenate(
+            [
+                ((read - read[own.start]) / self.noise)[own].ravel() * self.weight[at.start]
+                for p, at in zip(self.pieces, self.slices, strict=True)
+                for read in [p.measured(self.columns)]
+                for own in p.stretches
+            ]
+        )
+        standing, off = float(np.sqrt(np.abs(gap).mean())), error(self.residuals([model])[0])
+        if off < math.sqrt(HARDLY_BETTER) * standing:
+            return []
+        much, than = self.told(off), self.told(standing)
+        return [
+            f"A robot that stays where each window begins would be off by {than}, this model is by {much}: it says next to "
+            "nothing of the motion. Is there more in the record than rest, and is friction no more than what moved the joints?"
+        ]
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         """Of the first stretch of each trial; of a robot that is led, the whole trial."""

@@ -142,7 +142,7 @@ def wired_commands(trial: MeasuredTrial, model: Robot) -> Commands:
     if isinstance(trial.driver, Network):
         return Commands(trial.log.commands)
     planned = trial.driver.values if isinstance(trial.driver, Commands) else trial.log.commands
-    return Commands(np.ascontiguousarray(trial.obeyed(planned[: len(trial.log)])[:, list(model.wiring.source)]))
+    return Commands(np.ascontiguousarray(trial.obeyed(planned[: len(trial.log)], model)[:, list(model.wiring.source)]))
 
 
 Obeyed = tuple[Commands, Array | None]
