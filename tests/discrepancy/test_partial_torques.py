@@ -17,6 +17,7 @@ from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.sharing import apart
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques
+from ee_dist.discrepancy.ways.force_balance.noise import RESOLVED
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.effects.catalogue import term
 from ee_dist.engines.drivers import Commands
@@ -132,3 +133,25 @@ def test_a_recording_keeps_which_torques_are_not_known(tmp_path: Path) -> None:
     (record,) = read_logs(tmp_path / "part.mcap")
     assert log.torques is not None and record.log.torques is not None
     assert np.array_equal(record.log.torques, log.torques, equal_nan=True)
+
+
+def test_a_torque_of_a_few_steps_of_its_readings_does_not_outweigh_the_others() -> None:
+    """An idle wrist read in steps as large as its torque: what is off there is a hundred times as much, and means nothing."""
+    rms = float(
+        np.sqrt(np.mean([np.mean(t.log.torques[:, 1] ** 2) for t in measured("arm") if t.log.torques is not None]))
+    )
+    for steps, coarse in ((2.0, (1,)), (200.0, ())):
+        size, read = rms / steps, []
+        for t in measured("arm"):
+            assert t.log.torques is not None
+            torques = t.log.torques.copy()
+            torques[:, 1] = size * np.round(torques[:, 1] / size)
+            read.append(replace(t, log=replace(t.log, torques=torques)))
+        problem = ForceBalance(read, arm())
+        assert problem.coarse == coarse
+        assert any("a few steps of the readings" in n for n in problem.notes) == bool(coarse)
+        assert problem.size[1] == pytest.approx(RESOLVED * size if coarse else rms, rel=0.1)
+        # In newton metres what is left is what it was.
+        left = problem.raw(problem.residuals([FRICTION])[0])[problem.channel_of == 0]
+        plain = ForceBalance(measured("arm"), arm())
+        assert left == pytest.approx(plain.raw(plain.residuals([FRICTION])[0])[plain.channel_of == 0], abs=1e-9)

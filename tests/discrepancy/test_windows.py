@@ -11,6 +11,7 @@ from way_samples import evaluator_for, measure, samples
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
+from ee_dist.effects.catalogue import term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.robots.linear_stage import linear_stage
@@ -112,3 +113,15 @@ def test_what_was_sent_before_a_record_began_is_not_made_up() -> None:
     off = np.abs(windows.raw(windows.residuals([()])[0]))
     assert len(windows.segments) == 6 and windows.pieces[0].rows[0] * robot.time_step_s >= 0.05
     assert off.mean() < 1e-4 * float(np.ptp(began.sensors[:, 0]))
+
+
+def test_a_model_that_stands_still_is_told() -> None:
+    """With friction enough a model leaves what a robot would that never moved, far less than one that falls."""
+    robot = quiet(samples()["pendulum"].robot)
+    loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque"))
+    problem = FreeRun((trial_of(loose, 2.0),), loose, evaluator_for(loose), windows_s=RESTART_S)
+    stuck = (term("coulomb_friction", loose.drives[0].joint, torque_nm=50.0),)
+    assert not any("stays where each window begins" in line for line in problem.remarks(()))
+    (line,) = [line for line in problem.remarks(stuck) if "stays where each window begins" in line]
+    off = problem.told(error(problem.residuals([stuck])[0]))
+    assert f"this model is by {off}" in line
