@@ -68,3 +68,5 @@ def test_joints_that_were_not_recorded_are_named_with_what_to_do(tmp_path: Path)
     (asked,) = proposed(tmp_path, frame).questions
     assert "the columns name shoulder alone; of elbow nothing was recorded" in asked
     assert "fixed_joints: {" in asked
+    (turning,) = proposed(tmp_path, frame.assign(elbow_velocity=np.cos(3.0 * m["t"]))).questions
+    assert "of elbow speeds were recorded" in turning and "fixed_joints" not in turning

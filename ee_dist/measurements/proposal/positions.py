@@ -77,11 +77,19 @@ def ask_for_positions(v: View) -> None:
         v.out.ask(f"positions: {ranked[0].block.name} or {ranked[1].block.name}? write the right one into the mapping")
     elif v.hints.joints is None and (some := _recorded(v)):
         rest = [m for m in v.robot.motor_names if m not in some]
-        v.out.ask(
-            f"positions: the columns name {listed(some)} alone; of {listed(rest)} nothing was recorded. Those that stood "
-            f"still are written into the description of the robot, each with its place (rad, m): 'fixed_joints: "
-            f"{{{', '.join(f'{m}: 0.0' for m in rest)}}}'; one that moved unrecorded leaves the motion of the others unknown"
-        )
+        turning = [m for m in rest if m in _recorded(v, SPEED)]
+        if turning:
+            v.out.ask(
+                f"positions: the columns name {listed(some)} alone; of {listed(turning)} speeds were recorded. Add their "
+                "integral as a column of positions, or write the mapping by hand: the sensors of a description may leave out "
+                "a position"
+            )
+        elif rest:
+            v.out.ask(
+                f"positions: the columns name {listed(some)} alone; of {listed(rest)} nothing was recorded. Those that stood "
+                f"still are written into the description of the robot, each with its place (rad, m): 'fixed_joints: "
+                f"{{{', '.join(f'{m}: 0.0' for m in rest)}}}'; one that moved unrecorded leaves the motion of the others unknown"
+            )
     elif v.hints.joints is None and n > 1 and (called := _other_joints(v)):
         v.out.ask(
             f"positions: the columns call the joints {', '.join(called)}; which are these of {names}? say task.joints=[...] with "
@@ -104,15 +112,15 @@ def ask_for_positions(v: View) -> None:
         v.out.choices.append(Choice("sensors", m.name, {"column": "???"}, UNKNOWN, "not found"))
 
 
-def _recorded(v: View) -> list[str]:
-    """The joints that have a column of positions which bears their name, where others have none; at least half of such
+def _recorded(v: View, kind: str = POSITION) -> list[str]:
+    """The joints that have a column of that kind which bears their name, where others have none; at least half of such
     columns must name one, as those of another robot may by chance."""
     found: set[str] = set()
     other = 0
     for table in v.timed.tables:
         for address in series_of(table, filled=True):
             joint = in_full(address, v.robot.motor_names)
-            if read_name(address, frozenset(tokens(joint)) if joint else frozenset()).kind == POSITION:
+            if read_name(address, frozenset(tokens(joint)) if joint else frozenset()).kind == kind:
                 found |= {joint} if joint else set()
                 other += joint is None
     return [m for m in v.robot.motor_names if m in found] if other <= len(found) < len(v.joints) else []
