@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ee_dist.measurements.jumps import jumping, jumps
+from ee_dist.measurements.jumps import jumping, jumps, losing_time
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import Array, SensorLog
 
@@ -28,6 +28,11 @@ def log(position: Array, filled: Array | None = None) -> SensorLog:
         joints=position[:, None],
         filled=filled,
     )
+
+
+def of_joints(positions: Array) -> SensorLog:
+    names = tuple("ab"[: positions.shape[1]])
+    return SensorLog(T, positions, positions, names, ("rad",) * len(names), names, joints=positions)
 
 
 def test_an_angle_that_wraps_is_told_also_between_rows_that_were_filled_in() -> None:
@@ -62,3 +67,31 @@ def test_quick_motion_and_steps_are_no_jumps(seed: int) -> None:
         position[k] = position[k - 1] + (goal[k] - position[k - 1]) * 0.3
     assert not any(map(len, jumps(position + 1e-3 * rng.standard_normal(len(T)))))
     assert jumping(replace(ROBOT), [("steps", log(position))]) == []
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_rows_that_a_logger_lost_under_even_times_are_told(joints: int) -> None:
+    """Of ten rows at four places one is kept, and the times count on. One joint, which hops alone, or two that hop together."""
+    true_s = T + sum(0.09 * (at_s < T) for at_s in (1.0, 3.1, 5.2, 8.3))
+    position = np.stack([np.sin(1.3 * true_s), np.cos(0.9 * true_s)][:joints], axis=1)
+    late = of_joints(position)
+    (line,) = losing_time([("swing", late)])
+    assert "at 4 places, in swing at 1.0" in line
+    if joints == 1:
+        assert jumping(ROBOT, [("swing", log(position[:, 0]))]) == [line]
+
+
+def test_one_joint_of_two_that_hops_was_hit_or_slipped() -> None:
+    true_s = T + sum(0.09 * (at_s < T) for at_s in (1.0, 3.1, 5.2, 8.3))
+    position = np.stack([np.sin(1.3 * true_s), np.cos(0.9 * T)], axis=1)
+    assert losing_time([("swing", of_joints(position))]) == []
+
+
+def test_readings_whose_own_times_say_that_they_were_late_are_not_lost() -> None:
+    kept = np.ones(len(T), dtype=bool)
+    for at in (100, 310, 520, 830):
+        kept[at : at + 9] = False
+    read = np.interp(T, T[kept], np.sin(1.3 * T[kept]))
+    assert losing_time([("swing", log(read, ~kept))]) == []
+    assert losing_time([("noise", log(np.random.default_rng(1).standard_normal(len(T))))]) == []
+    assert losing_time([("stuck", log(np.floor(np.sin(0.3 * T) * 50) / 50))]) == []
