@@ -17,7 +17,7 @@ LEAST, BEYOND, NEARLY_ALL = 0.3, 8.0, 0.98
 TURN, QUICK, MOST = 0.15, 4.0, 0.9
 """Share by which a step may be off a whole turn and be one, where it is so many times the largest of most other steps."""
 HOP, AROUND = 3.0, (-4, -3, -2, 2, 3, 4)
-"""A joint that goes one way hops where it goes so many times as far in a row as in any of those around it, but for the next ones."""
+"""A joint that goes one way hops where it goes so many times as far in a row as in those around it, but for the next ones."""
 TOGETHER, FEWEST = 2, 3
 """Joints that hop in one row, or rows in which one joint hops where only one moves, that are no accident."""
 
