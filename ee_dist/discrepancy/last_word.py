@@ -53,9 +53,10 @@ class LastWord:
         return f"{text} There the improved model is the worse one: do not use it for such motions." if worse else text
 
 
-def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis]) -> LastWord:
-    """Of trials that nothing was fitted to, as a problem of each of two ``models`` (they may be weighed by a calibration).
-    Raises RobotError where one cannot be simulated."""
+def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis], fitted: Sequence[str]) -> LastWord:
+    """Of trials that nothing was fitted to, as a problem of each of two ``models`` (they may be weighed by a calibration);
+    ``fitted``: the channels of what was fitted, which are other ones where a joint moves in some trials alone. Raises
+    RobotError where one cannot be simulated."""
     residuals = [residual_as_it_is(p, m) for p, m in zip(problems, models, strict=True)]
     first, last = problems
     trials = range(len(last.trials))
@@ -63,5 +64,14 @@ def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis]) -> Last
     before, after = map(error, residuals)
     left = tuple(leftovers(last, residuals[1]))
     changed = models[0] != models[1]
-    others = tuple(last.other_errors(*models if changed else models[:1]))
+    others = (*last.other_errors(*models if changed else models[:1]), *_elsewhere(last.channels, fitted))
     return LastWord(last, before, after, last.noise_floor()[0], tuple(by_trial), left, changed, others)
+
+
+def _elsewhere(channels: Sequence[str], fitted: Sequence[str]) -> list[str]:
+    """A line where these trials are judged by other channels than those that were fitted."""
+    more, less = ([c for c in a if c not in b] for a, b in ((channels, fitted), (fitted, channels)))
+    told = [f"at {listed(more)} too"] * bool(more) + [f"not at {listed(less)}"] * bool(less)
+    if not told:
+        return []
+    return [f"It is judged {' and '.join(told)}, unlike what was fitted: the two errors are of other joints."]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -101,7 +101,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             )
     also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
     also = (*also, *way.instead(bool(found.left)))
-    word = None if apart is None else told_of(apart, way, config, found.terms)
+    word = None if apart is None else told_of(apart, way, config, found.terms, problem.channels)
     account = improve_account(problem, found, planning(out, problem.robot), also, word).warned(measured.remarks)
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
@@ -132,11 +132,11 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     return problem, found, account
 
 
-def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis) -> LastWord:
+def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis, fitted: Sequence[str]) -> LastWord:
     """How far the model as it was and the one with ``terms`` are from trials that nothing was fitted to, compared
-    in the same way."""
+    in the same way; ``fitted``: the channels of what was."""
     models = (apart.model, terms)
-    return last_word([way.make(replace(apart, model=m), config) for m in models], models)
+    return last_word([way.make(replace(apart, model=m), config) for m in models], models, fitted)
 
 
 def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:

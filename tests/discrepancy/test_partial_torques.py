@@ -12,6 +12,7 @@ import pytest
 from way_samples import measure, measured, samples
 
 from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.last_word import last_word
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.pool import pool_of
@@ -155,3 +156,11 @@ def test_a_torque_of_a_few_steps_of_its_readings_does_not_outweigh_the_others() 
         left = problem.raw(problem.residuals([FRICTION])[0])[problem.channel_of == 0]
         plain = ForceBalance(measured("arm"), arm())
         assert left == pytest.approx(plain.raw(plain.residuals([FRICTION])[0])[plain.channel_of == 0], abs=1e-9)
+
+
+def test_a_last_word_on_other_joints_than_were_fitted_says_so() -> None:
+    both, one = ForceBalance(measured("arm"), arm()), known_at(0)
+    for last, fitted, told in ((both, one, "at elbow too"), (one, both, "not at elbow"), (one, one, None)):
+        word = last_word([last, last], [(), FRICTION], fitted.channels)
+        lines = [line for line in word.lines if "the two errors are of other joints" in line]
+        assert len(lines) == (told is not None) and all(f"it is judged {told}" in line for line in lines)
