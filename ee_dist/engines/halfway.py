@@ -30,7 +30,7 @@ class Halfway:
 
     def __init__(self, bodies: Bodies, time_step_s: float) -> None:
         self.bodies, self.gives = bodies, bodies.gives
-        self.step_s, self.half_s = time_step_s, 0.5 * time_step_s
+        self.half_s = 0.5 * time_step_s
         start = bodies.read(False, False, False)
         self.joints, self.speeds = start.joints.copy(), start.speeds.copy()
         self.gained: Array = np.zeros_like(self.speeds)
