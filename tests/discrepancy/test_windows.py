@@ -125,3 +125,14 @@ def test_a_model_that_stands_still_is_told() -> None:
     (line,) = [line for line in problem.remarks(stuck) if "stays where each window begins" in line]
     off = problem.told(error(problem.residuals([stuck])[0]))
     assert f"this model is by {off}" in line
+
+
+def test_a_right_model_of_a_robot_at_rest_is_not_told_to_stand_still() -> None:
+    robot = samples()["pendulum"].robot
+    loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque"))
+    at_rest = np.zeros((800, 1))
+    (log,) = evaluator_for(loose).engine.rollout([Rollout(loose, Commands(at_rest), 800, pose=True)])  # type: ignore[attr-defined]
+    problem = FreeRun(
+        (MeasuredTrial("rest", log, Commands(at_rest)),), loose, evaluator_for(loose), windows_s=RESTART_S
+    )
+    assert not any("stays where each window begins" in line for line in problem.remarks(()))

@@ -60,6 +60,8 @@ FINEST = 2.0**-20
 """Share of a joint's range that the finest encoders tell apart: one at rest reads the same all the time, and has noise."""
 HARDLY_BETTER = 0.8
 """Share of the error of a robot that stays where it is, from which a model says next to nothing of the motion."""
+AT_NOISE = 1.3
+"""Times the noise floor up to which a model is right, be it of a robot at rest."""
 BLOCKS = 6
 """Segments that a record run through in one go is cut into."""
 
@@ -323,7 +325,11 @@ class FreeRun(Problem):
             ]
         )
         standing, off = float(np.sqrt(np.abs(gap).mean())), error(self.residuals([model])[0])
-        if off < math.sqrt(HARDLY_BETTER) * standing:
+        if (
+            off < math.sqrt(HARDLY_BETTER) * standing
+            or off < AT_NOISE * self.noise_floor()[0]
+            or not math.isfinite(off)
+        ):
             return []
         much, than = self.told(off), self.told(standing)
         return [
