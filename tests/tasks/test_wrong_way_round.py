@@ -26,8 +26,8 @@ SUSPECTS = (
 
 def keep_log(folder: Path, wrong: str, flaw: str = "") -> None:
     """Two motions of an arm that differs from its description by ``wrong``, if by anything, as a logger keeps them: the bus of
-    its servos lost three rows of the first. A ``flaw`` of the record: "jump" puts an angle a whole turn on, "late" is a logger that
-    stood still at four places and counted its rows, "coarse" a torque read in steps as large as it is."""
+    its servos lost three rows of the first. A ``flaw`` of the record: "jump" puts an angle a whole turn on, "late" is a logger
+    that stood still at four places and counted its rows, "coarse" a torque read in steps as large as it is."""
     robot, _ = load_robot(ARM)
     name, _, target = wrong.partition("@")
     true = apply(robot, (term(name, target),)) if wrong else robot
