@@ -2,7 +2,8 @@
 
 A general engine spends its time on bodies and contacts that a pendulum or a slide does not have. Here a step is a few
 array operations whatever the number of rows, and the inertia about the joint and the work of gravity are exact. Steps
-are semi-implicit Euler, as in Bullet, or half steps (``halfway``). Everything else (drives, sensors, controllers) is the same code as for any engine.
+are semi-implicit Euler, as in Bullet, or half steps (``halfway``). Everything else (drives, sensors, controllers) is the same
+code as for any engine.
 """
 
 from __future__ import annotations
