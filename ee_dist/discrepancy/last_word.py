@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ee_dist.basics.names import listed
 from ee_dist.discrepancy.base_model import residual_as_it_is
-from ee_dist.discrepancy.evidence.left import SETTLED, Leftover, leftovers
+from ee_dist.discrepancy.evidence.left import Leftover, leftovers, settled
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.effects.catalogue import Hypothesis
 
@@ -34,7 +34,7 @@ class LastWord:
     @property
     def more(self) -> bool:
         """Whether more than noise is left on these trials."""
-        return bool(self.left) or self.after > SETTLED * self.floor
+        return not settled(self.left, self.after, self.floor)
 
     @property
     def lines(self) -> list[str]:

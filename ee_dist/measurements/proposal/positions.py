@@ -77,14 +77,15 @@ def ask_for_positions(v: View) -> None:
         v.out.ask(f"positions: {ranked[0].block.name} or {ranked[1].block.name}? write the right one into the mapping")
     elif v.hints.joints is None and (some := _recorded(v)):
         rest = [m for m in v.robot.motor_names if m not in some]
-        turning = [m for m in rest if m in _recorded(v, SPEED)]
+        with_speed = _recorded(v, SPEED)
+        turning = [m for m in rest if m in with_speed]
         if turning:
             v.out.ask(
                 f"positions: the columns name {listed(some)} alone; of {listed(turning)} speeds were recorded. Add their "
                 "integral as a column of positions, or write the mapping by hand: the sensors of a description may leave out "
                 "a position"
             )
-        elif rest:
+        else:
             v.out.ask(
                 f"positions: the columns name {listed(some)} alone; of {listed(rest)} nothing was recorded. Those that stood "
                 f"still are written into the description of the robot, each with its place (rad, m): 'fixed_joints: "

@@ -174,14 +174,13 @@ def torque_steps(trials: Sequence[MeasuredTrial], models: Sequence[Robot]) -> Ar
 
 
 def prepared(
-    trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing, steps: Array | None = None
+    trials: Sequence[MeasuredTrial], models: Sequence[Robot], processing: Processing, steps: Array
 ) -> Prepared:
     """Motions smoothed as much as their noise asks for, and no more than the motion bears, unless a filter is given. ``steps``
-    (M,): those in which the torques were read, where they are known.
+    (M,): those in which the torques were read.
 
     Raises MeasurementError where noise is all that would be left.
     """
-    steps = np.zeros(len(models[0].drives)) if steps is None else steps
     found = _tried(trials, models, processing, steps)
     if processing.low_pass is not None:
         return found
