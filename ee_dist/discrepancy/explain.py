@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
-from ee_dist.discrepancy.evidence.judge import Judged
-from ee_dist.discrepancy.evidence.left import Leftover, may_be_noise
+from ee_dist.discrepancy.evidence.judge import Judged, ranked
+from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import Candidate, known, on_top_of, values_of
@@ -103,6 +103,18 @@ def as_it_was(
     return kept if better else None
 
 
+def _that_say_something(problem: Problem, found: Examined, fixed: Hypothesis) -> Examined:
+    """Without what explains no more than a model that says nothing: where most is rest, friction that stops all motion."""
+    nothing = [(j, why) for j in found.judged if j.earned and (why := problem.says_nothing((*fixed, *j.hypothesis)))]
+    if not nothing:
+        return found
+    for j, why in nothing:
+        j.why_not = why
+    again = replace(found, judged=ranked(found.judged))
+    again.left = leftovers(problem, found.base if again.best is None else again.best.residual)
+    return again
+
+
 def _energy(residual: Array) -> float:
     return float(residual @ residual)
 
@@ -124,6 +136,7 @@ def explain(
     kept = as_it_was(search, found, before, as_it_is, others, effort)
     if kept is not None:
         found, fixed, model = kept, before, before
+    found = _that_say_something(problem, found, fixed)
     verdict = EFFECT if found.best is not None else (UNEXPLAINED if found.left else NOTHING_MISSING)
     floor, source = problem.noise_floor()
     unsure = may_be_noise(problem, found.base if found.best is None else found.best.residual)

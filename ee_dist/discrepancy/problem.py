@@ -172,6 +172,10 @@ class Problem(ABC):
         """What this way alone can say about what a model leaves, in lines for people."""
         return []
 
+    def says_nothing(self, model: Hypothesis) -> str:
+        """Why a model that leaves little says next to nothing of what was measured; empty: it does say something."""
+        return ""
+
     def other_errors(self, *models: Hypothesis) -> list[str]:
         """Errors of a model, or of one and another made from it, as this way counts them elsewhere, in lines for people."""
         return []

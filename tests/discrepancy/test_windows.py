@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from way_samples import evaluator_for, measure, samples
 
+from ee_dist.discrepancy.explain import UNEXPLAINED, explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
 from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.effects.catalogue import term
 from ee_dist.engines.contract import Rollout
@@ -125,6 +127,21 @@ def test_a_model_that_stands_still_is_told() -> None:
     (line,) = [line for line in problem.remarks(stuck) if "stays where each window begins" in line]
     off = problem.told(error(problem.residuals([stuck])[0]))
     assert f"this model is by {off}" in line
+
+
+def test_what_explains_by_standing_still_is_not_what_is_missing() -> None:
+    """Of a load that hardly moves and a model that falls, friction which stops it takes nearly all of the error."""
+    robot = quiet(samples()["pendulum"].robot)
+    loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque"))
+    read = trial_of(loose, 2.0)
+    steps = np.random.default_rng(0).normal(0.0, 2e-3, read.log.sensors.shape)
+    log = replace(read.log, sensors=np.cumsum(steps, axis=0), joints=np.cumsum(steps[:, :1], axis=0))
+    problem = FreeRun((replace(read, log=log),), loose, evaluator_for(loose), windows_s=RESTART_S)
+    joint = loose.drives[0].joint
+    friction = explain(problem, [candidate(loose, "coulomb_friction", joint)])
+    (found,) = friction.candidates
+    assert found.explained > 0.5 and friction.best is None and friction.verdict == UNEXPLAINED
+    assert "says next to nothing of the motion" in found.why_not and friction.left
 
 
 def test_a_right_model_of_a_robot_at_rest_is_not_told_to_stand_still() -> None:

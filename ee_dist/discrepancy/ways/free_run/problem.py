@@ -23,15 +23,14 @@ import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import TIMES_NOISE, Layout, Problem, Series, error, joints_of
-from ee_dist.discrepancy.slow_noise import slow_noise, without_motion
 from ee_dist.discrepancy.starting import speeds_off
-from ee_dist.discrepancy.ways.free_run.pieces import Piece, pieces, spared, thinned
+from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
+from ee_dist.discrepancy.ways.free_run.pieces import pieces, spared, thinned
 from ee_dist.effects.catalogue import Hypothesis, applied, apply
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
-from ee_dist.trials.noise import channel_range
 
 
 @dataclass(frozen=True)
@@ -51,15 +50,12 @@ class ToPositions:
 
 RESTART_S = 0.5
 """Length of windows that start anew from the measured state."""
-MEAN_ABSOLUTE, MEDIAN_ABSOLUTE = math.sqrt(2 / math.pi), 0.6745
-"""Of normal noise with a standard deviation of 1."""
 GROWN = 10.0
 """Error over that of noise alone, of a perfect model, from which the starts of windows decide: motions that are not stable.
 Below it noise is all of the floor: it is a bound, and hid what was found without it in simulated robots."""
-FINEST = 2.0**-20
-"""Share of a joint's range that the finest encoders tell apart: one at rest reads the same all the time, and has noise."""
 HARDLY_BETTER = 0.8
 """Share of the error of a robot that stays where it is, from which a model says next to nothing of the motion."""
+MOVES = "Is there more in the record than rest, and is friction no more than what moved the joints?"
 AT_NOISE = 1.3
 """Times the noise floor up to which a model is right, be it of a robot at rest."""
 BLOCKS = 6
@@ -98,7 +94,7 @@ class FreeRun(Problem):
         # What is predicted is the motion: noise of its sensors would count against every model.
         self.setups = [noiseless(apply(robot, t.setup)) for t in trials]
         self.pieces = [p for k, t in enumerate(trials) for p in pieces(k, t, robot, windows_s, every)]
-        by_unit = _noise_by_unit(self.pieces, robot, columns)
+        by_unit = noise_by_unit(self.pieces, robot, columns)
         if one_in > 1:
             self.pieces = thinned(self.pieces, one_in)
         self.noise = np.array([by_unit[robot.sensors[k].unit] for k in columns])
@@ -309,13 +305,24 @@ class FreeRun(Problem):
             rows = other.residuals(models)
             each = [other.told(error(r)) if len(self.units) == 1 else other.told_by_unit(r) for r in rows]
             out += [f"{how}: {_listed(each)}."]
-        return out + self._beside_standing(*models[-1:])
+        rest = self.says_nothing(models[-1])
+        return [*out, f"{rest[0].upper()}{rest[1:]}. {MOVES}"] if rest else out
 
-    def _beside_standing(self, model: Hypothesis) -> list[str]:
-        """A line where a model does hardly better than one that says nothing: one with enough friction stands still, and most of
-        a record is often rest."""
-        if self.windows_s is None:
-            return []
+    def says_nothing(self, model: Hypothesis) -> str:
+        """One with enough friction stands still, and most of a record is often rest."""
+        off = error(self.residuals([model])[0])
+        if self.windows_s is None or not (AT_NOISE * self.noise_floor()[0] <= off < math.inf):
+            return ""
+        standing = self._of_one_at_rest()
+        if off < math.sqrt(HARDLY_BETTER) * standing:
+            return ""
+        return (
+            f"a robot that stays where each window begins would be off by {self.told(standing)}, this model is by "
+            f"{self.told(off)}: it says next to nothing of the motion"
+        )
+
+    def _of_one_at_rest(self) -> float:
+        """The error of a robot that stays where each window begins."""
         gap = np.concatenate(
             [
                 ((read - read[own.start]) / self.noise)[own].ravel() * self.weight[at.start]
@@ -324,18 +331,7 @@ class FreeRun(Problem):
                 for own in p.stretches
             ]
         )
-        standing, off = float(np.sqrt(np.abs(gap).mean())), error(self.residuals([model])[0])
-        if (
-            off < math.sqrt(HARDLY_BETTER) * standing
-            or off < AT_NOISE * self.noise_floor()[0]
-            or not math.isfinite(off)
-        ):
-            return []
-        much, than = self.told(off), self.told(standing)
-        return [
-            f"A robot that stays where each window begins would be off by {than}, this model is by {much}: it says next to "
-            "nothing of the motion. Is there more in the record than rest, and is friction no more than what moved the joints?"
-        ]
+        return float(np.sqrt(np.abs(gap).mean()))
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         """Of the first stretch of each trial; of a robot that is led, the whole trial."""
@@ -364,36 +360,5 @@ def _listed(each: Sequence[str]) -> str:
     return each[0] if len(each) == 1 else f"model {each[0]}, improved model {each[-1]}"
 
 
-def noiseless(robot: Robot) -> Robot:
-    return replace(robot, sensors=tuple(replace(s, noise=0.0) for s in robot.sensors))
-
-
-def _noise_by_unit(pieces: Sequence[Piece], robot: Robot, columns: Sequence[int]) -> dict[str, float]:
-    """``_noise`` of all channels of a unit, by unit."""
-    units = dict.fromkeys(robot.sensors[k].unit for k in columns)
-    found = {}
-    for unit in units:
-        own = [k for k in columns if robot.sensors[k].unit == unit]
-        # Of one unit it is a scale and no more. Beside another it decides which of them counts.
-        least = FINEST * np.mean([channel_range(robot, robot.sensors[k]) for k in own]) if len(units) > 1 else 0.0
-        found[unit] = max(float(np.mean([_noise(p, own) for p in pieces])), float(least), 1e-9)
-    return found
-
-
 def _told(value: float, unit: str) -> str:
     return f"{1e3 * value:.3g} {'mrad' if unit == 'rad' else 'mm'}"
-
-
-def _noise(piece: Piece, columns: Sequence[int]) -> float:
-    """Mean absolute error that the noise of the readings alone would leave, from second differences of the rows that are
-    compared. A little of the motion is in them, as what the noise of the first state does later is in the error; no more."""
-    positions = piece.measured(columns)
-    if piece.log.filled is not None:
-        return float(np.mean(slow_noise(piece.times_s, positions))) * MEAN_ABSOLUTE
-    if len(positions) < 3:
-        return 0.0
-    rough = np.abs(positions[2:] - 2 * positions[1:-1] + positions[:-2])
-    found = float(np.median(rough) / np.sqrt(6.0)) / MEDIAN_ABSOLUTE
-    # Of the rows between, too: the finer they are, the less motion is in them.
-    every = piece.log.sensors[:, list(columns)]
-    return float(np.mean(without_motion(np.full(len(columns), found), piece.log.times_s, every))) * MEAN_ABSOLUTE
