@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -120,6 +120,15 @@ class Problem(ABC):
 
         With ``trials`` only those are computed; values of the others are zero, whatever the hypothesis.
         """
+
+    @property
+    def piece_of(self) -> Index:
+        """(n,) the piece of a trial that each residual value is simulated in: the trial, unless a way starts anew within."""
+        return self.trial_of
+
+    def residuals_of_pieces(self, hypotheses: Sequence[Hypothesis], pieces: Collection[int]) -> Array:
+        """(H, n): those of some pieces (see ``piece_of``) alone; values of the others are zero, whatever the hypothesis."""
+        return self.residuals(hypotheses, tuple(pieces))
 
     @abstractmethod
     def noise_floor(self) -> tuple[float, str]:

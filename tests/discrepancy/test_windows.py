@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from way_samples import evaluator_for, measure, samples
 
+from ee_dist.discrepancy.evidence.holdout import windows as windows_cut
 from ee_dist.discrepancy.explain import UNEXPLAINED, explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.slopes import SAME, tells_nothing
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.effects.catalogue import term
 from ee_dist.engines.contract import Rollout
@@ -54,6 +57,33 @@ def test_what_a_drive_holds_goes_on_where_a_window_begins(held: dict[str, float]
     off = np.abs(windows.raw(windows.residuals([()])[0]))
     # Play and twist of a transmission come back within the run-up but for what they were in the middle of.
     assert off.mean() < (1e-6 if held.keys() <= {"delay_s", "ki"} else 2e-3) * range_
+
+
+def test_what_is_fitted_to_some_windows_simulates_these_alone() -> None:
+    """Every second window held out is half of the work, and the same values."""
+    robot = quiet(samples()["pendulum"].robot)
+    loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque", delay_s=0.01))
+    problem = FreeRun((trial_of(loose),), loose, evaluator_for(loose), windows_s=RESTART_S)
+    cut, search = windows_cut(problem), Search(problem)
+    seen = cut.seen(problem, 0)
+    some = search.within(seen)
+    assert some.pieces is not None and 2 * len(some.pieces) == len(problem.pieces)
+    assert np.array_equal(some.everything, seen) and some.within(seen) is some
+    models = [(), (term("coulomb_friction", loose.drives[0].joint, torque_nm=0.1),)]
+    part, whole = some.residuals(models), search.residuals(models)
+    assert np.array_equal(part[:, seen], whole[:, seen]) and not part[:, ~seen].any()
+
+
+def test_fits_end_where_starts_that_are_off_tell_no_more() -> None:
+    """Where motions are not stable the floor is what starts do to whole windows: less than one of these tells nothing."""
+    robot = quiet(samples()["pendulum"].robot)
+    loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque"))
+    problem = FreeRun((trial_of(loose),), loose, evaluator_for(loose), windows_s=RESTART_S)
+    everything = np.ones(len(problem.segment_of), dtype=bool)
+    assert tells_nothing(problem, everything) == SAME
+    problem.layout = replace(problem.layout, known=np.full(len(everything), 40.0), by_segment=True)
+    starts = 2 * len(problem.segments)
+    assert tells_nothing(problem, everything) == pytest.approx(SAME * 40.0 * len(everything) / starts)
 
 
 def test_a_stage_without_a_sensor_of_speed_starts_with_the_speed_that_it_had() -> None:

@@ -50,18 +50,23 @@ def within(doing: str, progress: Progress) -> Progress:
 @dataclass(frozen=True)
 class Search:
     """``fixed``: terms that every hypothesis has, with values that are not searched; ``trials``: those that are
-    simulated (None: all); residual values of the others are zero."""
+    simulated (None: all), ``pieces``: what of these, where a way can simulate less than whole trials (None: all of it);
+    residual values of the rest are zero."""
 
     problem: Problem
     fixed: Hypothesis = ()
     trials: tuple[int, ...] | None = None
+    pieces: tuple[int, ...] | None = None
     progress: Progress = quiet
 
     def residuals(self, hypotheses: Sequence[Hypothesis]) -> Array:
         """(H, n) of the fixed terms followed by each hypothesis; none are simulated where none are asked for."""
         if not hypotheses:
             return np.zeros((0, len(self.problem.segment_of)))
-        return self.problem.residuals([(*self.fixed, *h) for h in hypotheses], self.trials)
+        models = [(*self.fixed, *h) for h in hypotheses]
+        if self.pieces is not None:
+            return self.problem.residuals_of_pieces(models, self.pieces)
+        return self.problem.residuals(models, self.trials)
 
     @property
     def batch(self) -> int:
@@ -90,18 +95,23 @@ class Search:
         return replace(self, fixed=(*self.fixed, *terms))
 
     def among(self, trials: Sequence[int] | None) -> Search:
-        return replace(self, trials=None if trials is None else tuple(trials))
+        return replace(self, trials=None if trials is None else tuple(trials), pieces=None)
 
     def within(self, mask: Mask) -> Search:
-        """The same on the trials that some residual values (n,) are of; itself where these are all that it has."""
-        mine = range(len(self.problem.trials)) if self.trials is None else self.trials
-        of = set(np.unique(self.problem.trial_of[mask]).tolist())
-        few = [k for k in mine if k in of]
-        return self if len(few) == len(mine) else self.among(few)
+        """The same on the pieces of trials that some residual values (n,) are of; itself where these are all that it has."""
+        piece_of = self.problem.piece_of
+        mine, few = np.unique(piece_of[self.everything]), np.unique(piece_of[mask & self.everything])
+        if len(few) == len(mine):
+            return self
+        of = tuple(np.unique(self.problem.trial_of[mask & self.everything]).tolist())
+        whole = np.unique(piece_of[np.isin(self.problem.trial_of, of)])
+        return replace(self, trials=of, pieces=None if len(whole) == len(few) else tuple(few.tolist()))
 
     @property
     def everything(self) -> Mask:
-        """(n,): the values of the trials that are simulated. The zeros of the others would pass for evidence."""
+        """(n,): the values that are simulated. The zeros of the others would pass for evidence."""
+        if self.pieces is not None:
+            return np.isin(self.problem.piece_of, self.pieces)
         if self.trials is None:
             return np.ones(len(self.problem.segment_of), dtype=bool)
         return np.isin(self.problem.trial_of, self.trials)

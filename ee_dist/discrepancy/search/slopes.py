@@ -148,11 +148,21 @@ def _finer(
 def _iterate(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Problem, prior: float) -> None:
     """Slopes over each run's width, and steps along them."""
     before, floor = [run.energy for run in runs], float(problem.floor[mask].sum())
+    same = tells_nothing(problem, mask)
     _slopes(runs, mask, evaluate, problem)
-    _steps(runs, mask, evaluate, floor, prior)
+    _steps(runs, mask, evaluate, floor, same, prior)
     for run, energy in zip(runs, before, strict=True):
-        paid = run.energy < (energy - SAME if energy <= NEAR * floor else STILL * energy)
+        paid = run.energy < (energy - same if energy <= NEAR * floor else STILL * energy)
         run.misses = 0 if paid else run.misses + 1
+
+
+def tells_nothing(problem: Problem, mask: Mask) -> float:
+    """Energy that data tell nothing by, of the residual values of ``mask`` (n,). Where windows begin from what was measured, what
+    is off there, a position and a speed of each channel, stays for the whole window: it is no more evidence than these are."""
+    if not problem.layout.by_segment:
+        return SAME
+    starts = 2 * len(problem.layout.channels) * np.unique(problem.segment_of[mask]).size
+    return SAME * max(1.0, float(problem.layout.known[mask].sum()) / max(starts, 1))
 
 
 def weighed(problem: Problem, residual: Array) -> tuple[Array, Array]:
@@ -211,7 +221,7 @@ def _slopes(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, problem: Probl
         run.energy, run.u, run.residual = best
 
 
-def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, prior: float) -> None:
+def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, same: float, prior: float) -> None:
     """The step that slopes lead to, and shorter ones: all of them where more than NEAR times the ``floor`` is left, else where
     the whole one does not come to what slopes foretell."""
 
@@ -241,12 +251,12 @@ def _steps(runs: Sequence[_Run], mask: Mask, evaluate: Evaluate, floor: float, p
             full += [(run, u) for u in (*others, _unweighed(run, mask, prior))]
             continue
         shorter += [(run, here - KEPT * (here - there), u) for u in others]
-        run.flat = here - there < SAME
+        run.flat = here - there < same
         if not run.flat and np.array_equal(first, aim):
             aims.append((run, first, there))
     better(full)
     for run, first, there in aims:
-        run.straight = run.u is first and abs(run.energy - there) < SAME
+        run.straight = run.u is first and abs(run.energy - there) < same
     better([(run, u) for run, enough, u in shorter if not run.energy <= enough])
 
 

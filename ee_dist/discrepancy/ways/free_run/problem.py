@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.discrepancy.problem import TIMES_NOISE, Layout, Problem, Series, error, joints_of
+from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.starting import speeds_off
 from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
 from ee_dist.discrepancy.ways.free_run.pieces import pieces, spared, thinned
@@ -157,6 +157,14 @@ class FreeRun(Problem):
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
         chosen = [i for i, p in enumerate(self.pieces) if trials is None or p.trial in set(trials)]
+        return self.residuals_of_pieces(hypotheses, chosen)
+
+    @cached_property
+    def piece_of(self) -> Index:
+        return np.repeat(np.arange(len(self.pieces)), [s.stop - s.start for s in self.slices])
+
+    def residuals_of_pieces(self, hypotheses: Sequence[Hypothesis], pieces: Collection[int]) -> Array:
+        chosen = sorted(pieces)
         models = self._models(hypotheses, {self.pieces[i].trial for i in chosen})
         # Rollouts of one length with the same inputs share a batch, so all run as long as the longest.
         steps, switched = max(len(p.log) for p in self.pieces), any(p.enabled is not None for p in self.pieces)
