@@ -19,9 +19,10 @@ from ee_dist.measurements.clocks import Clocked, check_grid
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.looking import Looked, repeats
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
+from ee_dist.measurements.reading import between_readings, rows_read
 from ee_dist.measurements.report import TORQUE, Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
-from ee_dist.measurements.sampling import LowPass, carried, filled, grid, held, linear, smoothed
+from ee_dist.measurements.sampling import LowPass, carried, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import suspicions, time_suspicion
 from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.measurements.trial_clocks import TrialClocks
@@ -71,6 +72,7 @@ class _Import:
 
     def run(self) -> tuple[TrialRecord, Report]:
         self._time()
+        self.read_at = rows_read(self.mapping, self.clocks, self.report.done)
         positions = self._sensors()
         self.report.suspicious += repeats(self.mapping, self.clocks)
         torques = self._torques()
@@ -153,23 +155,9 @@ class _Import:
             report.suspicious.append(f"time: a gap of {seconds:.4g} s before row {row}")
 
     def _filled(self) -> Array | None:
-        """Rows between the readings of the slowest table that sensors are read from."""
-        tables = {c.table for c in self.mapping.sensors.values() if isinstance(c, Column)}
-        slowest = max((self.clocks[t] for t in sorted(tables)), key=lambda c: c.timing.median_s, default=self.main)
-        # The grid begins where the main table does.
-        read_s = slowest.times_s - self.main.times_s[0]
-        if self.as_is:
-            rows_s = self._rows_s()
-            read_s = np.interp(read_s[(read_s >= 0) & (read_s <= rows_s[-1])], rows_s, self.at_s)
-        found = filled(self.at_s, read_s)
-        if found is not None:
-            some, rows = int((~found).sum()), len(found)
-            self.report.done.append(
-                f"{some} of {rows} rows are readings of the sensors: only these are compared"
-                if some <= len(read_s)
-                else f"{rows - some} of {rows} rows lie in gaps between readings: they are not compared"
-            )
-        return found
+        """Rows between readings."""
+        rows_s = self._rows_s() if self.as_is else None
+        return between_readings(self.at_s, rows_s, self.main, self.clocks, self.read_at, self.report.done)
 
     def _rows_s(self) -> Array:
         """When the rows of the log were, (T,) s since the main table began. Rows that are taken sample by sample count as evenly
@@ -178,8 +166,10 @@ class _Import:
 
     # -- columns -----------------------------------------------------------------------------------------------------
 
-    def _column(self, column: Column, unit: str, name: str, step_like: bool, quiet: bool = False) -> Array:
-        """The column on the grid, in ``unit``; ``step_like`` values are held, others joined by lines."""
+    def _column(
+        self, column: Column, unit: str, name: str, step_like: bool, quiet: bool = False, reading: bool = False
+    ) -> Array:
+        """The column on the grid, in ``unit``; ``step_like`` values are held, others, and any ``reading``, joined by lines."""
         own = self.clocks[column.table]
         raw = own.table.numbers(column.column, gaps=column.gaps == "interpolate")
         size = factor(column.unit, unit, f"{self.where}: {name}")
@@ -206,6 +196,10 @@ class _Import:
             raise MeasurementError(f"{own.table}: column {quoted(column.column)}: too large a number to be {name}")
         if column.unwrap:
             values = np.unwrap(values)
+        if reading and len(self.read_at[column.table]) < len(values):
+            # Between readings a state goes on: it does not stand still and jump.
+            rows = self.read_at[column.table]
+            values = linear(own.times_s - own.times_s[0], own.times_s[rows], values[rows])
         if not self._same_rows(own):
             # The grid begins where the main table does.
             at_s = self._rows_s() + (self.main.times_s[0] - own.times_s[0])
@@ -235,7 +229,8 @@ class _Import:
         positions: dict[str, Array] = {}
         for name, column in self.mapping.sensors.items():
             if isinstance(column, Column):
-                self.channels[name] = self._column(column, sensors[name].unit, name, sensors[name].kind == "touch")
+                touch = sensors[name].kind == "touch"
+                self.channels[name] = self._column(column, sensors[name].unit, name, touch, reading=not touch)
                 if sensors[name].kind == "position":
                     positions[sensors[name].target] = self.channels[name]
         for name, column in self.mapping.sensors.items():

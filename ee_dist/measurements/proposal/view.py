@@ -10,6 +10,7 @@ import numpy as np
 
 from ee_dist.measurements import signals
 from ee_dist.measurements.alignment import match, one_clock
+from ee_dist.measurements.held_readings import held_readings
 from ee_dist.measurements.proposal.blocks import (
     BY_NAME,
     BY_SENSOR,
@@ -22,6 +23,7 @@ from ee_dist.measurements.proposal.blocks import (
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.time import TimeChoice
 from ee_dist.measurements.proposal.units import UnitChoice
+from ee_dist.measurements.proposal.words import POSITION, SPEED
 from ee_dist.measurements.table import Recorded
 from ee_dist.measurements.units import UNITS
 from ee_dist.robots.model import Robot
@@ -112,12 +114,16 @@ class View:
         return found
 
     def even(self, block: Block) -> Block:
-        """The block on an even grid of its own median step, and no longer than it need be."""
+        """The block on an even grid of its own median step, and no longer than it need be; what sensors say by lines between
+        their readings."""
         times = self.times[block.table.name].seconds
         step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
         count = int(min(float(times[-1] - times[0]) / step + 1, signals.MOST_ROWS)) if step > 0 else 0
         at = times[0] + step * np.arange(max(count, 1))
-        return replace(block, values=np.stack([np.interp(at, times, c) for c in block.values.T], axis=1))
+        sensed = block.reading.command is None and block.reading.kind in (POSITION, SPEED)
+        rows = held_readings(block.values) if sensed else None
+        read = slice(None) if rows is None else rows
+        return replace(block, values=np.stack([np.interp(at, times[read], c[read]) for c in block.values.T], axis=1))
 
     def step(self, block: Block) -> float:
         times = self.times[block.table.name].seconds

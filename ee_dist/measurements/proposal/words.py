@@ -14,8 +14,8 @@ _QUANTITY = {
     "qp thetap dphi",
     TORQUE: "tau torque torques effort efforts trq moment drehmoment force kraft jtau frc",
     CURRENT: "cur curr current currents amps ampere strom iq amperage",
-    OTHER: "acc accel acceleration qdd ddq volt voltage volts temp temperature pwm err error fric friction duty status flag "
-    "mode supply battery load enable enabled counter seq id ticks cycle wrench imu",
+    OTHER: "acc accel acceleration qdd ddq qddot volt voltage volts temp temperature pwm err error fric friction duty status "
+    "flag mode supply battery load enable enabled counter seq id ticks cycle wrench imu",
     TIME: "t time times timestamp timestamps stamp zeit clock sec secs seconds elapsed uptime tstamp date datetime",
 }
 _KIND = {w: k for k, words in _QUANTITY.items() for w in words.split()}
@@ -139,6 +139,7 @@ def read_name(name: str, joint_words: frozenset[str] = frozenset()) -> Reading:
     numbers = [int(w) for w in words if w.isdigit()]
     texts = [part for w in words if not w.isdigit() for part in _unglued(w)]
     texts = ["present" if w in _PRESENT and _OF_NOW & set(texts[k + 1 : k + 2]) else w for k, w in enumerate(texts)]
+    texts = _derived(texts)
     kinds = [_KIND[w] for w in texts if w in _KIND]
     if unit is None and len(texts) > 1 and texts[-1] in _UNIT:
         unit = _UNIT[texts[-1]]
@@ -170,6 +171,18 @@ def _unglued(word: str) -> tuple[str, ...]:
         if any(quantity_of(a) and b in _ROLES for a, b in ((first, second), (second, first))):
             return first, second
     return (word,)
+
+
+def _derived(texts: list[str]) -> list[str]:
+    """With a position and its dots as one word: q dot is a speed, and theta ddot, or dot dot, an acceleration."""
+    found: list[str] = []
+    for w in texts:
+        before = quantity_of(found[-1]) if found else None
+        if w in ("dot", "ddot") and before in (POSITION, SPEED):
+            found[-1] = "qdot" if (w, before) == ("dot", POSITION) else "qdd"
+        else:
+            found.append(w)
+    return found
 
 
 def _amperes(name: str, texts: list[str]) -> bool:

@@ -155,9 +155,13 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
 
 def spared(windows: Sequence[Piece]) -> int:
     """Of how many windows one is enough: 1 where all of them are few steps, or are simulated in one go."""
-    per_trial = Counter(p.trial for p in windows)
     needed = math.ceil(sum(len(p.log) for p in windows) / MOST_STEPS)
-    return max(1, min(needed, min(per_trial.values(), default=0) // FEWEST))
+    return max(1, min(needed, in_turn(windows, FEWEST)))
+
+
+def in_turn(windows: Sequence[Piece], count: int) -> int:
+    """Of how many windows one may be left so that each trial has ``count`` of them."""
+    return max(1, min(Counter(p.trial for p in windows).values(), default=0) // count)
 
 
 def thinned(windows: Sequence[Piece], one_in: int) -> list[Piece]:

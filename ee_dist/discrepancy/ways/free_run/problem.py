@@ -25,7 +25,7 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.starting import speeds_off
 from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
-from ee_dist.discrepancy.ways.free_run.pieces import pieces, spared, thinned
+from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, in_turn, pieces, spared, thinned
 from ee_dist.effects.catalogue import Hypothesis, applied, apply
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
@@ -273,6 +273,14 @@ class FreeRun(Problem):
         found = self if self.windows_s is not None else self._in_windows
         one_in = spared(found.pieces)
         return found if one_in == 1 else self._by(found.windows_s, one_in)
+
+    def beginning(self, seconds: float) -> Problem:
+        """Windows from all over the trials, half as many as the beginning would have: each begins from what was measured, and
+        they are less alike than one stretch."""
+        if self.windows_s is None:
+            return self
+        one_in = in_turn(self.pieces, max(FEWEST, round(0.5 * seconds / self.windows_s)))
+        return self if one_in == 1 else self._by(self.windows_s, self.one_in * one_in)
 
     @cached_property
     def _in_windows(self) -> FreeRun:

@@ -1,0 +1,63 @@
+"""When sensors were read: in which rows of a file, and between which rows of the grid that it is brought to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as AnyMapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ee_dist.measurements.clocks import Clocked
+from ee_dist.measurements.held_readings import held_readings
+from ee_dist.measurements.mapping import Column, Mapping
+from ee_dist.measurements.sampling import filled
+from ee_dist.trials.log import Array
+
+Rows = NDArray[np.intp]
+
+
+def rows_read(mapping: Mapping, clocks: AnyMapping[str, Clocked], done: list[str]) -> dict[str, Rows]:
+    """The rows of each table that sensors are read from in which they were. Where these are not all, ``done`` hears of it."""
+    by_table: dict[str, list[str]] = {}
+    for column in mapping.sensors.values():
+        if isinstance(column, Column):
+            by_table.setdefault(column.table, []).append(column.column)
+    out = {}
+    for name in sorted(by_table):
+        own = clocks[name]
+        count = len(own.times_s)
+        rows = held_readings(np.stack([own.table.numbers(c, gaps=True) for c in by_table[name]], axis=1))
+        out[name] = np.arange(count) if rows is None else rows
+        if rows is not None:
+            every = float(np.median(np.diff(own.times_s[rows])))
+            done.append(
+                f"the sensors were read every {1e3 * every:.4g} ms: {count - len(rows)} of {count} rows repeat all readings of "
+                "the row before, and count as none"
+            )
+    return out
+
+
+def between_readings(
+    at_s: Array,
+    rows_s: Array | None,
+    main: Clocked,
+    clocks: AnyMapping[str, Clocked],
+    read_at: AnyMapping[str, Rows],
+    done: list[str],
+) -> Array | None:
+    """(T,) whether nothing was read at the times ``at_s`` (T,) of the grid, by the table that is read the most seldom; None where
+    all may be readings. ``rows_s`` (T,): when rows that are taken sample by sample were."""
+    read = [clocks[t].times_s[rows] for t, rows in read_at.items() if len(rows) > 1] or [main.times_s]
+    # The grid begins where the main table does.
+    read_s = max(read, key=lambda times_s: float(np.median(np.diff(times_s)))) - main.times_s[0]
+    if rows_s is not None:
+        read_s = np.interp(read_s[(read_s >= 0) & (read_s <= rows_s[-1])], rows_s, at_s)
+    found = filled(at_s, read_s)
+    if found is not None:
+        some, rows = int((~found).sum()), len(found)
+        done.append(
+            f"{some} of {rows} rows are readings of the sensors: only these are compared"
+            if some <= len(read_s)
+            else f"{rows - some} of {rows} rows lie in gaps between readings: they are not compared"
+        )
+    return found

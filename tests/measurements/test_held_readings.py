@@ -1,0 +1,109 @@
+"""Logs that repeat the last reading until the next one comes: only what was read counts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import measurement_files as samples
+import numpy as np
+import pytest
+import small_logs as logs
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ee_dist.measurements.held_readings import held_readings
+from ee_dist.measurements.importer import import_files
+from ee_dist.measurements.mapping_file import read_mapping
+from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.model import Hints
+from ee_dist.measurements.proposal.words import OTHER, POSITION, SPEED, read_name
+from ee_dist.measurements.proposal.write import as_yaml
+from ee_dist.robots.describe import load_robot
+from ee_dist.trials.log import Array
+
+STEP_S = 0.001
+T = np.arange(4000) * STEP_S
+
+
+def motion(t: Array, joints: int = 3) -> Array:
+    return np.stack([0.5 * np.sin((1.3 + 0.7 * k) * t + k) for k in range(joints)], axis=1)
+
+
+def read_at(every: int, jitter: int, seed: int = 0) -> Array:
+    """Rows at which sensors are read."""
+    rng = np.random.default_rng(seed)
+    found = [0]
+    while found[-1] < len(T):
+        found.append(found[-1] + every + int(rng.integers(-jitter, jitter + 1)))
+    return np.array(found[:-1])
+
+
+def holding(values: Array, rows: Array) -> Array:
+    return np.asarray(values[rows[np.searchsorted(rows, np.arange(len(values)), side="right") - 1]])
+
+
+@given(every=st.integers(2, 20), seed=st.integers(0, 10_000), coarse=st.sampled_from([0.0, 1e-5, 1e-4]))
+@settings(max_examples=60, deadline=None)
+def test_rows_in_which_something_was_read_are_found(every: int, seed: int, coarse: float) -> None:
+    rows = read_at(every, every // 3, seed)
+    values = holding(motion(T) + np.random.default_rng(seed).normal(0, 1e-3, (len(T), 3)), rows)
+    values = np.round(values / coarse) * coarse if coarse else values
+    found = held_readings(values)
+    assert found is not None
+    # Now and then a reading is the same number again, which nobody can see.
+    assert len(np.setxor1d(found, rows)) <= 0.02 * len(rows)
+
+
+def test_a_robot_at_rest_was_read_as_often_as_in_motion() -> None:
+    moving = motion(T)
+    moving[1000:3000] = moving[1000]
+    rows = held_readings(holding(moving, read_at(10, 3)))
+    assert rows is not None
+    inside = rows[(rows > 1100) & (rows < 2900)]
+    assert np.ptp(np.diff(inside)) == 0 and abs(np.diff(inside)[0] - 10) <= 1
+
+
+@pytest.mark.parametrize("step", [0.01, 0.003, 0.001])
+def test_few_steps_of_an_encoder_are_readings_all_the_same(step: float) -> None:
+    coarse = np.round(motion(T) / step) * step
+    assert held_readings(coarse) is None
+    speeds = np.round(np.gradient(coarse, axis=0) / step) * step
+    assert held_readings(np.hstack([coarse[:, :1], speeds[:, :1]])) is None
+
+
+def test_rest_noise_and_dead_channels_are_no_seldom_readings() -> None:
+    still = np.zeros((len(T), 3))
+    assert held_readings(still) is None
+    mostly = still.copy()
+    mostly[500:800] = motion(T)[500:800]
+    assert held_readings(mostly) is None
+    assert held_readings(motion(T) + np.random.default_rng(0).normal(0, 1e-4, still.shape)) is None
+
+
+def test_commands_keep_their_rows_where_sensors_repeat_theirs(tmp_path: Path) -> None:
+    """A log at 1 kHz of sensors that are read every 10 ms: between two readings a joint does not stand still."""
+    described = samples.robot_file(tmp_path)
+    described.write_text(described.read_text().replace("time_step_s: 0.01", "time_step_s: 0.001"))
+    robot, _ = load_robot(described)
+    true, goals = motion(T, 2), motion(T + 0.04, 2)
+    rows = read_at(10, 3)
+    file = logs.written(tmp_path, logs.frame_of(T, holding(true, rows), goals))
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal_for([file], robot, Hints()), str(described), file.name))
+    ((record, report),) = import_files([file], read_mapping(tmp_path / "mapping.yaml"), robot)
+    log = record.log
+    (line,) = [n for n in report.done if "repeat all readings" in n]
+    assert "read every 10 ms" in line and f"{len(T) - len(rows)} of {len(T)} rows" in line
+    assert log.filled is not None and np.array_equal(log.readings, rows)
+    assert np.allclose(log.commands, goals[: len(log)], atol=1e-6)
+    last = rows[-1]
+    assert np.abs(log.sensors[:last, :2] - true[:last]).max() < 1e-3
+    assert np.abs(holding(true, rows) - true)[:last].max() > 5e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("qDot[0]", SPEED), ("q_dot_1", SPEED), ("theta_dot", SPEED), ("qDDot[2]", OTHER), ("q_ddot", OTHER), ("q_dot_dot", OTHER),
+     ("q[0]", POSITION)],
+)  # fmt: skip
+def test_a_position_with_a_dot_is_a_speed(name: str, kind: str) -> None:
+    assert read_name(name).kind == kind
