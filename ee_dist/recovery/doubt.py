@@ -11,7 +11,9 @@ neuron, a lighter body) no genome can say. The yardstick does not see the truth.
 
 What is left above both is doubt. All trials after the change count, also the last one, which no diagnosis has seen. They
 are compared by the beginning of the sensors' courses (``RollingMean``) whatever metric the diagnosis used: a whole trial is
-chaotic, and there one step of a magnitude may change the distance by as much as another fault does.
+chaotic, and there one step of a magnitude may change the distance by as much as another fault does. Where nothing at all is left
+of the beginning, though, and no noise is declared, a right hypothesis foretells whole trials to the last digit: a joint that jams
+may be driven against its new limits late in a trial, and till then nothing is changed.
 """
 
 from __future__ import annotations
@@ -40,6 +42,9 @@ DRAWS = 99
 EXACT = 1e-9
 """Differences of sensors that are none: sums of floating-point numbers."""
 
+PARTED = 1e-6
+"""Differences of sensors from which two courses have parted: those of contact grow from there."""
+
 Trials = Sequence[tuple[Any, SensorLog]]
 """What drove the hardware and what came back, trial by trial."""
 
@@ -47,13 +52,15 @@ Trials = Sequence[tuple[Any, SensorLog]]
 @dataclass(frozen=True)
 class Doubt:
     """Errors of the metric that judged, means over trials. ``left`` by the hypothesis; ``noise`` and ``rounding``: what a right
-    one would leave of each; ``unchanged``: what "nothing changed" leaves."""
+    one would leave of each; ``unchanged``: what "nothing changed" leaves; ``later_s``: from when on, in s, a trial whose
+    beginning it leaves nothing of goes another way than it says (None: none does, or something was left of the beginning)."""
 
     left: float
     noise: float
     rounding: float
     unchanged: float
     trials: int
+    later_s: float | None = None
 
     @property
     def allowed(self) -> float:
@@ -62,13 +69,13 @@ class Doubt:
 
     @property
     def said(self) -> bool:
-        return not self.left <= self.allowed + EXACT
+        return not self.left <= self.allowed + EXACT or self.later_s is not None
 
     def as_dict(self) -> dict[str, Any]:
         """The form of a summary; errors that are not finite, of models that fly apart, are None: JSON has no such numbers."""
         numbers = {k: getattr(self, k) for k in ("left", "allowed", "noise", "rounding", "unchanged")}
         finite = {k: v if math.isfinite(v) else None for k, v in numbers.items()}
-        return {"said": self.said, **finite, "trials": self.trials}
+        return {"said": self.said, **finite, "trials": self.trials, "later_s": self.later_s}
 
     @property
     def words(self) -> str:
@@ -77,6 +84,11 @@ class Doubt:
         if not self.said:
             left = f"{self.left:.2g}" if self.left > EXACT else "nothing"
             return f"No doubt: the last hypothesis leaves {left} of the sensors' courses unexplained; {most}."
+        if self.later_s is not None:
+            return (
+                "Doubt: the last hypothesis leaves nothing of how trials begin unexplained, and one of them goes another way "
+                f"than it says from {self.later_s:.2g} s on. Something shows later that it does not say."
+            )
         share = f", {self.left / self.unchanged:.0%} of what 'nothing changed' leaves" if self.unchanged > EXACT else ""
         return (
             f"Doubt: the nearest hypothesis leaves an error of {self.left:.2g}{share}; {most}. Something is wrong that it "
@@ -89,7 +101,7 @@ def doubt_from(told: Mapping[str, Any]) -> Doubt:
     numbers = {
         k: float("inf") if told[k] is None else float(told[k]) for k in ("left", "noise", "rounding", "unchanged")
     }
-    return Doubt(**numbers, trials=int(told["trials"]))
+    return Doubt(**numbers, trials=int(told["trials"]), later_s=told.get("later_s"))
 
 
 def doubt(
@@ -112,7 +124,19 @@ def doubt(
     beside = list(zip(drivers, quiet, strict=True))
     lucky = _noise(robot, hypothesis, beside, metric, evaluator, noise, seed) if noise > 0.0 else 0.0
     rounding = _rounding(robot, hypothesis, Judge(robot, beside, metric, evaluator))
-    return Doubt(float(left), max(float(known), lucky), rounding, float(unchanged), len(changed))
+    later_s = _parting(model, changed, evaluator) if left <= EXACT and noise == 0.0 else None
+    return Doubt(float(left), max(float(known), lucky), rounding, float(unchanged), len(changed), later_s)
+
+
+def _parting(model: System, changed: Trials, evaluator: Evaluator) -> float | None:
+    """When the first trial goes another way than the model says, in s."""
+    logs = evaluator.evaluate([Job(Rollout(model, driver, len(log)), Whole()) for driver, log in changed])
+    parted = [
+        log.times_s[int(np.argmax(differs))]
+        for (_, log), foretold in zip(changed, logs, strict=True)
+        if (differs := np.any(np.abs(foretold.sensors - log.sensors) > PARTED, axis=1)).any()
+    ]
+    return float(min(parted)) if parted else None
 
 
 def _noise(

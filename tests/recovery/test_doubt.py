@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,6 +72,28 @@ def test_what_no_genome_can_say_is_doubted(engine, name):
 def test_a_sayable_fault_that_was_missed_is_doubted(engine):
     assert sayable((LEG, WEAK), WALKING)
     assert doubted(engine, (LEG, WEAK), (LEG,)).said
+
+
+def test_what_shows_late_in_a_trial_is_doubted_where_its_beginning_is_foretold_to_the_digit(engine):
+    """A jam that a gait drives against after seconds only: till then nothing has changed."""
+    (driver,) = networks(1)
+    body = PhysicalRobot(engine, ROBOT, (WEAK,), SEED)
+    log = body.trial(driver, 200)
+    late = log.sensors.copy()
+    late[150:] += 0.01
+
+    def of(*logs):
+        changed = [(driver, one) for one in logs]
+        return doubt(
+            ROBOT, (WEAK,), [], changed, RollingMean(), SerialEvaluator(engine), 0.0, np.random.SeedSequence(3)
+        )
+
+    as_foretold = of(log)
+    assert not as_foretold.said and as_foretold.later_s is None
+    found = of(log, replace(log, sensors=late))
+    assert found.left <= found.allowed and found.said and found.later_s == log.times_s[150]
+    assert "Something shows later" in found.words and f"from {found.later_s:.2g} s on" in found.words
+    assert doubt_from(json.loads(json.dumps(found.as_dict()))) == found
 
 
 def test_a_magnitude_between_two_decimals_is_no_doubt(engine):

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.model import Hints, Proposal
 from ee_dist.measurements.proposal.stated import add_stated
@@ -31,6 +32,7 @@ def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints)
     if len(files) > 1 and len(first.tables) == 1:
         spread = _spread(files, first)
         if spread is not None:
+            _check_clocks([table for _, table in spread.values()], hints)
             tables = []
             for name, (pattern, table) in spread.items():
                 tables.append(replace(table, name=name))
@@ -43,6 +45,18 @@ def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints)
     if len(first.tables) == 1:
         return _first_of_split(first, proposal_head)
     return first
+
+
+def _check_clocks(tables: Sequence[Table], hints: Hints) -> None:
+    """Raises MeasurementError for files of one quantity each that say the time of their rows in another file, or nowhere."""
+    timed = [t for t in tables if t.clock is not None or t.rate_hz or time_of(t, hints) is not None]
+    if len(timed) > 1 or len(tables) < 2 or len({len(t) for t in tables}) > 1:
+        return
+    raise MeasurementError(
+        f"{tables[0].path.parent}: {listed([t.path.name for t in tables])} have {len(tables[0])} rows each, and "
+        f"{f'only {timed[0].path.name}' if timed else 'none'} says when they were: put their columns side by side into one file "
+        "for each trial, with the time (a .mat or .npz may hold them as arrays)"
+    )
 
 
 def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Table]] | None:
