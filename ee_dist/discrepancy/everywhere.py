@@ -283,12 +283,16 @@ class _Look:
         if not tried:
             return None
         starts = [(Model((*model.parts, c)), np.concatenate([start, u])) for c, u in tried]
-        problem, own = search.problem, search.everything
-        heats = telling_values(problem, alone.residual, own)
-        best, *ended = race(search, starts, own, HEATS, PRIOR, heats_on=heats)
-        best = over_ridges(search, best, PRIOR)
+        # Of long trials some tells which of them, and in which valley to look.
+        brief = self.brief
+        problem, own = brief.problem, brief.everything
+        heats = telling_values(problem, brief.on(alone.hypothesis).base(), own)
+        best, *ended = race(brief, starts, own, HEATS, PRIOR, heats_on=heats)
+        best = over_ridges(brief, best, PRIOR)
         noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))
         ties = [f.model.parts[-1].name for f in ended if f.energy - best.energy < TIE_ENERGY * noise]
+        if brief is not search:
+            (best,) = follow_valley(search, [(best.model, best.u)], search.everything, PRIOR, widths=(AGAIN,))
         return self._worth(best, {best.model.parts[-1].name: ties})
 
     def _others(self, model: Model) -> list[Candidate]:
