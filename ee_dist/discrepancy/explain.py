@@ -105,7 +105,7 @@ def as_it_was(
 
 def _that_say_something(problem: Problem, found: Examined, fixed: Hypothesis) -> Examined:
     """Without what explains no more than a model that says nothing: where most is rest, friction that stops all motion."""
-    nothing = [(j, why) for j in found.judged if j.earned and (why := problem.says_nothing((*fixed, *j.hypothesis)))]
+    nothing = [(j, why) for j in found.judged if j.stands and (why := problem.says_nothing((*fixed, *j.hypothesis)))]
     if not nothing:
         return found
     for j, why in nothing:
