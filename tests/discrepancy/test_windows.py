@@ -74,6 +74,19 @@ def test_what_is_fitted_to_some_windows_simulates_these_alone() -> None:
     assert np.array_equal(part[:, seen], whole[:, seen]) and not part[:, ~seen].any()
 
 
+def test_the_beginning_of_long_trials_is_windows_from_all_over_them() -> None:
+    robot = quiet(samples()["pendulum"].robot)
+    loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque"))
+    problem = FreeRun((trial_of(loose, 12.0),), loose, evaluator_for(loose), windows_s=RESTART_S)
+    brief = problem.beginning(8.0)
+    assert isinstance(brief, FreeRun) and len(problem.pieces) == 24 and len(brief.pieces) == 8
+    starts = [p.start_s for p in brief.pieces]
+    assert starts[0] < 3.0 and starts[-1] > 9.0
+    assert np.array_equal(brief.noise, problem.noise)
+    assert problem.beginning(16.0) is problem, "two windows in three are hardly fewer"
+    assert FreeRun((trial_of(loose, 12.0),), loose, evaluator_for(loose)).beginning(1.0).pieces[0].start_s == 0.0
+
+
 def test_fits_end_where_starts_that_are_off_tell_no_more() -> None:
     """Where motions are not stable the floor is what starts do to whole windows: less than one of these tells nothing."""
     robot = quiet(samples()["pendulum"].robot)
