@@ -8,6 +8,7 @@ import measurement_files as samples
 import numpy as np
 import pandas as pd
 import pytest
+import small_logs as logs
 
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints, Proposal
@@ -60,6 +61,14 @@ def test_speeds_without_a_name_are_those_of_the_measured_positions(tmp_path: Pat
     found = proposed(tmp_path, frame, header=False, joints=samples.JOINTS)
     assert taken(found, "position") == ["6", "7"]
     assert taken(found, "velocity") == ["8", "9"]
+
+
+def test_fewer_numbered_columns_than_joints_are_counted(tmp_path: Path) -> None:
+    m = samples.motion()
+    frame = pd.DataFrame({"t": m["t"], "q[0]": m["q"][:, 0], "q[1]": m["q"][:, 1]})
+    _, found = logs.proposed(tmp_path, logs.written(tmp_path, frame), ("waist", "shoulder", "elbow"))
+    (asked,) = found.questions
+    assert "(3 joints; q[0] to q[1] are 2)" in asked and "fixed_joints: {JOINT: 0.0}" in asked
 
 
 def test_joints_that_were_not_recorded_are_named_with_what_to_do(tmp_path: Path) -> None:

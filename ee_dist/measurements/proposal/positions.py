@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from ee_dist.basics.names import listed
 from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, in_full, series_of
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
@@ -97,11 +99,11 @@ def ask_for_positions(v: View) -> None:
             "the robot's names in that order"
         )
     elif v.hints.joints is None and n > 1:
+        fewer = _fewer(v)
         v.out.ask(
-            f"no columns can be told to be the positions of {names}; if they have no names, say task.joints=[...] "
+            f"no columns can be told to be the positions of {names}{fewer}; if they have no names, say task.joints=[...] "
             "with the joints in the order of the columns, else write them into the mapping; a joint that nobody recorded, and "
-            "that stood still, a gripper's say, goes into the description of the robot: 'fixed_joints: "
-            f"{{{v.robot.motor_names[-1]}: 0.0}}'"
+            "that stood still, a gripper's say, goes into the robot's description with its place: 'fixed_joints: {JOINT: 0.0}'"
         )
     else:
         mute = [b.name for b in v.blocks if v.moves(b) and b.reading.command is None and b.reading.kind is None]
@@ -111,6 +113,18 @@ def ask_for_positions(v: View) -> None:
         )
     for m in v.robot.sensors:
         v.out.choices.append(Choice("sensors", m.name, {"column": "???"}, UNKNOWN, "not found"))
+
+
+def _fewer(v: View) -> str:
+    """That positions of fewer joints were recorded than the robot has, where numbered columns say so."""
+    for table in v.timed.tables:
+        readings = [(a, read_name(a)) for a in series_of(table, filled=True)]
+        counted = Counter(r.family for _, r in readings if r.kind == POSITION and r.number is not None)
+        for family, count in counted.most_common(1):
+            own = [a for a, r in readings if r.family == family]
+            if 1 < count < len(v.joints):
+                return f" ({len(v.joints)} joints; {own[0]} to {own[-1]} are {count})"
+    return ""
 
 
 def _recorded(v: View, kind: str = POSITION) -> list[str]:
