@@ -17,16 +17,18 @@ Rows = NDArray[np.intp]
 
 
 def rows_read(mapping: Mapping, clocks: AnyMapping[str, Clocked], done: list[str]) -> dict[str, Rows]:
-    """The rows of each table that sensors are read from in which they were. Where these are not all, ``done`` hears of it."""
-    by_table: dict[str, list[str]] = {}
+    """The rows of each table that sensors are read from in which they were. Where these are not all, ``done`` hears of it.
+    Raises MeasurementError for cells that hold no number."""
+    by_table: dict[str, list[Column]] = {}
     for column in mapping.sensors.values():
         if isinstance(column, Column):
-            by_table.setdefault(column.table, []).append(column.column)
+            by_table.setdefault(column.table, []).append(column)
     out = {}
     for name in sorted(by_table):
         own = clocks[name]
         count = len(own.times_s)
-        rows = held_readings(np.stack([own.table.numbers(c, gaps=True) for c in by_table[name]], axis=1))
+        read = [own.table.numbers(c.column, gaps=c.gaps == "interpolate") for c in by_table[name]]
+        rows = held_readings(np.stack(read, axis=1))
         out[name] = np.arange(count) if rows is None else rows
         if rows is not None:
             every = float(np.median(np.diff(own.times_s[rows])))
