@@ -223,11 +223,13 @@ class _Look:
             if first.energy > share * held:
                 return None
         (fit,) = follow_valley(self.brief, [(model, u)], self.brief.everything, PRIOR, widths=widths)
-        fit = over_ridges(self.brief, fit, PRIOR)
+        return self._on_all_of_it(over_ridges(self.brief, fit, PRIOR))
+
+    def _on_all_of_it(self, fit: Fit) -> Fit:
+        """A fit to the beginnings, where these are looked at first: of long trials they tell in which valley to look."""
         if self.brief is self.calm:
             return fit
-        # Of long trials the beginning tells in which valley to look.
-        (fit,) = follow_valley(self.calm, [(model, fit.u)], self.calm.everything, PRIOR, widths=(AGAIN,))
+        (fit,) = follow_valley(self.calm, [(fit.model, fit.u)], self.calm.everything, PRIOR, widths=(AGAIN,))
         return fit
 
     def _one_sided(self, fit: Fit) -> bool:
@@ -283,7 +285,6 @@ class _Look:
         if not tried:
             return None
         starts = [(Model((*model.parts, c)), np.concatenate([start, u])) for c, u in tried]
-        # Of long trials some tells which of them, and in which valley to look.
         brief = self.brief
         problem, own = brief.problem, brief.everything
         heats = telling_values(problem, brief.on(alone.hypothesis).base(), own)
@@ -291,9 +292,7 @@ class _Look:
         best = over_ridges(brief, best, PRIOR)
         noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))
         ties = [f.model.parts[-1].name for f in ended if f.energy - best.energy < TIE_ENERGY * noise]
-        if brief is not search:
-            (best,) = follow_valley(search, [(best.model, best.u)], search.everything, PRIOR, widths=(AGAIN,))
-        return self._worth(best, {best.model.parts[-1].name: ties})
+        return self._worth(self._on_all_of_it(best), {best.model.parts[-1].name: ties})
 
     def _others(self, model: Model) -> list[Candidate]:
         return not_said(self.search.problem.robot, model.parts, self.pool)

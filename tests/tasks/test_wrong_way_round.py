@@ -14,6 +14,7 @@ from ee_dist.effects.catalogue import apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.recording.reader import read_run
 from ee_dist.robots.describe import load_robot
 
 ARM = Path(__file__).parents[2] / "docs" / "examples" / "arm.yaml"
@@ -27,7 +28,8 @@ SUSPECTS = (
 def keep_log(folder: Path, wrong: str, flaw: str = "") -> None:
     """Two motions of an arm that differs from its description by ``wrong``, if by anything, as a logger keeps them: the bus of
     its servos lost three rows of the first. A ``flaw`` of the record: "jump" puts an angle a whole turn on, "late" is a logger
-    that stood still at four places and counted its rows, "coarse" a torque read in steps as large as it is."""
+    that stood still at four places and counted its rows, "coarse" a torque read in steps as large as it is, "seldom" sensors
+    of which every fourth row says something new."""
     robot, _ = load_robot(ARM)
     name, _, target = wrong.partition("@")
     true = apply(robot, (term(name, target),)) if wrong else robot
@@ -42,6 +44,9 @@ def keep_log(folder: Path, wrong: str, flaw: str = "") -> None:
             table[f"tau_{j}"], table[f"goal_{j}"] = read[:, 3 + k], sent[:, k]
         if flaw == "jump":
             table.loc[400:, "q_turn"] += 2 * np.pi
+        if flaw == "seldom":
+            read_once = [c for c in table if c[0] in "qt" and c != "t"]
+            table[read_once] = table[read_once].iloc[np.arange(len(t)) // 4 * 4].to_numpy()
         if flaw == "coarse":
             step = 0.5 * float(np.sqrt(np.mean(table["tau_turn"] ** 2)))
             table["tau_turn"] = step * np.round(table["tau_turn"] / step)
@@ -100,3 +105,15 @@ def test_what_makes_all_else_wrong_is_told_with_the_verdict(cli, tmp_path, wrong
     _, summary, said = run(cli, "task=compare", log, "task.by=force_balance", *QUICK)
     first = summary["words"] if flaw == "coarse" else summary["words"][1:5]
     assert told in said and any(told in line for line in first), summary["words"]
+
+
+def test_rows_that_repeat_the_last_reading_are_no_readings(cli, tmp_path):
+    keep_log(tmp_path, "", "seldom")
+    log, said = imported(cli, tmp_path)
+    assert "the sensors were read every 20 ms" in said and "200 of 800 rows are readings of the sensors" in said
+    second = read_run(Path(log.removeprefix("measured="))).trials[1].log
+    assert np.array_equal(second.readings, np.arange(0, 800, 4))
+    between = np.diff(second.sensors[:797, :3], axis=0)
+    assert (between != 0).all(), "joints stand still between readings"
+    _, summary, _ = run(cli, "task=compare", log, "task.by=force_balance", *QUICK)
+    assert summary["error"] < 2.0 * summary["noise_floor"]

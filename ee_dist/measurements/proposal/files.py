@@ -14,7 +14,7 @@ from ee_dist.basics.names import listed
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.model import Hints, Proposal
 from ee_dist.measurements.proposal.stated import add_stated
-from ee_dist.measurements.proposal.time import time_of
+from ee_dist.measurements.proposal.time import TimeChoice, time_of
 from ee_dist.measurements.proposal.words import TIME, read_name, role_of
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.table import Recorded, Table
@@ -32,11 +32,11 @@ def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints)
     if len(files) > 1 and len(first.tables) == 1:
         spread = _spread(files, first)
         if spread is not None:
-            _check_clocks([table for _, table in spread.values()], hints)
+            times = [time_of(table, hints) for _, table in spread.values()]
+            _check_clocks([table for _, table in spread.values()], times)
             tables = []
-            for name, (pattern, table) in spread.items():
+            for (name, (pattern, table)), found in zip(spread.items(), times, strict=True):
                 tables.append(replace(table, name=name))
-                found = time_of(table, hints)
                 clock: dict[str, Any] = {"file": pattern}
                 if found is not None and found.column is not None:
                     clock["time"] = {"column": found.column, "unit": found.unit}
@@ -47,9 +47,9 @@ def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints)
     return first
 
 
-def _check_clocks(tables: Sequence[Table], hints: Hints) -> None:
+def _check_clocks(tables: Sequence[Table], times: Sequence[TimeChoice | None]) -> None:
     """Raises MeasurementError for files of one quantity each that say the time of their rows in another file, or nowhere."""
-    timed = [t for t in tables if t.clock is not None or t.rate_hz or time_of(t, hints) is not None]
+    timed = [t for t, found in zip(tables, times, strict=True) if found is not None or t.rate_hz]
     if len(timed) > 1 or len(tables) < 2 or len({len(t) for t in tables}) > 1:
         return
     raise MeasurementError(

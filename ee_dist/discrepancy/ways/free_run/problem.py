@@ -326,18 +326,19 @@ class FreeRun(Problem):
 
     def says_nothing(self, model: Hypothesis) -> str:
         """One with enough friction stands still, and most of a record is often rest."""
-        off = error(self.residuals([model])[0])
-        if self.windows_s is None or not (AT_NOISE * self.noise_floor()[0] <= off < math.inf):
+        if self.windows_s is None:
             return ""
-        standing = self._of_one_at_rest()
-        if off < math.sqrt(HARDLY_BETTER) * standing:
+        off = error(self.residuals([model])[0])
+        least = max(AT_NOISE * self.noise_floor()[0], math.sqrt(HARDLY_BETTER) * self._at_rest)
+        if not least <= off < math.inf:
             return ""
         return (
-            f"a robot that stays where each window begins would be off by {self.told(standing)}, this model is by "
+            f"a robot that stays where each window begins would be off by {self.told(self._at_rest)}, this model is by "
             f"{self.told(off)}: it says next to nothing of the motion"
         )
 
-    def _of_one_at_rest(self) -> float:
+    @cached_property
+    def _at_rest(self) -> float:
         """The error of a robot that stays where each window begins."""
         gap = np.concatenate(
             [
