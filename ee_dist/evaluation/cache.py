@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -22,6 +23,8 @@ class CachedEvaluator:
         self.inner, self.most = inner, most
         self.counts = inner.counts
         self._known: dict[str, Any] = {}
+        self._sizes: OrderedDict[str, int] = OrderedDict()
+        """Of what takes room, oldest first: among hundreds of thousands of results nobody looks for the oldest each time."""
         self._held = 0
 
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
@@ -34,7 +37,9 @@ class CachedEvaluator:
         if fresh:
             found = dict(zip(fresh, self.inner.evaluate(list(fresh.values())), strict=True))
             self._known.update(found)
-            self._held += sum(map(size_of, found.values()))
+            sizes = {key: size for key, result in found.items() if (size := size_of(result))}
+            self._sizes.update(sizes)
+            self._held += sum(sizes.values())
         self.counts.asked = before.asked + len(jobs)
         self.counts.asked_steps = before.asked_steps + sum(j.rollout.steps for j in jobs)
         results = [self._known[key] for key in keys]
@@ -43,15 +48,14 @@ class CachedEvaluator:
 
     def _forget(self) -> None:
         """The oldest results that take room, until the rest fits."""
-        if self._held <= self.most:
-            return
-        for key in [k for k, v in self._known.items() if size_of(v)]:
-            self._held -= size_of(self._known.pop(key))
-            if self._held <= self.most:
-                return
+        while self._held > self.most:
+            oldest, size = self._sizes.popitem(last=False)
+            self._held -= size
+            del self._known[oldest]
 
     def close(self) -> None:
         self._known.clear()
+        self._sizes.clear()
         self._held = 0
         self.inner.close()
 
