@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.assumed import beside, puts_right
-from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, held_by_slopes
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, held_by_slopes, travelling, windows
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge
 from ee_dist.discrepancy.evidence.rule import least_energy
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.ladder import Rung
-from ee_dist.discrepancy.problem import error, per_segment
+from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import AGAIN, pruned
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, possible
 from ee_dist.discrepancy.search.fit import fit_all
@@ -51,6 +51,8 @@ HEATS = ((3, 5), (4, 2))
 BEGINNING_S, BUSY = 8.0, 0.5
 """How much of each trial all values are fitted to first, and what it must have to explain for its length, as a share of what
 the whole has."""
+OF_DRIVES = ("coulomb", "viscous", "rotor_inertia")
+"""What every drive has, and a description of it."""
 MOST_OF_IT = 0.5
 """Share of what is above the noise that must be left at one joint for an effect to stand out there."""
 
@@ -63,6 +65,20 @@ class Everywhere:
     current: Current
     rungs: list[Rung]
     held: float
+
+
+def held_out_by(problem: Problem) -> list[Cut]:
+    """What is held out: motions and settings, or, of a single motion, windows."""
+    return travelling(problem) or [windows(problem)]
+
+
+def looked_for_at_once(problem: Problem, pool: Sequence[Candidate]) -> list[Candidate]:
+    """What of the pool may be fitted at once. Of a single motion windows are all the evidence, and they share what a model gets wrong
+    in it: there it is what every drive has, friction and a rotor, as in anybody's least squares. One of them is worth little
+    where another is described wrongly: a joint that is said to be slowed by its speed alone and has dry friction too."""
+    if travelling(problem):
+        return [*pool]
+    return [c for c in pool if not c.effect.everywhere or any(p.on_top in OF_DRIVES for p in c.effect.parameters)]
 
 
 def everywhere(

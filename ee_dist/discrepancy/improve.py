@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
-from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, stands_out
+from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, held_out_by, looked_for_at_once, stands_out
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, cross_fit, prior_of, travelling, windows
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
@@ -124,8 +124,8 @@ def improve(
             ready = anew < OFTEN and special != beside and bool(special) if spread else len(current.parts) != looked
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
-                at_once, cuts = search.doing(AT_ONCE), travelling(problem)
-                found = everywhere(at_once, current, own, pool, cuts, spread > 0, alike, [*seen.values()])
+                at_once, some = search.doing(AT_ONCE), looked_for_at_once(problem, pool)
+                found = everywhere(at_once, current, own, some, held_out_by(problem), spread > 0, alike, [*seen.values()])
                 looked = len(current.parts)
                 # Where a single one does more than all of them, it goes first, and they are looked for beside it.
                 if found is None or best is None or found.held < float(best.held.sum()):
@@ -205,8 +205,8 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
     """Whether much is left although the search had its chance with few effects; or, when no single one is left that stands out,
     anything that counts, and where that is known to be ``spread`` over many places whatever is above the noise."""
     best, problem = found.best, search.problem
-    # Windows of a single motion say nothing about so many values.
-    if not travelling(problem) or (best is not None and added < FEW):
+    # Windows of a single motion are weak evidence for so many values: few are looked for, and only where no single one is left.
+    if best is not None and (added < FEW or not travelling(problem)):
         return False
     energy, noise = float((found.base**2).sum() if best is None else best.held.sum()), float(problem.floor.sum())
     if best is not None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from ee_dist.discrepancy.everywhere import AT_ONCE, Everywhere, everywhere, stands_out
+from ee_dist.discrepancy.everywhere import AT_ONCE, Everywhere, everywhere, held_out_by, looked_for_at_once, stands_out
 from ee_dist.discrepancy.evidence.holdout import cross_fit, travelling
 from ee_dist.discrepancy.evidence.left import leftovers, settled
 from ee_dist.discrepancy.examine import FAR, Current
@@ -68,7 +68,8 @@ def last_steps(
             if spread and often and came:
                 left = leftovers(problem, search.on(current.hypothesis).base())
                 if not settled(left, step.error_heldout, problem.noise_floor()[0]):
-                    found = everywhere(search.doing(AT_ONCE), current, own, pool, travelling(problem), True, (), seen)
+                    some = looked_for_at_once(problem, pool)
+                    found = everywhere(search.doing(AT_ONCE), current, own, some, held_out_by(problem), True, (), seen)
         if found is None:
             return current, twins
         often, current = often - 1, found.current

@@ -71,11 +71,16 @@ def elastic_transmission(robot: Robot, target: str, values: Mapping[str, float])
     return robot.map_drive(target, lambda d: altered(d, compliance=d.compliance + values["compliance_rad_nm"]))
 
 
+LEFT = 1e-9
+"""Share of a spring below which it is none."""
+
+
 def _springs(robot: Robot, target: str) -> dict[str, Range]:
     joint, travel = robot.joint(target), scales.travel(robot, target)
     stiffest = min(scales.torque(robot, target) / travel, scales.stiffest(robot, target))
     return {
-        "stiffness_nm_rad": (0.0, stiffest),
+        # A spring that is described may be softer, down to none.
+        "stiffness_nm_rad": (0.0 - scales.drive_of(robot, target).spring, stiffest),
         "rest_rad": (max(joint.lower, -travel), min(joint.upper, travel)),
     }
 
@@ -85,7 +90,16 @@ def _springs(robot: Robot, target: str) -> dict[str, Range]:
     family="drive",
     targets=sprung_joints,
     parameters=(
-        Parameter("stiffness_nm_rad", "N.m/rad", 0.0, math.inf, 0.0, "torque for each rad away from rest", 0.02),
+        Parameter(
+            "stiffness_nm_rad",
+            "N.m/rad",
+            -math.inf,
+            math.inf,
+            0.0,
+            "torque for each rad away from rest, on top of nominal",
+            0.02,
+            on_top="spring",
+        ),
         Parameter("rest_rad", "rad", -math.inf, math.inf, 0.0, "position at which the spring pulls nothing", 0.02),
     ),
     physics="A spring beside the motor: a cable, a hose, a gas spring, a balance spring that the model left out.",
@@ -99,9 +113,13 @@ def parallel_spring(robot: Robot, target: str, values: Mapping[str, float]) -> R
         return robot
 
     def sprung(drive: Drive) -> Drive:
-        # Two springs on one joint pull like one: stiffnesses add, and it rests between their rests.
-        total = drive.spring + stiffness
-        return altered(drive, spring=total, spring_rest=(drive.spring * drive.spring_rest + stiffness * rest) / total)
+        # Two springs on one joint pull like one: stiffnesses add, and it rests between their rests. Less of one that is described
+        # leaves, where it leaves nothing, what its rest was off by.
+        total = max(drive.spring + stiffness, 0.0)
+        pull = drive.spring * drive.spring_rest + (total - drive.spring) * rest
+        if total <= LEFT * drive.spring:
+            return altered(drive, spring=0.0, spring_rest=0.0, offset_torque=drive.offset_torque + pull)
+        return altered(drive, spring=total, spring_rest=pull / total)
 
     return robot.map_drive(target, sprung)
 

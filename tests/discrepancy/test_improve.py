@@ -10,7 +10,7 @@ from linear_problem import ROBOT, Linear
 
 import ee_dist.discrepancy.improve as improving
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
-from ee_dist.discrepancy.evidence.rule import TOO_LITTLE
+from ee_dist.discrepancy.evidence.rule import TOO_LITTLE, TOO_LITTLE_ALONE
 from ee_dist.discrepancy.examine import STANDARD_EFFORT
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED, NOTHING_LEFT, improve
@@ -149,7 +149,7 @@ def test_one_motion_is_weak_evidence_for_what_a_robot_in_order_does_not_have(
     effect, joint = name.split("@")
     found = improve(Linear((term(effect, joint, **{value: 0.47}),), extra=4.0), [parse(ROBOT, name)])
     assert bool(found.terms) is expected
-    assert found.last is not None and (expected or found.last.judged[0].why_not == TOO_LITTLE)
+    assert found.last is not None and (expected or found.last.judged[0].why_not == TOO_LITTLE_ALONE)
 
 
 @pytest.mark.parametrize(("energy", "better"), [(50.0, True), (190.0, False)])

@@ -280,6 +280,24 @@ def test_parallel_spring_beside_another_is_one_stiffer_spring_between_their_rest
     assert settled(bench, slider(), *two) == pytest.approx(0.2, abs=1e-4)
 
 
+def test_parallel_spring_takes_off_what_is_described_down_to_none(bench: Bench) -> None:
+    described = slider().with_drive("joint", spring=50.0, spring_rest=0.2)
+    half, none = (term("parallel_spring", "joint", stiffness_nm_rad=-k, rest_rad=0.2) for k in (25.0, 50.0))
+    position = bench.run(described, half, steps=4000, position=0.3).channel("position")
+    ups = np.flatnonzero(np.diff(np.sign(position - 0.2)) > 0)
+    assert float(np.diff(ups).mean()) * 0.001 == pytest.approx(2 * math.pi * math.sqrt(MASS_KG / 25.0), rel=0.01)
+    np.testing.assert_allclose(bench.run(described, none, steps=200, position=0.3).channel("position"), 0.3, atol=1e-12)
+    # Of one with another rest a pull is left: what it was off by.
+    pulled = apply(described, (term("parallel_spring", "joint", stiffness_nm_rad=-50.0, rest_rad=0.1),)).drives[0]
+    assert (pulled.spring, pulled.offset_torque) == (0.0, pytest.approx(50.0 * 0.1))
+
+
+@pytest.mark.parametrize("spring", [0.0, 40.0])
+def test_parallel_spring_is_looked_for_down_to_what_is_described(spring: float) -> None:
+    low, high = CATALOGUE["parallel_spring"].room(slider().with_drive("joint", spring=spring), "joint")["stiffness_nm_rad"]
+    assert low == -spring and high > 0
+
+
 def test_offset_torque_accelerates_by_torque_over_mass(bench: Bench) -> None:
     log = bench.run(slider(), term("offset_torque", "joint", torque_nm=PULL_N), steps=101)
     assert log.channel("velocity")[-1] / 0.1 == pytest.approx(PULL_N / MASS_KG, rel=1e-6)

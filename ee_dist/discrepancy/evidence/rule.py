@@ -36,6 +36,9 @@ STARTS = 3.0
 LUCK = "its gain on held-out data is no more than luck"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes too little of what is above the noise"
+TOO_LITTLE_ALONE = (
+    f"where a single motion is all the evidence it would have to take off {100 * ALONE:.0f} % of what is above the noise"
+)
 
 
 def least_energy(tried: int, parameters: int = 1) -> float:
@@ -70,8 +73,9 @@ def why_not(
         return LUCK
     if may_be_zero(gained, low):
         return MAY_BE_ZERO
-    if gain < LEAST_SHARE * total or gain < _worth(problem, cut, proposal, held) * max(total - floor, 1e-12):
-        return TOO_LITTLE
+    worth = _worth(problem, cut, proposal, held)
+    if gain < LEAST_SHARE * total or gain < worth * max(total - floor, 1e-12):
+        return TOO_LITTLE_ALONE if worth == ALONE else TOO_LITTLE
     return ""
 
 
