@@ -73,12 +73,18 @@ def held_out_by(problem: Problem) -> list[Cut]:
 
 
 def looked_for_at_once(problem: Problem, pool: Sequence[Candidate]) -> list[Candidate]:
-    """What of the pool may be fitted at once. Of a single motion windows are all the evidence, and they share what a model gets wrong
-    in it: there it is what every drive has, friction and a rotor, as in anybody's least squares. One of them is worth little
-    where another is described wrongly: a joint that is said to be slowed by its speed alone and has dry friction too."""
+    """What of the pool may be fitted at once. Of a single motion windows are all the evidence, and they share what a model gets
+    wrong in it: there it is what every driven joint has, friction and a rotor, as in anybody's least squares. One of them is
+    worth little by itself where another is described wrongly: a joint that is said to be slowed by its speed alone, and has
+    dry friction too."""
     if travelling(problem):
         return [*pool]
-    return [c for c in pool if not c.effect.everywhere or any(p.on_top in OF_DRIVES for p in c.effect.parameters)]
+    idle = {d.joint for d in problem.robot.drives if d.command == "none"}
+    return [c for c in pool if not c.effect.everywhere or (_of_drives(c) and c.target not in idle)]
+
+
+def _of_drives(c: Candidate) -> bool:
+    return any(p.on_top in OF_DRIVES for p in c.effect.parameters)
 
 
 def everywhere(

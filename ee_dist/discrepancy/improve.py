@@ -125,7 +125,9 @@ def improve(
             if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
                 at_once, some = search.doing(AT_ONCE), looked_for_at_once(problem, pool)
-                found = everywhere(at_once, current, own, some, held_out_by(problem), spread > 0, alike, [*seen.values()])
+                found = everywhere(
+                    at_once, current, own, some, held_out_by(problem), spread > 0, alike, [*seen.values()]
+                )
                 looked = len(current.parts)
                 # Where a single one does more than all of them, it goes first, and they are looked for beside it.
                 if found is None or best is None or found.held < float(best.held.sum()):

@@ -294,7 +294,9 @@ def test_parallel_spring_takes_off_what_is_described_down_to_none(bench: Bench) 
 
 @pytest.mark.parametrize("spring", [0.0, 40.0])
 def test_parallel_spring_is_looked_for_down_to_what_is_described(spring: float) -> None:
-    low, high = CATALOGUE["parallel_spring"].room(slider().with_drive("joint", spring=spring), "joint")["stiffness_nm_rad"]
+    low, high = CATALOGUE["parallel_spring"].room(slider().with_drive("joint", spring=spring), "joint")[
+        "stiffness_nm_rad"
+    ]
     assert low == -spring and high > 0
 
 

@@ -37,7 +37,7 @@ LUCK = "its gain on held-out data is no more than luck"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes too little of what is above the noise"
 TOO_LITTLE_ALONE = (
-    f"where a single motion is all the evidence it would have to take off {100 * ALONE:.0f} % of what is above the noise"
+    f"a single motion is all the evidence, and it takes off less than {100 * ALONE:.0f} % of what is above the noise"
 )
 
 
