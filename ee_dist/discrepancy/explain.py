@@ -8,14 +8,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
+from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise
+from ee_dist.discrepancy.evidence.signs import either_sign
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import Candidate, known, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
-from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Progress, Search, quiet
+from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.trials.log import Array
 
@@ -42,6 +45,8 @@ class Explanation:
     examined: Examined
     as_it_was: bool = False
     unsure: list[str] = field(default_factory=list)
+    parameters: list[ParameterReport] = field(default_factory=list)
+    """How sure each value of ``after`` is that was fitted, where an effect was found."""
 
     @property
     def candidates(self) -> list[Judged]:
@@ -140,9 +145,19 @@ def explain(
     verdict = EFFECT if found.best is not None else (UNEXPLAINED if found.left else NOTHING_MISSING)
     floor, source = problem.noise_floor()
     unsure = may_be_noise(problem, found.base if found.best is None else found.best.residual)
+    told = [] if found.best is None else _how_sure(replace(search, fixed=fixed), found.best, found)
     return Explanation(
-        verdict, error(as_it_is), error(found.base), floor, source, model, fixed, found, kept is not None, unsure
+        verdict, error(as_it_is), error(found.base), floor, source, model, fixed, found, kept is not None, unsure, told
     )
+
+
+def _how_sure(search: Search, best: Judged, found: Examined) -> list[ParameterReport]:
+    """Of each value of the best, as it is told, by all data: nothing is fitted anew for it."""
+    problem, model, u = search.problem, best.model, best.u
+    residual = search.residuals([model.hypothesis(u)])[0]
+    fit = Fit(model, u, float(residual @ residual), residual, slopes_at(search, model, u), search.everything)
+    reports = parameters(problem, fit, found.left, found.tried, either_sign(search, fit))
+    return [replace(p, term=p.term + len(search.fixed)) for p in reports]
 
 
 def gained_untouched(found: Explanation) -> float:

@@ -65,6 +65,17 @@ def replace_examined(found: Explanation, **changes: object) -> Explanation:
     return replace(found, examined=replace(found.examined, **changes))  # type: ignore[arg-type]
 
 
+def test_the_interval_of_what_is_found_holds_the_truth(friction: tuple[Problem, Explanation]) -> None:
+    problem, found = friction
+    assert found.best is not None and found.best.name == HIDDEN.name
+    (torque,) = found.parameters
+    (told,) = found.best.terms[0].values
+    assert (torque.name, torque.value) == (told[0], pytest.approx(told[1])), "of the value that is told"
+    assert torque.low < dict(HIDDEN.values)[torque.name] < torque.high < 1.5 * torque.value
+    assert "95 % intervals: torque" in explain_account(problem, found, None).sure
+    assert explained(())[1].parameters == []
+
+
 def test_nothing_is_said_of_what_nobody_counted(friction: tuple[Problem, Explanation]) -> None:
     problem, found = friction
     assert confidence("force_balance", found) is None

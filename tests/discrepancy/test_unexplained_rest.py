@@ -10,7 +10,8 @@ import pytest
 from linear_problem import ROBOT, Linear
 from way_samples import measure, problem_by, samples
 
-from ee_dist.discrepancy.accounts.of_improve import improve_account, rest_text
+from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.accounts.ranges import rest_text
 from ee_dist.discrepancy.evidence.intervals import (
     ALL_OF_IT,
     WIDER,

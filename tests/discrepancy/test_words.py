@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,15 +10,14 @@ import pytest
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
-from ee_dist.discrepancy.accounts.of_explain import _at_bounds, explain_account
+from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
-from ee_dist.discrepancy.evidence.intervals import NEUTRAL, ParameterReport
+from ee_dist.discrepancy.evidence.intervals import BOUND, NEUTRAL, ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
 from ee_dist.discrepancy.ladder import Twin
-from ee_dist.discrepancy.search.candidates import Proposal, candidate
-from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.words import percent, percents, phrase, plain, span, told, told_all
 from ee_dist.effects.catalogue import Term, term
@@ -46,7 +46,7 @@ def made_up() -> SimpleNamespace:
 
 def account(
     tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = (),
-    what: Term = DRY, left: tuple[Leftover, ...] = (),
+    what: Term = DRY, left: tuple[Leftover, ...] = (), parameters: tuple[ParameterReport, ...] = (),
 ) -> Account:  # fmt: skip
     best = SimpleNamespace(
         terms=(what,), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
@@ -65,6 +65,8 @@ def account(
         tried=9,
         as_it_was=False,
         unsure=unsure,
+        after=(what,),
+        parameters=list(parameters),
     )
     return explain_account(made_up(), found, ahead, planner)  # type: ignore[arg-type]
 
@@ -342,15 +344,13 @@ def test_a_share_is_never_all_of_it_where_something_is_left(share: float, said: 
     assert percent(share) == said
 
 
-def test_explain_says_which_value_ended_at_its_bound() -> None:
-    robot = servo_pendulum()
-    parts = tuple(candidate(robot, name, "servo") for name in ("coulomb_friction", "speed_limit", "viscous_friction"))
-    u = np.array([1.0, 0.4, 0.99])
-    best = SimpleNamespace(proposal=Proposal(parts), own=u, terms=Model(parts).hypothesis(u))
-    said = _at_bounds(best, robot)  # type: ignore[arg-type]
-    assert said == " Its torque and damping ended at its bound: the range is too small, or the effect is another."
-    best.own = np.array([0.2, 0.4, 0.3])
-    assert _at_bounds(best, robot) == ""  # type: ignore[arg-type]
+def test_explain_says_how_sure_a_value_is_and_which_ended_at_its_bound() -> None:
+    exact = ParameterReport(0, "torque_nm", 0.3, 0.28, 0.32, "")
+    said = account([], parameters=(exact,)).sure
+    assert "no other does as well; 95 % intervals: torque 0.28 to 0.32 N.m." in said
+    at_end = account([], parameters=(replace(exact, flag=BOUND),)).sure
+    assert f"; 95 % intervals: torque {BOUND}." in at_end and "0.28" not in at_end
+    assert "interval" not in account([]).sure.partition("judged on")[2]
 
 
 @pytest.mark.parametrize(("low", "high", "said"), [

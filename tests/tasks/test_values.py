@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from ee_dist.discrepancy.accounts.of_improve import flag_texts
+from ee_dist.discrepancy.accounts.ranges import flag_texts
 from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, NOT_DETERMINED, ParameterReport
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.linear_stage import linear_stage

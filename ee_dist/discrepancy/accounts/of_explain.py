@@ -32,18 +32,19 @@ from ee_dist.discrepancy.accounts.account import (
     unsure_of,
     was_or_were,
 )
+from ee_dist.discrepancy.accounts.ranges import ranges
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
-from ee_dist.discrepancy.evidence.intervals import at_bound
 from ee_dist.discrepancy.evidence.judge import Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.evidence.rule import LUCK
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.words import is_less, percent, percents, phrase, placed, plain, quantity, told_all
+from ee_dist.discrepancy.words import is_less, percent, percents, phrase, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE
-from ee_dist.robots.model import Robot
 
+NAMED = 3
+"""Terms whose intervals are told in a sentence."""
 NOTHING_STANDS_OUT = "Nothing else stands out."
 
 
@@ -96,7 +97,9 @@ def explain_account(
         head += " More than noise is left with it." if rest else f" {THAT_NOISE if found.left else nothing}"
         error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor)
         sure = f"How sure: it explains {taken_off(best)}{unexplained_rest(best.explained, not found.left)}. "
-        sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}.{_at_bounds(best, robot)}"
+        some = best.terms if len(best.terms) <= NAMED else ()  # of more the table tells
+        values = ranges(found.after, found.parameters, some, robot, len(best.terms) > 1)
+        sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}{values}."
         advice = slower(unsure) if unsure else MEND if entry.mistake else ""
         guessed = best.proposal.label == LABEL
         lines.append(GUESSED if guessed else entry.physics)
@@ -149,20 +152,6 @@ def _rivals(tried: int, tied: Sequence[str], more: str) -> str:
         return f"Of {counted(tried, 'explanation')} no other does as well"
     told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
     return f"Of {counted(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
-
-
-def _at_bounds(best: Judged, robot: Robot) -> str:
-    """Which of its values ended where the search may not go farther."""
-    by_words: dict[str, list[str]] = {}
-    at = 0
-    for c, term in zip(best.proposal.parts, best.terms, strict=True):
-        for k, (name, _) in enumerate(term.values):
-            said = at_bound(c, k, float(best.own[at + k]))
-            called = quantity(term, name, robot) or "value"
-            if said and called not in by_words.setdefault(said, []):
-                by_words[said].append(called)
-        at += c.size
-    return "".join(f" Its {' and '.join(names)} ended {said}." for said, names in by_words.items())
 
 
 def _counted_right(confidence: float | None) -> str:

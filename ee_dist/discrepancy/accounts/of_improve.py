@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
-import numpy as np
-
 from ee_dist.basics.names import counted
 from ee_dist.discrepancy.accounts.account import (
     BEYOND,
@@ -29,8 +27,9 @@ from ee_dist.discrepancy.accounts.account import (
     unsure_of,
     was_or_were,
 )
+from ee_dist.discrepancy.accounts.ranges import flag_texts, ranges, rest_text
 from ee_dist.discrepancy.calibrated_away import OddOne
-from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, EITHER, HARDLY, NEUTRAL, WIDER, ParameterReport, called
+from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
@@ -38,8 +37,8 @@ from ee_dist.discrepancy.ladder import Improvement, Twin
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
-from ee_dist.discrepancy.words import much, percent, phrase, placed, plain, quantity, span
-from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
+from ee_dist.discrepancy.words import much, percent, phrase, placed, plain
+from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
 
@@ -48,8 +47,6 @@ EACH = "each of "
 TRIALS_APART = "trials that were held out from all of it"
 NAMED = 3
 """Effects that a headline names."""
-LISTED = 3
-"""Places that a line lists; of more the table of values tells."""
 
 
 def has(names: AbstractSet[str], told: str, robot: Robot) -> bool:
@@ -130,7 +127,8 @@ def improve_account(
         where = "" if found.left or settled else f" on {TRIALS_APART if more_there else last.held_out}"
         head += f" {BEYOND if unsure else NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {last.held_out}{unexplained_rest(found.explained, settled)}"
-        sure += f"{_ranges(found, [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1], robot)}{_told_from(ties)}"
+        one_each = [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1]
+        sure += f"{ranges(found.terms, found.parameters, one_each, robot, len(added(found)) > 1)}{_told_from(ties)}"
         sure += f"{unsure_of(unsure)}."
     if word is not None:
         error = f"{error} {word.text}"
@@ -191,24 +189,6 @@ def _listed(names: Sequence[str]) -> str:
     return "; ".join(names[:NAMED]) + more
 
 
-def _ranges(found: Improvement, named_: Sequence[Term], robot: Robot) -> str:
-    """The 95 % intervals of the values that a headline names."""
-    told_of: dict[str, list[str]] = {t.name: [] for t in named_}
-    for p in found.parameters:
-        term = found.terms[p.term]
-        if term.name in told_of:
-            range_ = span(term, p.name, p.low, p.high, robot, interval=True)
-            sure = p.flag in ("", HARDLY, EITHER) and np.isfinite(p.high - p.low)
-            range_ += f", of which {EITHER}" if p.flag == EITHER else ""
-            told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
-    out = [
-        (f"{placed(name)}: " if len(added(found)) > 1 else "") + ", ".join(values)
-        for name, values in told_of.items()
-        if values
-    ]
-    return f"; {called(found.parameters)}: {'; '.join(out)}" if out else ""
-
-
 def _told_from(ties: Mapping[str, Sequence[str]]) -> str:
     """Whether others would have done as well."""
     others = sorted({t for names in ties.values() for t in names})
@@ -216,41 +196,3 @@ def _told_from(ties: Mapping[str, Sequence[str]]) -> str:
         return ""
     several = f"{len(others)} others ({listed_few(others)})"
     return f"; not told from {' or '.join(map(placed, others)) if len(others) <= TWINS else several}"
-
-
-def rest_text(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
-    """What an effect that nobody found may have to do with the values, where more than noise is left."""
-    doubted = [p for p in parameters if p.doubt]
-    if not doubted:
-        return []
-    text = f"Intervals are {WIDER}: an effect that is not in the model may have gone into the values."
-    # A value that is flagged is told already.
-    worst = [terms[p.term] for p in doubted if p.doubt == ALL_OF_IT and not p.flag]
-    names = [placed(mine[0].name) if len(mine) == 1 else f"{plain(effect)} at {len(mine)} places"
-             for effect in dict.fromkeys(t.effect for t in worst)
-             if (mine := [*dict.fromkeys(t for t in worst if t.effect == effect)])]  # fmt: skip
-    return [text + (f" It could be all of: {'; '.join(names)}." if names else "")]
-
-
-def flag_texts(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
-    """What is wrong with values, a line for each kind of doubt: a robot that is a little wrong everywhere has dozens of them."""
-    told: dict[str, dict[tuple[str, str], list[str]]] = {}
-    for p in parameters:
-        if p.flag:
-            term = terms[p.term]
-            told.setdefault(p.flag, {}).setdefault((term.effect, quantity(term, p.name)), []).append(term.target)
-    return [
-        "; ".join(_of_kind(effect, what, places) for (effect, what), places in kinds.items()) + f": {flag}."
-        for flag, kinds in told.items()
-    ]
-
-
-def _of_kind(effect: str, what: str, places: Sequence[str]) -> str:
-    """``zero offset at hip and knee, offset``."""
-    at = f"{len(places)} places" if len(places) > LISTED else _and([plain(place) for place in places])
-    return f"{plain(effect)}{f' at {at}' if any(places) else ''}{f', {what}' if what else ''}"
-
-
-def _and(words: Sequence[str]) -> str:
-    *most, last = words
-    return f"{', '.join(most)} and {last}" if most else last

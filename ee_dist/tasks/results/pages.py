@@ -81,6 +81,7 @@ def explain_page(
     overlays = parts.curves(problem, found.base, models)
     page.proof = parts.proof_section(problem, overlays, found.base, models, after)
     _add(page, parts.ranking_section(problem, found.candidates))
+    _add(page, parts.values_section(kinds_of(found.after, found.parameters, problem.robot)))
     page.sections.append(parts.browser_section(overlays, models))
     _add(page, parts.signature_section(problem, found.base, after, () if best is None else best.terms))
     page.sections.append(parts.heat_section(problem, found.base, after))

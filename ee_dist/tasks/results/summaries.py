@@ -8,6 +8,7 @@ from typing import Any
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.compare import Comparison
+from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import Explanation
@@ -71,9 +72,26 @@ def of_explanation(
         "baseline_error_natural": problem.natural(found.baseline_error),
         "refitted_error": found.refitted_error,
         "candidates": [of_judged(problem, c) for c in found.candidates],
+        "parameters": of_parameters(found.after, found.parameters),
         "left": of_left(found.left),
         "next_trial": {**ahead.excitation.as_dict(), "separation": ahead.separation} if ahead and worth else None,
     }
+
+
+def of_parameters(terms: Hypothesis, reports: Sequence[ParameterReport]) -> list[dict[str, Any]]:
+    """How sure the fitted values of a model of these ``terms`` are."""
+    told = hypothesis_list(terms)
+    return [
+        {
+            **told[p.term],
+            "name": p.name,
+            "value": p.value,
+            "interval": [p.low, p.high],
+            "flag": p.flag,
+            "doubt": p.doubt,
+        }
+        for p in reports
+    ]
 
 
 def of_judged(problem: Problem, c: Judged) -> dict[str, Any]:
@@ -147,7 +165,6 @@ def of_last_word(word: LastWord | None) -> dict[str, Any] | None:
 def of_improvement(
     problem: Problem, found: Improvement, account: Account, path: str, word: LastWord | None = None
 ) -> dict[str, Any]:
-    terms = hypothesis_list(found.terms)
     return {
         **common(problem, account, found.noise_floor, found.floor_source, found.terms),
         "verdict": found.verdict,
@@ -155,17 +172,7 @@ def of_improvement(
         "ladder": [of_rung(problem, r) for r in found.ladder],
         "model": path,
         "last_word": of_last_word(word),
-        "parameters": [
-            {
-                **terms[p.term],
-                "name": p.name,
-                "value": p.value,
-                "interval": [p.low, p.high],
-                "flag": p.flag,
-                "doubt": p.doubt,
-            }
-            for p in found.parameters
-        ],
+        "parameters": of_parameters(found.terms, found.parameters),
         "worth": [
             {"words": s.text, "terms": hypothesis_list(s.terms), "share": s.worth, "doubted": s.doubted}
             for s in shares(found, problem.robot)

@@ -13,7 +13,7 @@ from rich.table import Table
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import shown_gain
 from ee_dist.discrepancy.compare import Comparison
-from ee_dist.discrepancy.evidence.intervals import called
+from ee_dist.discrepancy.evidence.intervals import ParameterReport, called
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
@@ -100,14 +100,15 @@ def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
     table.add_section()
     table.add_row("noise floor", "", problem.told(found.noise_floor))
     console.print(table)
-    kinds = kinds_of(found.terms, found.parameters, problem.robot)
+    _show_values(console, found.terms, found.parameters, problem.robot)
+
+
+def _show_values(console: Console, terms: Hypothesis, reports: Sequence[ParameterReport], robot: Robot) -> None:
+    kinds = kinds_of(terms, reports, robot)
     if kinds:
         at = [(k.name, "; ".join(f"{place} {within(p)}" for place, p in k.at)) for k in kinds]
-        console.print(
-            _table(
-                f"Its values, with {called(found.parameters)}", (("effect", False), ("where, and how much", False)), at
-            )
-        )
+        columns = (("effect", False), ("where, and how much", False))
+        console.print(_table(f"Its values, with {called(reports)}", columns, at))
 
 
 def show_last_word(console: Console, word: LastWord | None) -> None:
@@ -156,3 +157,4 @@ def typed(terms: Hypothesis) -> str:
 
 def show_explanation(console: Console, problem: Problem, found: Explanation) -> None:
     show_candidates(console, problem, found.candidates, "Candidate effects, judged on data not fitted")
+    _show_values(console, found.after, found.parameters, problem.robot)

@@ -1,0 +1,71 @@
+"""How sure fitted values are, in words: their intervals, what is wrong with some, and what an effect that nobody found may
+have to do with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, EITHER, HARDLY, WIDER, ParameterReport, called
+from ee_dist.discrepancy.words import placed, plain, quantity, span
+from ee_dist.effects.catalogue import Hypothesis, Term
+from ee_dist.robots.model import Robot
+
+LISTED = 3
+"""Places that a line lists; of more the table of values tells."""
+
+
+def ranges(
+    terms: Hypothesis, parameters: Sequence[ParameterReport], named: Sequence[Term], robot: Robot, several: bool
+) -> str:
+    """The 95 % intervals of the values of ``named`` terms, of a model of these ``terms``; ``several``: more than one was found,
+    and each is said of which."""
+    told_of: dict[str, list[str]] = {t.name: [] for t in named}
+    for p in parameters:
+        term = terms[p.term]
+        if term.name in told_of:
+            range_ = span(term, p.name, p.low, p.high, robot, interval=True)
+            sure = p.flag in ("", HARDLY, EITHER) and np.isfinite(p.high - p.low)
+            range_ += f", of which {EITHER}" if p.flag == EITHER else ""
+            told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
+    out = [(f"{placed(name)}: " if several else "") + ", ".join(values) for name, values in told_of.items() if values]
+    return f"; {called(parameters)}: {'; '.join(out)}" if out else ""
+
+
+def rest_text(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
+    """What an effect that nobody found may have to do with the values, where more than noise is left."""
+    doubted = [p for p in parameters if p.doubt]
+    if not doubted:
+        return []
+    text = f"Intervals are {WIDER}: an effect that is not in the model may have gone into the values."
+    # A value that is flagged is told already.
+    worst = [terms[p.term] for p in doubted if p.doubt == ALL_OF_IT and not p.flag]
+    names = [placed(mine[0].name) if len(mine) == 1 else f"{plain(effect)} at {len(mine)} places"
+             for effect in dict.fromkeys(t.effect for t in worst)
+             if (mine := [*dict.fromkeys(t for t in worst if t.effect == effect)])]  # fmt: skip
+    return [text + (f" It could be all of: {'; '.join(names)}." if names else "")]
+
+
+def flag_texts(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
+    """What is wrong with values, a line for each kind of doubt: a robot that is a little wrong everywhere has dozens of them."""
+    told: dict[str, dict[tuple[str, str], list[str]]] = {}
+    for p in parameters:
+        if p.flag:
+            term = terms[p.term]
+            told.setdefault(p.flag, {}).setdefault((term.effect, quantity(term, p.name)), []).append(term.target)
+    return [
+        "; ".join(_of_kind(effect, what, places) for (effect, what), places in kinds.items()) + f": {flag}."
+        for flag, kinds in told.items()
+    ]
+
+
+def _of_kind(effect: str, what: str, places: Sequence[str]) -> str:
+    """``zero offset at hip and knee, offset``."""
+    at = f"{len(places)} places" if len(places) > LISTED else _and([plain(place) for place in places])
+    return f"{plain(effect)}{f' at {at}' if any(places) else ''}{f', {what}' if what else ''}"
+
+
+def _and(words: Sequence[str]) -> str:
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last
