@@ -26,10 +26,24 @@ def chosen(problem: Problem, without: Sequence[str], only: Sequence[str]) -> lis
     """Candidates at all places and groups, less those left out. Raises ConfigError where this way of comparing has none."""
     found = pool_of(problem, without, only)
     if (without or only) and not found:
-        raise _nothing(problem.robot, without, only)
+        raise _unseen(problem, without, only)
     return found
 
 
+def _asked(without: Sequence[str], only: Sequence[str]) -> str:
+    return " and ".join(f"task.{k}=[{','.join(v)}]" for k, v in (("only", only), ("without", without)) if v)
+
+
 def _nothing(robot: Robot, without: Sequence[str], only: Sequence[str]) -> ConfigError:
-    said = " and ".join(f"task.{k}=[{','.join(v)}]" for k, v in (("only", only), ("without", without)) if v)
-    return ConfigError(f"{said}: nothing is left to try on {robot.name}; name an effect that can act on it")
+    return ConfigError(
+        f"{_asked(without, only)}: nothing is left to try on {robot.name}; name an effect that can act on it"
+    )
+
+
+def _unseen(problem: Problem, without: Sequence[str], only: Sequence[str]) -> ConfigError:
+    """What is left could act on the robot, and leaves no mark in what is compared."""
+    families = {c.effect.family for c in candidates(problem.robot, without, only or None)}
+    blind = families.isdisjoint(problem.families)
+    why = "knows no faults of sensors or controllers" if blind else "sees nothing of it in these data"
+    other = "; task.by=open_loop compares what sensors read on recorded commands" if blind else ""
+    return ConfigError(f"{_asked(without, only)}: task.by={problem.way} {why}, so that nothing is left to try{other}")

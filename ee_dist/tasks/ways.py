@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques, torques_known
@@ -150,7 +151,7 @@ def way_of(measured: Measurements, by: str) -> Way:
         if driven and not held and _seen(measured):
             # A controller may stand behind recorded torques (an arm's currents), so forces are balanced where they were measured
             # and tell anything.
-            weak = _weak(measured) if torques else ""
+            weak = _weak(measured) if torques else _some_unknown(measured)
             if weak or not torques:
                 return _possible(replace(WAYS["free_run"], why=weak or WAYS["free_run"].why), measured)
         if by == "open_loop" and _only_motion(measured):
@@ -167,6 +168,20 @@ def _forces_known(log: SensorLog, robot: Robot, all_of_them: bool) -> bool:
     robot was driven, a simulation judges every joint."""
     torques = None if log.joints is None else motor_torques(log, robot)
     return torques is not None and (not all_of_them or len(torques_known(torques)) == len(robot.drives))
+
+
+def _some_unknown(measured: Measurements) -> str:
+    """Why torques that were recorded at some joints are not balanced; empty where none were."""
+    robot = measured.robot
+    forces = [None if t.log.joints is None else motor_torques(t.log, robot) for t in measured.trials]
+    known = set.intersection(*(set() if f is None else set(torques_known(f)) for f in forces))
+    names = [d.joint for k, d in enumerate(robot.drives) if k not in known]
+    if not known or not names:
+        return ""
+    return (
+        f"torques were recorded, and none of {listed(names)}, where a balance of forces would judge nothing: the model runs "
+        "freely from the measured state on the commands"
+    )
 
 
 TORQUES_TOO = "Torques of the drives were recorded too: task.by=force_balance compares these{gains}"

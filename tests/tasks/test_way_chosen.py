@@ -12,14 +12,17 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.ways.force_balance.motion import Motion, Processing, motion_of
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
+from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.measurements import Measurements
+from ee_dist.tasks.pool import chosen
 from ee_dist.tasks.ways import AUTO, way_of
 from ee_dist.trials.log import SensorLog
 
 ROWS = 300
+ARM = Path(__file__).parents[2] / "docs" / "examples" / "arm.urdf"
 
 
 def measured(command: str) -> Measurements:
@@ -93,6 +96,36 @@ def test_without_commands_forces_are_balanced_and_nothing_can_be_simulated() -> 
             way_of(with_torques, by)
     with pytest.raises(ConfigError, match="trial a holds no commands"):
         way_of(replace(known, trials=(MeasuredTrial("a", silent),)), AUTO)
+
+
+def test_where_some_torques_are_missing_it_is_said_which() -> None:
+    drives = {joint: {"command": "torque", "torque_limit": 9.0} for joint in ("shoulder", "elbow")}
+    robot, _ = load_robot({"urdf": str(ARM), "drives": drives})
+    rows = log(servo_pendulum()).times_s[:, None] * np.ones(len(robot.drives))
+    sensors = np.tile(rows[:, :1], (1, len(robot.sensors)))
+    units = tuple(s.unit for s in robot.sensors)
+    own = SensorLog(rows[:, 0], sensors, rows, robot.sensor_names, units, robot.motor_names, joints=rows)
+    some = np.full((ROWS, len(robot.drives)), 0.1)
+    some[:, -1] = np.nan
+    partly, none = (
+        Measurements(robot, (MeasuredTrial("a", replace(own, torques=torques)),), (), (), None, Path())
+        for torques in (some, None)
+    )
+    last = robot.motor_names[-1]
+    way = way_of(partly, AUTO)
+    assert way.name == "free_run" and f"torques were recorded, and none of {last}" in way.why
+    assert "torques" not in way_of(none, AUTO).why
+
+
+def test_a_way_says_that_it_cannot_see_what_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = Config(engine=EngineConfig("mujoco", 1), evaluator=EvaluatorConfig("serial"))
+    free = way_of(measured("torque"), "free_run").make(measured("torque"), config)
+    with pytest.raises(ConfigError, match=r"task.by=free_run knows no faults of sensors.*task.by=open_loop compares"):
+        chosen(free, (), ("sensor_delay",))
+    assert chosen(free, (), ("coulomb_friction",))
+    monkeypatch.setattr(free, "shows", lambda effect, target: False)
+    with pytest.raises(ConfigError, match="task.by=free_run sees nothing of it in these data, so that nothing is left"):
+        chosen(free, (), ("coulomb_friction",))
 
 
 @pytest.mark.parametrize(("times", "way"), [(1.0, "free_run"), (0.2, "force_balance"), (3.0, "force_balance")])
