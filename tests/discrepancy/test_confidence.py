@@ -76,14 +76,19 @@ def test_the_interval_of_what_is_found_holds_the_truth(friction: tuple[Problem, 
     assert explained(())[1].parameters == []
 
 
-def test_nothing_is_said_of_what_nobody_counted(friction: tuple[Problem, Explanation]) -> None:
+def test_nothing_is_said_of_what_nobody_counted(
+    friction: tuple[Problem, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
     problem, found = friction
     assert confidence("force_balance", found) is None
     strict = replace(RULE, misfit=0.5)
     assert confidence("open_loop", found, strict) is None, "no case fitted as badly"
     assert found.best is not None
     sure = explain_account(problem, found, None, "", None).sure
-    assert sure.endswith("How often such a verdict is right was not counted.")
+    assert "Too few of the simulated cases that were counted looked like this one" in sure
+    monkeypatch.setattr(problem, "way", "force_balance")
+    other = explain_account(problem, found, None).sure
+    assert other.endswith("How often verdicts are right was counted for open_loop alone, not for force_balance.")
 
 
 def test_other_verdicts_are_right_as_often_as_they_were() -> None:

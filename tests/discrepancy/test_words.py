@@ -37,6 +37,7 @@ def made_up() -> SimpleNamespace:
         told=str,
         natural_name="error",
         natural_unit="",
+        way="open_loop",
         notes=[],
         doubts="",
         trials=("a",),

@@ -123,8 +123,10 @@ def test_a_way_says_that_it_cannot_see_what_was_asked_for(monkeypatch: pytest.Mo
     with pytest.raises(ConfigError, match=r"task.by=free_run knows no faults of sensors.*task.by=open_loop compares"):
         chosen(free, (), ("sensor_delay",))
     assert chosen(free, (), ("coulomb_friction",))
-    monkeypatch.setattr(free, "shows", lambda effect, target: False)
-    with pytest.raises(ConfigError, match="task.by=free_run sees nothing of it in these data, so that nothing is left"):
+    monkeypatch.setattr(free, "shows", lambda *_: False)
+    with pytest.raises(
+        ConfigError, match=r"task.by=free_run sees nothing of it in these data, so that nothing is left"
+    ):
         chosen(free, (), ("coulomb_friction",))
 
 

@@ -34,6 +34,7 @@ from ee_dist.discrepancy.accounts.account import (
 )
 from ee_dist.discrepancy.accounts.ranges import ranges
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
+from ee_dist.discrepancy.confidence import COUNTED_WAY
 from ee_dist.discrepancy.evidence.judge import Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.evidence.rule import LUCK
@@ -132,7 +133,7 @@ def explain_account(
             f"To tell them apart, record: {plain(e.kind)} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed "
             f"{e.seed}{where}. There they should differ by {ahead.separation:.0f} standard deviations."
         )
-    sure = f"{sure} {_counted_right(confidence)}."
+    sure = f"{sure} {_counted_right(confidence, problem.way)}."
     tied = bool(found.verdict == EFFECT and best is not None and best.tied_with)
     good = (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not rest)) and not unsure and not tied
     return Account(
@@ -154,9 +155,11 @@ def _rivals(tried: int, tied: Sequence[str], more: str) -> str:
     return f"Of {counted(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
 
 
-def _counted_right(confidence: float | None) -> str:
+def _counted_right(confidence: float | None, way: str) -> str:
+    if confidence is None and way != COUNTED_WAY:
+        return f"How often verdicts are right was counted for {COUNTED_WAY} alone, not for {way}"
     if confidence is None:
-        return "How often such a verdict is right was not counted"
+        return "Too few of the simulated cases that were counted looked like this one to say how often such a verdict is right"
     return f"In {100 * confidence:.0f} of 100 simulated cases that looked like this one, the verdict was right"
 
 
