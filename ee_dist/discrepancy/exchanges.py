@@ -117,7 +117,7 @@ def nearest(
     more = tuple(other_scale(search.problem, current, own, pool))
     found = instead_of(search, current, own, pool, asked, more)
     best = next((i for i in found if i.better), None)
-    if best is not None and _surely(search, current, best.then, len(pool)):
+    if best is not None and _surely(search, current, best, len(pool)):
         return best.then, [], _step(search, best)
     found, nearer = _nearest_of(search, current, found, len(pool))
     fixed = search.fixed
@@ -151,10 +151,10 @@ def _worse(search: Search, current: Current, then: Current, tried: int) -> bool:
     return other.energy - one.energy > allowed_loss(search.problem, one.energy, one.cut, tried)
 
 
-def _surely(search: Search, current: Current, then: Current, tried: int) -> bool:
+def _surely(search: Search, current: Current, found: Instead, tried: int) -> bool:
     """Whether another model is better on data that its fits had not seen."""
-    one, other = _held_out(search, current, then)
-    return surely_better(search.problem, one, other, tried)
+    one, other = _held_out(search, current, found.then)
+    return surely_better(search.problem, one, other, tried, Proposal((found.comes,)))
 
 
 def _held_out(search: Search, current: Current, then: Current) -> list[HeldOut]:

@@ -61,6 +61,30 @@ def test_an_exchange_pays_as_much_as_a_new_effect_on_motions_that_were_not_fitte
     assert not surely_better(problem, before, held_out(problem, uneven, True), 100), "one motion is far worse"
     near = [held_out(problem, size * unit, False) for size in (1.2, 1.0)]
     assert surely_better(problem, near[0], near[1], 10), "windows of one motion: more than luck is enough"
+    assert surely_better(problem, near[0], near[1], 10, Proposal((WEAK,))), (
+        "and of what comes, where only noise is left"
+    )
+
+
+@pytest.mark.parametrize(
+    ("after", "effect", "better"),
+    [
+        (8.7, "motor_weak", False),
+        (8.7, "coulomb_friction", True),
+        (8.0, "motor_weak", True),
+        (9.7, "coulomb_friction", False),
+    ],
+)
+def test_of_a_single_motion_what_comes_in_anothers_place_is_worth_as_much_as_any(
+    after: float, effect: str, better: bool
+) -> None:
+    """What a description leaves open a tenth of what is above the noise; a fault, or a weight that was not described, 30 %."""
+    problem = Linear(())
+    unit = np.sign(problem.data)
+    one, other = (held_out(problem, size * unit, False) for size in (10.0, after))
+    came = Proposal((candidate(ROBOT, effect, "knee_front_left"),))
+    assert surely_better(problem, one, other, 100, came) is better
+    assert surely_better(problem, one, other, 100), "of what was weighed before it is enough"
 
 
 @pytest.mark.parametrize(("fuller", "first"), [(6.0, 2), (9.5, 1)])

@@ -10,7 +10,7 @@ import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import WINDOWS, HeldOut, bootstrap
 from ee_dist.discrepancy.evidence.intervals import half_widths
-from ee_dist.discrepancy.evidence.rule import NEAR, WORTH, least_energy, may_be_zero, told_in, why_not
+from ee_dist.discrepancy.evidence.rule import NEAR, WORTH, least_energy, least_share, may_be_zero, told_in, why_not
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fitted import Model
@@ -156,16 +156,18 @@ def judge(
     )
 
 
-def surely_better(problem: Problem, one: HeldOut, other: HeldOut, tried: int) -> bool:
+def surely_better(problem: Problem, one: HeldOut, other: HeldOut, tried: int, came: Proposal | None = None) -> bool:
     """Whether of two models judged under one cut the ``other`` is better by what a new effect must be worth. Where much is left,
-    some model always does a little better by chance."""
+    some model always does a little better by chance; and where a single motion is all the evidence, most effects take something
+    off it: what only ``came`` with the other model must be worth as much there as any."""
     cut, before, after = one.cut, per_segment(problem, one.residual), per_segment(problem, other.residual)
     gained = cut.by_unit(before - after)
     gain, energy = float(gained.sum()), float(before.sum())
     if not np.isfinite(gain) or gain < least_energy(tried) * max(1.0, energy / len(problem.floor)):
         return False
     if cut.name == WINDOWS:
-        return True
+        share = 0.0 if came is None else least_share(problem, cut, came, after)
+        return gain >= share * (energy - float(problem.floor.sum()))
     low, _ = bootstrap(gained, groups=cut.groups)
     return not may_be_zero(gained, low) and gain >= WORTH * (energy - float(problem.floor.sum()))
 

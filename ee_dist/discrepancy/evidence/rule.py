@@ -73,7 +73,7 @@ def why_not(
         return LUCK
     if may_be_zero(gained, low):
         return MAY_BE_ZERO
-    worth = _worth(problem, cut, proposal, held)
+    worth = least_share(problem, cut, proposal, held)
     if gain < LEAST_SHARE * total or gain < worth * max(total - floor, 1e-12):
         return TOO_LITTLE_ALONE if worth == ALONE else TOO_LITTLE
     return ""
@@ -104,8 +104,9 @@ def _of_starts(problem: Problem) -> float:
     return STARTS * math.sqrt(2.0 * float(known @ known))
 
 
-def _worth(problem: Problem, cut: Cut, proposal: Proposal, held: Array) -> float:
-    """Share of what is above the noise that a proposal must take off; nothing where no more than noise is left with it."""
+def least_share(problem: Problem, cut: Cut, proposal: Proposal, held: Array) -> float:
+    """Share of what is above the noise that a proposal must take off, with which ``held`` (segments,) energies are left; nothing
+    where that is no more than noise."""
     if cut.name != WINDOWS:
         return WORTH
     if no_more_than_noise(problem, float(held.sum())) or travelling(problem):
