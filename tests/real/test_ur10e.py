@@ -1,4 +1,4 @@
-"""A UR10e without and with a payload (docs/real_data.md): as good as an expert's least squares with fewer numbers, and the load."""
+"""A UR10e without and with a payload (docs/real_data.md): as good as an expert with fewer numbers, and the load is found."""
 
 from __future__ import annotations
 
