@@ -36,6 +36,8 @@ from ee_dist.trials.log import Array
 
 FAR = 2.0
 """Error over the noise floor of the best quick fit from which windows of the same motions need not even be looked at."""
+NEARLY = 1.2
+"""The same where starts of windows make the floor: noise is little of it, and of other windows nothing more is to be had."""
 WORTH_JUDGING = 0.4
 """Share of what the best quick fit takes off that another must take off to be judged beside it, unless it is among the first
 AT_LEAST."""
@@ -139,7 +141,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     guessed = assumed_drives(now.among(busy), pool, [t.name for t in (*search.fixed, *current.hypothesis)])
     starts += [guessed] if guessed is not None else []
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, few), 1e-12)
-    far = nearest > FAR**2
+    far = nearest > (NEARLY if problem.layout.by_segment else FAR) ** 2
     judged = _judged(search, current, starts, base, len(pool), leading, far)
     if judged and not judged[0].earned and not far and leftovers(problem, base):
         pairs = _pairs(screened, now)

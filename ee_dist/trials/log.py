@@ -89,18 +89,18 @@ class SensorLog:
         """The first ``steps`` rows."""
         return self.part(0, steps)
 
-    def part(self, first: int, last: int) -> SensorLog:
-        """Rows first (included) to last (left out)."""
+    def part(self, first: int, last: int, every: int = 1) -> SensorLog:
+        """Rows first (included) to last (left out), one of ``every`` so many."""
 
         def cut(a: Array | None) -> Array | None:
-            return None if a is None else a[first:last].copy()
+            return None if a is None else a[first:last:every].copy()
 
         last = min(last, len(self))
         return replace(
             self,
-            times_s=self.times_s[first:last].copy(),
-            sensors=self.sensors[first:last].copy(),
-            commands=self.commands[first:last].copy(),
+            times_s=self.times_s[first:last:every].copy(),
+            sensors=self.sensors[first:last:every].copy(),
+            commands=self.commands[first:last:every].copy(),
             base_pose=cut(self.base_pose),
             joints=cut(self.joints),
             torques=cut(self.torques),

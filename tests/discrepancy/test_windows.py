@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from way_samples import evaluator_for, measure, samples
 
 from ee_dist.discrepancy.evidence.holdout import windows as windows_cut
@@ -196,3 +198,69 @@ def test_a_right_model_of_a_robot_at_rest_is_not_told_to_stand_still() -> None:
         (MeasuredTrial("rest", log, Commands(at_rest)),), loose, evaluator_for(loose), windows_s=RESTART_S
     )
     assert not any("stays where each window begins" in line for line in problem.remarks(()))
+
+
+def unstable(floor: float, seconds: float = 12.0) -> FreeRun:
+    """A pendulum led by torques, as if starts that are off made a floor of so many times the noise."""
+    robot = quiet(samples()["pendulum"].robot)
+    loose = robot.map_drive(robot.drives[0].joint, lambda d: replace(d, command="torque", delay_s=0.01))
+    problem = FreeRun((trial_of(loose, seconds),), loose, evaluator_for(loose), windows_s=RESTART_S)
+    shape = np.full(len(problem.segment_of), floor)
+    problem.layout = replace(problem.layout, floor=shape, known=shape - 1.0, by_segment=True)
+    return problem
+
+
+def test_where_starts_decide_a_search_goes_in_longer_steps() -> None:
+    """What they move is little beside the floor: a third of the work, and the same residual but for that."""
+    problem = unstable(1e6)
+    found = problem.searched
+    assert isinstance(found, FreeRun) and found is not problem and (found.steps, problem.steps) == (problem.every, 1)
+    assert len(found.segments) == len(problem.segments)
+    assert len(found.segment_of) == pytest.approx(len(problem.segment_of), abs=problem.every)
+    joint = found.robot.drives[0].joint
+    for model in (
+        (),
+        (term("coulomb_friction", joint, torque_nm=0.1),),
+        (term("command_delay", joint, delay_s=0.013),),
+    ):
+        fine, coarse = (np.abs(p.raw(p.residuals([model])[0])) for p in (problem, found))
+        assert coarse.mean() == pytest.approx(
+            fine.mean(), abs=2e-3 * float(np.ptp(problem.measured[0].log.sensors[:, 0]))
+        )
+    before = found.evaluator.counts.steps
+    found.residuals([(term("viscous_friction", joint, damping_nm_s_rad=0.05),)])
+    assert found.evaluator.counts.steps - before == len(found.pieces) * max(len(p.log) for p in found.pieces)
+    assert 3 * max(len(p.log) for p in found.pieces) <= max(len(p.log) for p in problem.pieces) + 2 * problem.every
+    assert any("goes in steps of" in line for line in found.notes) and not any("in steps" in n for n in problem.notes)
+    brief = found.beginning(4.0)
+    assert isinstance(brief, FreeRun) and brief.steps == found.steps and len(brief.pieces) < len(found.pieces)
+    (log, *_) = found.simulated(())
+    assert log is not None and log.times_s[1] - log.times_s[0] == pytest.approx(found.robot.time_step_s), (
+        "seen in all rows"
+    )
+
+
+def test_longer_steps_are_not_taken_where_they_would_be_seen() -> None:
+    precise = unstable(1e-4)
+    assert precise.searched is precise
+    stable = unstable(1e6)
+    stable.layout = replace(stable.layout, by_segment=False)
+    assert stable.searched is stable
+    seldom = unstable(1e6)
+    log = seldom.measured[0].log
+    filled = np.arange(len(log)) % 2 == 1
+    seldom.measured = (replace(seldom.measured[0], log=replace(log, filled=filled)),)
+    assert seldom.searched is seldom, "rows that nobody read say nothing of what happened in them"
+
+
+@given(st.integers(1, 6), st.integers(0, 40))
+def test_what_drives_were_told_in_longer_steps_is_its_mean(count: int, first: int) -> None:
+    problem = unstable(1.0, 2.0)
+    (piece, *_) = [p for p in problem.pieces if p.start_s > 0]
+    short = replace(piece, commands=piece.commands[first:], rows=range(0, len(piece.log), count))
+    found = short.coarser(count)
+    whole = (len(short.commands) // count) * count
+    blocks = short.commands[:whole].reshape(-1, count, short.commands.shape[1]).mean(axis=1)
+    np.testing.assert_allclose(found.commands[: len(blocks)], blocks)
+    assert np.array_equal(found.measured((0,)), short.measured((0,)))
+    np.testing.assert_allclose(found.times_s, short.times_s)

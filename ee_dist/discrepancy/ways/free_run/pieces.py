@@ -59,6 +59,25 @@ class Piece:
         """(R,) of the rows that are compared, since its start."""
         return np.asarray(self.log.times_s[list(self.rows)] - self.log.times_s[0])
 
+    def coarser(self, count: int) -> Piece:
+        """The same in steps of ``count`` rows, of which those that are compared are. What the drives were told meanwhile is told
+        them as its mean: neither early nor late."""
+
+        def mean(values: Array | None) -> Array | None:
+            if values is None:
+                return None
+            first = np.arange(0, len(values), count)
+            lengths = np.diff([*first, len(values)]).reshape(-1, *(1,) * (values.ndim - 1))
+            return np.asarray(np.add.reduceat(values, first, axis=0) / lengths)
+
+        commands = mean(self.commands)
+        assert commands is not None
+        log = replace(
+            self.log.part(0, len(self.log), count), supply_v=mean(self.log.supply_v), external=mean(self.log.external)
+        )
+        rows, again = tuple(r // count for r in self.rows), tuple((k // count, state) for k, state in self.again)
+        return replace(self, log=log, rows=rows, commands=commands, again=again)
+
     def measured(self, columns: Sequence[int]) -> Array:
         """(R, C) of some channels."""
         return np.asarray(self.log.sensors[np.ix_(self.rows, columns)])
@@ -95,9 +114,11 @@ class Piece:
         )
 
 
-def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None, every: int) -> list[Piece]:
-    """Of a trial by its number, in windows of ``windows_s`` or in one; of every so many rows is compared one. Raises
-    MeasurementError for a log that no simulation can start from."""
+def pieces(
+    index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | None, every: int, steps: int = 1
+) -> list[Piece]:
+    """Of a trial by its number, in windows of ``windows_s`` or in one; of every so many rows is compared one. ``steps``: so many
+    rows at once are gone from the start of each. Raises MeasurementError for a log that no simulation can start from."""
     log = trial.log
     if log.joints is None:
         raise MeasurementError(
@@ -118,6 +139,7 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
     # A window is simulated from as long before it as a delay may be: what drives hold within them when it begins (commands on
     # their way, play) comes from there.
     run_up = round(longest_delay(robot) / robot.time_step_s)
+    run_up += -run_up % steps
     commands, enabled = released(trial.obeyed(log.commands, robot))
     length = len(log) if windows_s is None else max(2, round(windows_s / dt))
     # An integral is what a controller made of all that came before.
@@ -131,6 +153,7 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
         if last - first < min(length, len(log)) // 2:
             break
         begin = max(0, first - run_up)
+        begin += (first - begin) % steps
         anew = range(first + length, last - length // 2, length) if first == begin else [first]
         part = log.part(begin, last)
         seen = range(first - begin, len(part), every)
@@ -153,9 +176,10 @@ def pieces(index: int, trial: MeasuredTrial, robot: Robot, windows_s: float | No
     return found
 
 
-def spared(windows: Sequence[Piece]) -> int:
-    """Of how many windows one is enough: 1 where all of them are few steps, or are simulated in one go."""
-    needed = math.ceil(sum(len(p.log) for p in windows) / MOST_STEPS)
+def spared(windows: Sequence[Piece], steps: int = 1) -> int:
+    """Of how many windows one is enough: 1 where all of them are few steps, of ``steps`` rows each, or are simulated in one
+    go."""
+    needed = math.ceil(sum(len(p.log) for p in windows) / (steps * MOST_STEPS))
     return max(1, min(needed, in_turn(windows, FEWEST)))
 
 

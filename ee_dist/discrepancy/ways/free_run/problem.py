@@ -21,12 +21,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from ee_dist.basics.altered import altered
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.starting import speeds_off
 from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
-from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, in_turn, pieces, spared, thinned
+from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, Piece, in_turn, pieces, spared, thinned
 from ee_dist.effects.catalogue import Hypothesis, applied, apply
+from ee_dist.engines.halfway import goes_halfway
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
@@ -58,6 +60,8 @@ HARDLY_BETTER = 0.8
 MOVES = "Is there more in the record than rest, and is friction no more than what moved the joints?"
 AT_NOISE = 1.3
 """Times the noise floor up to which a model is right, be it of a robot at rest."""
+SLIGHT = 0.1
+"""Share of the noise floor by which longer steps may move what is foretold, for a search to go in them."""
 BLOCKS = 6
 """Segments that a record run through in one go is cut into."""
 
@@ -68,7 +72,7 @@ class FreeRun(Problem):
     ``every``: rows of a log from one residual value to the next; where sensors were read more seldom than rows are simulated,
     their readings are taken instead. ``windows_s`` starts the model anew from the measured
     state so often, and makes segments of the windows; None runs each trial through, in BLOCKS segments. ``one_in``: of so many
-    windows one is simulated.
+    windows one is simulated, and ``steps`` rows at a time.
     """
 
     way = "free_run"
@@ -84,8 +88,9 @@ class FreeRun(Problem):
         every: int = 3,
         windows_s: float | None = None,
         one_in: int = 1,
+        steps: int = 1,
     ) -> None:
-        self.windows_s, self.one_in = windows_s, one_in
+        self.windows_s, self.one_in, self.steps = windows_s, one_in, steps
         self.robot, self.measured, self.evaluator, self.every = robot, tuple(trials), evaluator, every
         columns = [k for k, s in enumerate(robot.sensors) if s.kind == "position"]
         if not columns:
@@ -93,10 +98,12 @@ class FreeRun(Problem):
         self.columns = tuple(columns)
         # What is predicted is the motion: noise of its sensors would count against every model.
         self.setups = [noiseless(apply(robot, t.setup)) for t in trials]
-        self.pieces = [p for k, t in enumerate(trials) for p in pieces(k, t, robot, windows_s, every)]
+        self.pieces = [p for k, t in enumerate(trials) for p in pieces(k, t, robot, windows_s, every, steps)]
         by_unit = noise_by_unit(self.pieces, robot, columns)
         if one_in > 1:
             self.pieces = thinned(self.pieces, one_in)
+        if steps > 1:
+            self.pieces = [p.coarser(steps) for p in self.pieces]
         self.noise = np.array([by_unit[robot.sensors[k].unit] for k in columns])
         """(C,) mean absolute error that noise alone would leave, in the unit of each channel."""
         self._lay_out(BLOCKS if windows_s is None else 1)
@@ -165,7 +172,7 @@ class FreeRun(Problem):
 
     def residuals_of_pieces(self, hypotheses: Sequence[Hypothesis], pieces: Collection[int]) -> Array:
         chosen = sorted(pieces)
-        models = self._models(hypotheses, {self.pieces[i].trial for i in chosen})
+        models = self._models(hypotheses, {self.pieces[i].trial for i in chosen}, self.steps)
         # Rollouts of one length with the same inputs share a batch, so all run as long as the longest.
         steps, switched = max(len(p.log) for p in self.pieces), any(p.enabled is not None for p in self.pieces)
         jobs = [
@@ -207,18 +214,22 @@ class FreeRun(Problem):
         joints = {s.target: n for s, n in zip((self.robot.sensors[k] for k in self.columns), self.noise, strict=True)}
         return np.array([joints.get(m, 0.0) / MEAN_ABSOLUTE for m in self.robot.motor_names])
 
-    def _models(self, hypotheses: Sequence[Hypothesis], trials: Collection[int]) -> dict[int, list[Robot]]:
-        """What is simulated for each hypothesis, by trial; trials in which the robot was held alike share them."""
+    def _models(self, hypotheses: Sequence[Hypothesis], trials: Collection[int], steps: int) -> dict[int, list[Robot]]:
+        """What is simulated for each hypothesis, so many rows at a time, by trial; trials in which the robot was held alike share
+        them."""
         alike: dict[tuple[Hypothesis, bool | None], list[Robot]] = {}
         for k in trials:
             t = self.measured[k]
             how = t.setup, t.commands_held
             if how not in alike:
-                alike[how] = [t.simulated(m) for m in applied(self.setups[k], hypotheses)]
+                models = applied(self.setups[k], hypotheses)
+                if steps > 1:
+                    models = [altered(m, time_step_s=m.time_step_s * steps) for m in models]
+                alike[how] = [t.simulated(m) for m in models]
         return {k: alike[self.measured[k].setup, self.measured[k].commands_held] for k in trials}
 
     def _simulated(self, trial: int, hypothesis: Hypothesis) -> Robot:
-        return self._models([hypothesis], (trial,))[trial][0]
+        return self._models([hypothesis], (trial,), self.steps)[trial][0]
 
     def noise_floor(self) -> tuple[float, str]:
         seldom = any(p.log.filled is not None for p in self.pieces)
@@ -271,8 +282,9 @@ class FreeRun(Problem):
         foretold of another motion depends on which of many equal ones was found. Of long records in fine steps some of them: a
         search simulates them ten thousand times."""
         found = self if self.windows_s is not None else self._in_windows
-        one_in = spared(found.pieces)
-        return found if one_in == 1 else self._by(found.windows_s, one_in)
+        steps = found._steps_enough
+        one_in = spared(found.pieces, steps)
+        return found if one_in == steps == 1 else self._by(found.windows_s, one_in, steps)
 
     def beginning(self, seconds: float) -> Problem:
         """Windows from all over the trials, half as many as the beginning would have: each begins from what was measured, and
@@ -280,7 +292,32 @@ class FreeRun(Problem):
         if self.windows_s is None:
             return self
         one_in = in_turn(self.pieces, max(FEWEST, round(0.5 * seconds / self.windows_s)))
-        return self if one_in == 1 else self._by(self.windows_s, self.one_in * one_in)
+        return self if one_in == 1 else self._by(self.windows_s, self.one_in * one_in, self.steps)
+
+    @cached_property
+    def _steps_enough(self) -> int:
+        """How many rows a search may go at a time: from one that is compared to the next, where that moves what the robot as it
+        is described does by little beside what starts that are off do to it, and every row was read; else one."""
+        count, logs = self.every, [t.log for t in self.measured]
+        exact = any(log.filled is not None or not np.isfinite(log.commands).all() for log in logs)
+        if self.windows_s is None or not self.layout.by_segment or exact or not goes_halfway(self.robot):
+            return 1
+        robot = self.robot
+        windows = [
+            p for k, t in enumerate(self.measured) for p in pieces(k, t, robot, self.windows_s, self.every, count)
+        ]
+        fine = self._foretold(windows, 1)
+        coarse = self._foretold([p.coarser(count) for p in windows], count)
+        off = np.concatenate([(np.abs(a - b) / self.noise).ravel() for a, b in zip(fine, coarse, strict=True)])
+        return count if float(off.mean()) <= SLIGHT * float(self.floor.mean()) else 1
+
+    def _foretold(self, windows: Sequence[Piece], steps: int) -> list[Array]:
+        """(rows, C) what the robot as it is described does in each, so many rows at a time."""
+        models = self._models([()], {p.trial for p in windows}, steps)
+        jobs = [
+            Job(p.rollout(models[p.trial][0], len(p.log), False), ToPositions(self.columns, p.rows)) for p in windows
+        ]
+        return [np.asarray(found) for found in self.evaluator.evaluate(jobs)]
 
     @cached_property
     def _in_windows(self) -> FreeRun:
@@ -292,8 +329,8 @@ class FreeRun(Problem):
         """The same run through."""
         return self if self.windows_s is None else self._by(None)
 
-    def _by(self, windows_s: float | None, one_in: int = 1) -> FreeRun:
-        return FreeRun(self.measured, self.robot, self.evaluator, self.every, windows_s, one_in)
+    def _by(self, windows_s: float | None, one_in: int = 1, steps: int = 1) -> FreeRun:
+        return FreeRun(self.measured, self.robot, self.evaluator, self.every, windows_s, one_in, steps)
 
     @property
     def notes(self) -> list[str]:
@@ -302,7 +339,13 @@ class FreeRun(Problem):
             whole = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)
             lines.append(
                 f"So that the search ends, one in {self.one_in} of the windows is simulated, of {whole:.0f} s in steps of "
-                f"{1e3 * self.robot.time_step_s:g} ms; compare takes all of them."
+                f"{1e3 * self.steps * self.robot.time_step_s:g} ms; compare takes all of them."
+            )
+        if self.steps > 1:
+            step_ms = 1e3 * self.robot.time_step_s
+            lines.append(
+                f"So that the search ends, it goes in steps of {self.steps * step_ms:g} ms, by which the robot as described is "
+                f"off by less than a tenth of the noise floor; compare goes in steps of {step_ms:g} ms."
             )
         return lines
 
@@ -354,6 +397,8 @@ class FreeRun(Problem):
         """Of the first stretch of each trial; of a robot that is led, the whole trial."""
         if self.windows_s is not None and led(self.robot):
             return self._whole.simulated(hypothesis)
+        if self.steps > 1:
+            return self._by(self.windows_s, self.one_in).simulated(hypothesis)
         first = {p.trial: p for p in reversed(self.pieces)}
         jobs = []
         for k, p in sorted(first.items()):
