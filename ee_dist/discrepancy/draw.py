@@ -14,8 +14,8 @@ LEAST, MOST = 0.1, 0.9
 
 def draw(robot: Robot, rng: np.random.Generator) -> tuple[Candidate, Term]:
     """An effect, then a target, then its values; every effect of the catalogue that the robot has room for, and may catch, is as
-    likely as any other."""
-    entries = [e for e in CATALOGUE.values() if e.proposed(robot) and not e.mistake]
+    likely as any other. What is only proposed where commands and positions show it depends on a motion that is not drawn yet."""
+    entries = [e for e in CATALOGUE.values() if e.proposed(robot) and not e.mistake and e.seen_at is None]
     entry = entries[int(rng.integers(len(entries)))]
     targets = entry.proposed(robot)
     chosen = candidate(robot, entry, targets[int(rng.integers(len(targets)))])

@@ -28,6 +28,10 @@ from ee_dist.effects.catalogue import (
 from ee_dist.effects.laws import LawContext, drive_law
 from ee_dist.effects.plugins import load_plugin, loaded_plugins
 
+# isort: split
+# Last: the order of registration is that of the catalogue, and of what is drawn from it.
+from ee_dist.effects import stops  # noqa: F401
+
 __all__ = [
     "CATALOGUE",
     "Effect",

@@ -113,6 +113,9 @@ class Effect:
     seen_in: Callable[[Array], Mapping[str, float]] | None = None
     """Its values as readings (T,) of a sensor show them without a model: a search looks there too, for no slope may lead there.
     Empty where they show none."""
+    seen_at: Callable[[Robot, str, Array, Array], Mapping[str, float]] | None = None
+    """Its values as the commands (T,) and positions (T,) of a joint show them, of all trials and as late as they are; empty where
+    they show none, and there it is not proposed unasked."""
     plainer: str = ""
     """The effect that says most of it with fewer numbers: what a search asks for in its place, once all else is known."""
     mistake: bool = False
@@ -269,6 +272,7 @@ def effect(
     of: type = Robot,
     guesses: Callable[[Robot], tuple[str, ...]] | None = None,
     seen_in: Callable[[Array], Mapping[str, float]] | None = None,
+    seen_at: Callable[[Robot, str, Array, Array], Mapping[str, float]] | None = None,
     plainer: str = "",
     mistake: bool = False,
 ) -> Callable[[Transform], Transform]:
@@ -305,6 +309,7 @@ def effect(
             of,
             guesses,
             seen_in,
+            seen_at,
             plainer,
             mistake,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from statistics import median
 
 from ee_dist.robots import ranges
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
@@ -33,6 +34,8 @@ DELAYED_STEPS, DELAYED_S = 20.0, 0.1
 OF_THE_LAG = 1.25
 """and as a share of the lag with which readings were seen to follow commands, of which the delay is a part. Of several joints the
 least lag counts: what one lags more is as a rule its own sluggishness, and too long a range makes slopes of delays coarse."""
+SLUGGISH_S, WAITS = 0.5, 1.05
+"""Lag of half of the joints from which it is none of their own, but what all of them wait for, and its share."""
 Range = tuple[float, float]
 Ranges = Callable[[Robot, str], Mapping[str, Range]]
 
@@ -54,8 +57,9 @@ def always(**ranges: Range) -> Ranges:
 
 def longest_delay(robot: Robot) -> float:
     """s; of buses and firmware, which do not know how finely somebody simulates."""
-    seen = min((j.lag_s for j in robot.joints if j.lag_s > 0), default=0.0)
-    return max(DELAYED_STEPS * robot.time_step_s, DELAYED_S, OF_THE_LAG * seen)
+    lags = [j.lag_s for j in robot.joints if j.lag_s > 0] or [0.0]
+    waits = WAITS * median(lags) if median(lags) > SLUGGISH_S else 0.0
+    return max(DELAYED_STEPS * robot.time_step_s, DELAYED_S, OF_THE_LAG * min(lags), waits)
 
 
 def travel(robot: Robot, joint: str) -> float:

@@ -8,7 +8,10 @@ import numpy as np
 
 from ee_dist.trials.log import Array
 
-LONGEST_LAG_S = 0.5
+LONGEST_LAG_S, LONGER_LAG_S = 0.5, 2.0
+AT_THE_END = 0.9
+"""Share of the longest lag from which the best is looked for farther on: at the end of what was tried it is none. Whoever leads
+an arm by another one, or over a network, waits for a second."""
 MOST_ROWS = 20_000
 AS_GOOD = 0.02
 """Correlations this close to the best fit as well as it does."""
@@ -113,13 +116,23 @@ def derivative(position: Array, speed: Array, step_s: float) -> Relation:
 
 
 def lead(a: Array, b: Array, step_s: float) -> Lead:
-    """By how much ``a`` (T, J) runs ahead of ``b`` (T, J), over shifts of half a second either way. Of shifts that fit alike the
-    one that turns the fewest signs is taken, then the shortest. Joints that hardly move do not count."""
-    most = min(round(LONGEST_LAG_S / step_s), len(a) // 3)
+    """By how much ``a`` (T, J) runs ahead of ``b`` (T, J), over shifts of half a second either way, or two where the best is at
+    the end of these and another is better. Of shifts that fit alike the one that turns the fewest signs is taken, then the
+    shortest. Joints that hardly move do not count."""
     columns = lively(a, b)
-    if not columns or most < 1:
+    near, far = (min(round(longest / step_s), len(a) // 3) for longest in (LONGEST_LAG_S, LONGER_LAG_S))
+    if not columns or near < 1:
         return Lead(0.0, 0.0, 0.0)
-    x, y = a[:, columns], b[:, columns]
+    found = _lead(a[:, columns], b[:, columns], step_s, near)
+    if abs(found.lead_s) < AT_THE_END * near * step_s or far == near:
+        return found
+    other = _lead(a[:, columns], b[:, columns], step_s, far)
+    at_end = abs(other.lead_s) >= AT_THE_END * far * step_s
+    return found if at_end or abs(other.correlation) <= abs(found.correlation) + AS_GOOD else other
+
+
+def _lead(x: Array, y: Array, step_s: float, most: int) -> Lead:
+    """The same of joints that move (T, J), over so many rows either way."""
     stride = max(1, most // 100)
     shifts = sorted({*range(-most, most + 1, stride), 0})
     fits = np.stack([_shifted(x, y, k) for k in shifts])
@@ -129,7 +142,7 @@ def lead(a: Array, b: Array, step_s: float) -> Lead:
     p, q = (x[: len(x) - k], y[k:]) if k >= 0 else (x[-k:], y[:k])
     # A joint mounted the other way round must not take away from what the others say.
     size, against = float(np.abs(fits[best]).mean()), int((fits[best] < 0).sum())
-    sign = -1.0 if 2 * against > len(columns) else 1.0
+    sign = -1.0 if 2 * against > x.shape[1] else 1.0
     return Lead(k * step_s, sign * size, relation(p, q).slope, len(peaks) > 1)
 
 

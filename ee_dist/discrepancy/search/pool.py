@@ -17,7 +17,9 @@ def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] =
     found = candidates(problem.robot, without, only or None, problem.families)
     told = (c for c in found if c.size or problem.switches or c.effect.mistake)
     able = (c for c in told if problem.shows(c.effect.name, c.target))
-    judged = (as_long(problem, c) for c in (_judged(problem, c) for c in able) if c is not None)
+    named = {name.partition("@")[0] for name in only}
+    seen = (c if c.effect.seen_at is None else _seen_at(problem, c, c.effect.name in named) for c in able)
+    judged = (as_long(problem, c) for c in (_judged(problem, c) for c in seen if c is not None) if c is not None)
     # Several groups may be one where joints that nothing is known of are left out.
     return list({c.name: _hinted(problem, c) for c in judged}.values())
 
@@ -44,6 +46,26 @@ def _judged(problem: Problem, c: Candidate) -> Candidate | None:
     if len(judged) < 2:
         return None
     return replace(candidate(problem.robot, c.effect, JOIN.join(judged)), guess=c.guess)
+
+
+def _seen_at(problem: Problem, c: Candidate, named: bool) -> Candidate | None:
+    """The candidate with what commands and positions of its joint show of its values; None where they show nothing, unless it was
+    asked for by name."""
+    robot = problem.robot
+    k, told, at = robot.motor_names.index(c.target), [], []
+    for log in (t.log for t in problem.measured):
+        if log.joints is None or len(log) < 2:
+            continue
+        late = round(robot.joint(c.target).lag_s / float(log.times_s[1] - log.times_s[0]))
+        told.append(log.commands[: len(log) - late, k])
+        at.append(log.joints[late:, k])
+    assert c.effect.seen_at is not None
+    both = np.concatenate(told or [np.zeros(0)]), np.concatenate(at or [np.zeros(0)])
+    known = np.isfinite(both[0]) & np.isfinite(both[1])
+    values = c.effect.seen_at(robot, c.target, both[0][known], both[1][known])
+    if values:
+        return replace(c, hint=tuple(c.shares(values).tolist()))
+    return c if named else None
 
 
 def _hinted(problem: Problem, c: Candidate) -> Candidate:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.measurements import signals
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
@@ -132,6 +133,7 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
     ahead = v.lead(b, v.position.block)
     entries, why, sure = [], "in the unit of the positions", v.units.sure
     turned: list[str] = []
+    short: dict[str, float] = {}
     still = [] if values is None else _standing_still(v, values)
     shift = round(ahead.lead_s / v.step(v.position.block))
     for k, base in enumerate(v.units.entries):
@@ -149,8 +151,7 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
                 unit = str(base["unit"])
                 seen = by_ratio(r.slope, allowed, unit) if "scale" not in base else unit
                 if seen is None and by_ratio(r.slope, allowed[:2], unit, LOOSE) == unit:
-                    seen, why = unit, f"in the unit of the positions, which go {1 / abs(r.slope):.2g} of the way"
-                    sure = LIKELY
+                    seen, short[v.joints[k].name], sure = unit, 1 / abs(r.slope), LIKELY
                 if seen is None or (stated and stated != seen):
                     said = f", though its name says {stated}" if stated else ""
                     return UnitChoice((), UNKNOWN, f"{r.slope:.3g} times the positions{said}")
@@ -162,6 +163,10 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
         elif stated:
             entry = {"unit": stated}
         entries.append(entry)
+    if short:
+        where = "" if len(short) == len(v.units.entries) else f" at {listed(short)}"
+        share = " to ".join(dict.fromkeys(f"{s:.2g}" for s in (min(short.values()), max(short.values()))))
+        why += f", which go {share} of the way{where}"
     if still:
         _as_the_others(v, entries, [k for k in still if not (b.units and b.units[k])])
         why += f"; {', '.join(v.joints[k].name for k in still)} does not follow, and shows no unit"
