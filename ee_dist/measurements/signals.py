@@ -12,6 +12,8 @@ LONGEST_LAG_S, LONGER_LAG_S = 0.5, 2.0
 AT_THE_END = 0.9
 """Share of the longest lag from which the best is looked for farther on: at the end of what was tried it is none. Whoever leads
 an arm by another one, or over a network, waits for a second."""
+BETTER = 0.5
+"""Share of what the correlation lacks that it may lack there: a slow motion goes with itself nearly as well a little later."""
 MOST_ROWS = 20_000
 AS_GOOD = 0.02
 """Correlations this close to the best fit as well as it does."""
@@ -128,7 +130,8 @@ def lead(a: Array, b: Array, step_s: float) -> Lead:
         return found
     other = _lead(a[:, columns], b[:, columns], step_s, far)
     at_end = abs(other.lead_s) >= AT_THE_END * far * step_s
-    return found if at_end or abs(other.correlation) <= abs(found.correlation) + AS_GOOD else other
+    better = 1.0 - abs(other.correlation) <= BETTER * (1.0 - abs(found.correlation))
+    return other if better and not at_end else found
 
 
 def _lead(x: Array, y: Array, step_s: float, most: int) -> Lead:

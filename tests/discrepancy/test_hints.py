@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from way_samples import Sample, measure, problem_by
 
+from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate
@@ -87,3 +88,43 @@ def test_what_a_user_s_own_reading_gets_wrong_is_said(seen_in: Callable[[Array],
 
 def test_a_sensor_with_many_steps_gives_no_hint() -> None:
     assert all(c.hint == () for c in steps_of(problem_of(())).values())
+
+
+def stops_of(problem: Problem, *only: str) -> dict[str, Candidate]:
+    return {c.effect.name: c for c in pool_of(problem, (), only) if c.effect.name.endswith("_stop")}
+
+
+@pytest.mark.parametrize(("name", "side"), [("upper_stop", 1.0), ("lower_stop", -1.0)])
+def test_a_stop_on_one_side_is_seen_where_commands_go_beyond_it_and_is_found(name: str, side: float) -> None:
+    joint = servo_pendulum().joint("servo")
+    at = 0.25 * side
+    nearer = joint.upper - at if side > 0 else at - joint.lower
+    hidden = (term(name, "servo", nearer_rad=nearer),)
+    problem = problem_of(hidden)
+    (seen,) = stops_of(problem).values()
+    assert seen.effect.name == name, "nothing ends on the other side"
+    assert seen.values(np.array(seen.hint))["nearer_rad"] == pytest.approx(nearer, abs=0.02)
+    rivals = (
+        "command_gain",
+        "position_gain",
+        "zero_offset",
+        "deadband",
+        "sensor_failing",
+        "sensor_stuck",
+        "motor_weak",
+    )
+    found = explain(problem, [c for c in pool_of(problem) if c.effect.name in (name, *rivals)])
+    assert found.best is not None and found.best.name == f"{name}@servo"
+    assert dict(found.best.terms[0].values)["nearer_rad"] == pytest.approx(nearer, abs=0.01)
+
+
+def test_where_no_joint_ends_no_stop_is_proposed_but_to_who_asks() -> None:
+    in_order, weak = problem_of(()), problem_of((term("motor_weak", "servo", loss=0.5),))
+    assert stops_of(in_order) == {} and stops_of(weak) == {}, "a soft motor comes back before its command does"
+    assert {c.hint for c in stops_of(in_order, "upper_stop").values()} == {()}
+    torques = CATALOGUE["upper_stop"].seen_at
+    assert torques is not None
+    robot = in_order.robot
+    loose = replace(robot, drives=tuple(replace(d, command="torque") for d in robot.drives))
+    told, at = np.linspace(-1.0, 1.0, 100), np.minimum(np.linspace(-1.0, 1.0, 100), 0.2)
+    assert torques(robot, "servo", told, at) and not torques(loose, "servo", told, at), "a torque is no place"

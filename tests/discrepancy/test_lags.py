@@ -11,6 +11,7 @@ from ee_dist.discrepancy.lags import with_lags
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.scales import longest_delay
+from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import SensorLog
 
@@ -68,3 +69,13 @@ def test_a_motor_that_is_mounted_the_other_way_round_lags_too():
 def test_what_one_joint_lags_more_is_its_own():
     arm = replace(ROBOT, joints=tuple(replace(j, name=n, lag_s=lag) for j in ROBOT.joints[:1] for n, lag in LAGS))
     assert longest_delay(arm) == pytest.approx(1.25 * 0.12)
+
+
+def test_what_most_joints_wait_for_is_no_sluggishness_of_theirs() -> None:
+    """Of an arm that is led over a network one joint seems to be early."""
+    arm = quadruped()
+    lags = [0.69, *(0.9 for _ in arm.joints[1:])]
+    waiting = replace(arm, joints=tuple(replace(j, lag_s=s) for j, s in zip(arm.joints, lags, strict=True)))
+    assert longest_delay(waiting) == pytest.approx(1.05 * 0.9)
+    quick = replace(arm, joints=tuple(replace(j, lag_s=s / 3) for j, s in zip(arm.joints, lags, strict=True)))
+    assert longest_delay(quick) == pytest.approx(1.25 * 0.23)

@@ -263,6 +263,21 @@ def test_elastic_transmission_swings_with_the_stiffness_of_motor_and_shaft_in_se
     assert period == pytest.approx(2 * math.pi * math.sqrt(MASS_KG * (1 / 400.0 + 0.01)), rel=0.01)
 
 
+def test_upper_stop_ends_a_joint_before_the_end_that_is_described(bench: Bench) -> None:
+    robot, stop = slider(kp=400.0, kd=60.0, torque_limit=100.0), term("upper_stop", "joint", nearer_rad=0.7)
+    end = robot.joint("joint").upper - 0.7
+    assert settled(bench, robot, stop, command=end + 0.2) == pytest.approx(end, abs=1e-3)
+    for free in (end - 0.2, robot.joint("joint").lower + 0.1):
+        assert settled(bench, robot, stop, command=free) == pytest.approx(free, abs=1e-3)
+
+
+def test_lower_stop_ends_a_joint_before_the_end_that_is_described(bench: Bench) -> None:
+    robot, stop = slider(kp=400.0, kd=60.0, torque_limit=100.0), term("lower_stop", "joint", nearer_rad=0.7)
+    end = robot.joint("joint").lower + 0.7
+    assert settled(bench, robot, stop, command=end - 0.2) == pytest.approx(end, abs=1e-3)
+    assert settled(bench, robot, stop, command=end + 0.3) == pytest.approx(end + 0.3, abs=1e-3)
+
+
 def test_parallel_spring_swings_about_its_rest_with_its_own_period(bench: Bench) -> None:
     spring = term("parallel_spring", "joint", stiffness_nm_rad=50.0, rest_rad=0.2)
     position = bench.run(slider(), spring, steps=4000, position=0.3).channel("position")

@@ -31,6 +31,23 @@ def test_a_motion_that_does_not_repeat_itself_has_one_lead() -> None:
     assert (round(found.lead_s, 2), found.correlation < -0.99, found.repeats) == (0.05, True, False)
 
 
+@pytest.mark.parametrize(("late_s", "found_s"), [(0.9, 0.9), (0.3, 0.3), (-0.7, -0.7), (2.6, None)])
+def test_who_is_led_over_a_network_is_a_second_late(late_s: float, found_s: float | None) -> None:
+    """At the end of what is tried the best is none: farther on there may be a better one, or there is none."""
+    step = 1 / 30
+    t = np.arange(0.0, 30.0, step)
+    rng = np.random.default_rng(0)
+    knots = np.arange(-5.0, 36.0, 1.5)
+    course = np.stack([np.interp(t, knots, np.cumsum(rng.standard_normal(len(knots)))) for _ in range(3)], axis=1)
+    late = np.stack([np.interp(t - late_s, t, c) for c in course.T], axis=1)
+    found = lead(course, late, step)
+    if found_s is None:
+        assert abs(found.lead_s) <= 0.5, "of a lag that is not found no farther one is made up"
+        return
+    assert found.lead_s == pytest.approx(found_s, abs=step)
+    assert found.correlation > 0.98 and found.slope == pytest.approx(1.0, abs=0.05)
+
+
 def test_commands_of_a_single_sine_are_likely_and_as_they_stand(tmp_path: Path) -> None:
     sine = lambda t: np.sin(8.8 * t)[:, None] * [0.4, 0.3]  # noqa: E731
     file = logs.written(tmp_path, logs.frame_of(T, sine(T - 0.035), sine(T)))
