@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -23,6 +24,21 @@ from ee_dist.trials.log import Array, SensorLog, State
 MOST_STEPS, FEWEST = 60_000, 6
 """Steps that a search simulates for each model at most, of windows that start anew; but so many windows of each trial."""
 GOLDEN = (math.sqrt(5) - 1) / 2
+
+
+@dataclass(frozen=True)
+class ToPositions:
+    """The reduction that keeps some rows of some channels, (rows, C)."""
+
+    columns: tuple[int, ...]
+    rows: range | tuple[int, ...]
+
+    @property
+    def key(self) -> str:
+        return f"positions:{self.columns}:{hashlib.sha256(repr(self.rows).encode()).hexdigest()}"
+
+    def __call__(self, log: SensorLog) -> Array:
+        return log.sensors[np.ix_(self.rows, self.columns)]
 
 
 @dataclass(frozen=True, eq=False)

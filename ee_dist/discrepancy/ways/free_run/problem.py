@@ -12,10 +12,9 @@ Joints that turn and joints that slide have nothing in common but their noise: e
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -25,30 +24,14 @@ from ee_dist.basics.altered import altered
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, error, joints_of
 from ee_dist.discrepancy.starting import speeds_off
+from ee_dist.discrepancy.ways.free_run.longer_steps import SLIGHT, every_row_is_known, moved_by
 from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
-from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, Piece, in_turn, pieces, spared, thinned
+from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, ToPositions, in_turn, pieces, spared, thinned
 from ee_dist.effects.catalogue import Hypothesis, applied, apply
-from ee_dist.engines.halfway import goes_halfway
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
-
-
-@dataclass(frozen=True)
-class ToPositions:
-    """The reduction that keeps some rows of some channels, (rows, C)."""
-
-    columns: tuple[int, ...]
-    rows: range | tuple[int, ...]
-
-    @property
-    def key(self) -> str:
-        return f"positions:{self.columns}:{hashlib.sha256(repr(self.rows).encode()).hexdigest()}"
-
-    def __call__(self, log: SensorLog) -> Array:
-        return log.sensors[np.ix_(self.rows, self.columns)]
-
 
 RESTART_S = 0.5
 """Length of windows that start anew from the measured state."""
@@ -60,8 +43,6 @@ HARDLY_BETTER = 0.8
 MOVES = "Is there more in the record than rest, and is friction no more than what moved the joints?"
 AT_NOISE = 1.3
 """Times the noise floor up to which a model is right, be it of a robot at rest."""
-SLIGHT = 0.1
-"""Share of the noise floor by which longer steps may move what is foretold, for a search to go in them."""
 BLOCKS = 6
 """Segments that a record run through in one go is cut into."""
 
@@ -296,28 +277,18 @@ class FreeRun(Problem):
 
     @cached_property
     def _steps_enough(self) -> int:
-        """How many rows a search may go at a time: from one that is compared to the next, where that moves what the robot as it
-        is described does by little beside what starts that are off do to it, and every row was read; else one."""
-        count, logs = self.every, [t.log for t in self.measured]
-        exact = any(log.filled is not None or not np.isfinite(log.commands).all() for log in logs)
-        if self.windows_s is None or not self.layout.by_segment or exact or not goes_halfway(self.robot):
+        """How many rows a search may go at a time."""
+        if self.windows_s is None or not self.layout.by_segment or not every_row_is_known(self.measured, self.robot):
             return 1
-        robot = self.robot
-        windows = [
-            p for k, t in enumerate(self.measured) for p in pieces(k, t, robot, self.windows_s, self.every, count)
-        ]
-        fine = self._foretold(windows, 1)
-        coarse = self._foretold([p.coarser(count) for p in windows], count)
-        off = np.concatenate([(np.abs(a - b) / self.noise).ravel() for a, b in zip(fine, coarse, strict=True)])
-        return count if float(off.mean()) <= SLIGHT * float(self.floor.mean()) else 1
+        count, trials = self.every, list(enumerate(self.measured))
+        windows = [p for k, t in trials for p in pieces(k, t, self.robot, self.windows_s, count, count)]
+        off = moved_by(windows, count, self._as_described, self.columns, self.evaluator)
+        return count if float(np.mean(off / self.noise)) <= SLIGHT * float(self.floor.mean()) else 1
 
-    def _foretold(self, windows: Sequence[Piece], steps: int) -> list[Array]:
-        """(rows, C) what the robot as it is described does in each, so many rows at a time."""
-        models = self._models([()], {p.trial for p in windows}, steps)
-        jobs = [
-            Job(p.rollout(models[p.trial][0], len(p.log), False), ToPositions(self.columns, p.rows)) for p in windows
-        ]
-        return [np.asarray(found) for found in self.evaluator.evaluate(jobs)]
+    def _as_described(self, steps: int) -> list[Robot]:
+        """The robot of each trial that is simulated so many rows at a time."""
+        models = self._models([()], range(len(self.measured)), steps)
+        return [models[k][0] for k in sorted(models)]
 
     @cached_property
     def _in_windows(self) -> FreeRun:
