@@ -122,7 +122,8 @@ def improve(
                     seen.setdefault(j.name, (j.proposal.parts[0], j.own))
             special = {c.name for c in current.parts[own:] if stands_out(problem.robot, c)}
             ready = anew < OFTEN and special != beside and bool(special) if spread else len(current.parts) != looked
-            if ready and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
+            plain = best is not None and _seen_by_itself(best)
+            if ready and not plain and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
                 at_once, some = search.doing(AT_ONCE), looked_for_at_once(problem, pool)
                 found = everywhere(
@@ -201,6 +202,12 @@ def _offered(robot: Robot, pool: Sequence[Candidate], current: Current, ladder: 
     take turns to the end."""
     dropped = Counter(name for rung in ladder for name in rung.dropped)
     return [c for c in not_said(robot, current.parts, pool) if dropped[c.name] < RETURNS]
+
+
+def _seen_by_itself(best: Judged) -> bool:
+    """Whether commands and positions show it without a model: a stop is none of the small things that are wrong everywhere, which
+    would stand in for it (a command gain of a half, in the place of a joint that ends there)."""
+    return any(c.effect.seen_at is not None and c.hint for c in best.proposal.parts)
 
 
 def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:

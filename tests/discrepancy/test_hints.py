@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from way_samples import Sample, measure, problem_by
 
 from ee_dist.discrepancy.explain import explain
+from ee_dist.discrepancy.improve import EXPLAINED, _seen_by_itself, improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.search.candidates import Candidate
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import pool_of
@@ -128,3 +130,26 @@ def test_where_no_joint_ends_no_stop_is_proposed_but_to_who_asks() -> None:
     loose = replace(robot, drives=tuple(replace(d, command="torque") for d in robot.drives))
     told, at = np.linspace(-1.0, 1.0, 100), np.minimum(np.linspace(-1.0, 1.0, 100), 0.2)
     assert torques(robot, "servo", told, at) and not torques(loose, "servo", told, at), "a torque is no place"
+
+
+@pytest.mark.parametrize("hinted", [True, False])
+def test_a_stop_that_is_seen_goes_before_what_is_a_little_wrong_everywhere(hinted: bool) -> None:
+    stop = replace(candidate(servo_pendulum(), "upper_stop", "servo"), hint=(0.5,) if hinted else ())
+    friction = candidate(servo_pendulum(), "coulomb_friction", "servo")
+    found = [SimpleNamespace(proposal=Proposal(parts)) for parts in ((stop,), (friction, stop), (friction,))]
+    assert [_seen_by_itself(f) for f in found] == [hinted, hinted, False]  # type: ignore[arg-type]
+
+
+def test_improve_finds_a_stop_and_friction_beside_it() -> None:
+    joint = servo_pendulum().joint("servo")
+    hidden = (
+        term("upper_stop", "servo", nearer_rad=joint.upper - 0.25),
+        term("coulomb_friction", "servo", torque_nm=0.2),
+    )
+    problem = problem_of(hidden)
+    names = ("upper_stop", "coulomb_friction", "command_gain", "position_gain", "zero_offset", "viscous_friction")
+    found = improve(problem, [c for c in pool_of(problem) if c.effect.name in names])
+    told = {t.effect: dict(t.values) for t in found.terms}
+    assert set(told) == {"upper_stop", "coulomb_friction"} and found.verdict == EXPLAINED
+    assert joint.upper - told["upper_stop"]["nearer_rad"] == pytest.approx(0.25, abs=0.01)
+    assert told["coulomb_friction"]["torque_nm"] == pytest.approx(0.2, rel=0.05)
