@@ -22,9 +22,14 @@ AT_END = 0.02
 SIDES = {"upper": 1.0, "lower": -1.0}
 
 
-def _ranges(robot: Robot, target: str) -> dict[str, Range]:
+def _room(robot: Robot, target: str, side: str) -> float:
+    """From where a joint begins to its end on one side: a stop before that would throw it."""
     joint = robot.joint(target)
-    return {"nearer_rad": (0.0, joint.upper - joint.lower)}
+    return max(joint.upper - joint.start, 0.0) if side == "upper" else max(joint.start - joint.lower, 0.0)
+
+
+def _with_room(robot: Robot, side: str) -> tuple[str, ...]:
+    return tuple(t for t in stopped_joints(robot) if _room(robot, t, side) > 0)
 
 
 def _seen(robot: Robot, target: str, told: Array, at: Array, side: str) -> Mapping[str, float]:
@@ -42,15 +47,32 @@ def _seen(robot: Robot, target: str, told: Array, at: Array, side: str) -> Mappi
     if np.mean(there > top - NEAR * span) < MOSTLY:
         return {}
     # One reading beyond it is no stop: where they pile up is.
-    return {"nearer_rad": end - float(np.median(there[there > top - NEAR * span]))}
+    nearer = end - float(np.median(there[there > top - NEAR * span]))
+    return {"nearer_rad": nearer} if nearer <= _room(robot, target, side) else {}
 
 
-def _upper(robot: Robot, target: str, told: Array, at: Array) -> Mapping[str, float]:
+def _upper_seen(robot: Robot, target: str, told: Array, at: Array) -> Mapping[str, float]:
     return _seen(robot, target, told, at, "upper")
 
 
-def _lower(robot: Robot, target: str, told: Array, at: Array) -> Mapping[str, float]:
+def _upper_targets(robot: Robot) -> tuple[str, ...]:
+    return _with_room(robot, "upper")
+
+
+def _upper_ranges(robot: Robot, target: str) -> dict[str, Range]:
+    return {"nearer_rad": (0.0, _room(robot, target, "upper"))}
+
+
+def _lower_seen(robot: Robot, target: str, told: Array, at: Array) -> Mapping[str, float]:
     return _seen(robot, target, told, at, "lower")
+
+
+def _lower_targets(robot: Robot) -> tuple[str, ...]:
+    return _with_room(robot, "lower")
+
+
+def _lower_ranges(robot: Robot, target: str) -> dict[str, Range]:
+    return {"nearer_rad": (0.0, _room(robot, target, "lower"))}
 
 
 PARAMETERS = (
@@ -71,28 +93,28 @@ SIGNATURE = (
 @effect(
     "upper_stop",
     family="body",
-    targets=stopped_joints,
+    targets=_upper_targets,
     parameters=PARAMETERS,
     physics=PHYSICS.format(side="upper"),
     signature=SIGNATURE,
-    ranges=_ranges,
-    seen_at=_upper,
+    ranges=_upper_ranges,
+    seen_at=_upper_seen,
 )
 def upper_stop(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    joint = robot.joint(target)
-    return robot.with_joint(target, upper=max(joint.upper - values["nearer_rad"], joint.lower))
+    nearer = min(values["nearer_rad"], _room(robot, target, "upper"))
+    return robot.with_joint(target, upper=robot.joint(target).upper - nearer)
 
 
 @effect(
     "lower_stop",
     family="body",
-    targets=stopped_joints,
+    targets=_lower_targets,
     parameters=PARAMETERS,
     physics=PHYSICS.format(side="lower"),
     signature=SIGNATURE,
-    ranges=_ranges,
-    seen_at=_lower,
+    ranges=_lower_ranges,
+    seen_at=_lower_seen,
 )
 def lower_stop(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    joint = robot.joint(target)
-    return robot.with_joint(target, lower=min(joint.lower + values["nearer_rad"], joint.upper))
+    nearer = min(values["nearer_rad"], _room(robot, target, "lower"))
+    return robot.with_joint(target, lower=robot.joint(target).lower + nearer)
