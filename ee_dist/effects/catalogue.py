@@ -16,6 +16,7 @@ import sys
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from numbers import Real
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -194,12 +195,17 @@ class Effect:
     def shown_in(self, readings: Array) -> dict[str, float]:
         """Its values by parameter, as readings (T,) of a sensor show them by themselves; empty where they show none. Raises
         EffectError where a user's own ``seen_in`` fails, or gives what is none of them."""
-        if self.seen_in is None:
-            return {}
+        return {} if self.seen_in is None else self._shown("seen_in", partial(self.seen_in, readings))
+
+    def shown_at(self, robot: Robot, joint: str, told: Array, at: Array) -> dict[str, float]:
+        """The same, as commands (T,) and positions (T,) of a joint show them (``seen_at``)."""
+        return {} if self.seen_at is None else self._shown("seen_at", partial(self.seen_at, robot, joint, told, at))
+
+    def _shown(self, called: str, look: Callable[[], Mapping[str, float]]) -> dict[str, float]:
         try:
-            found = dict(self.seen_in(readings))
+            found = dict(look())
         except (Exception, SystemExit) as error:
-            raise EffectError(f"{self.name}: its seen_in failed: {type(error).__name__}: {error}") from error
+            raise EffectError(f"{self.name}: its {called} failed: {type(error).__name__}: {error}") from error
         return dict(term(self.name, "", **found).values) if found else {}
 
     def unit(self, parameter: str, robot: Robot, target: str) -> str:

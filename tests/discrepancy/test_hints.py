@@ -86,6 +86,9 @@ def test_what_a_user_s_own_reading_gets_wrong_is_said(seen_in: Callable[[Array],
     own = replace(CATALOGUE["sensor_quantisation"], seen_in=seen_in)
     with pytest.raises(EffectError, match=said):
         own.shown_in(np.zeros(5))
+    other = replace(CATALOGUE["upper_stop"], seen_at=lambda *_: seen_in(np.zeros(5)))
+    with pytest.raises(EffectError, match=said.replace("seen_in", "seen_at")):
+        other.shown_at(servo_pendulum(), "servo", np.zeros(5), np.zeros(5))
 
 
 def test_a_sensor_with_many_steps_gives_no_hint() -> None:

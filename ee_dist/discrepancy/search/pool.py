@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -59,11 +59,10 @@ def _seen_at(problem: Problem, c: Candidate, named: bool) -> Candidate | None:
         late = round(robot.joint(c.target).lag_s / float(log.times_s[1] - log.times_s[0]))
         told.append(log.commands[: len(log) - late, k])
         at.append(log.joints[late:, k])
-    assert c.effect.seen_at is not None
     both = np.concatenate(told or [np.zeros(0)]), np.concatenate(at or [np.zeros(0)])
     known = np.isfinite(both[0]) & np.isfinite(both[1])
-    values = c.effect.seen_at(robot, c.target, both[0][known], both[1][known])
-    if values:
+    values = c.effect.shown_at(robot, c.target, both[0][known], both[1][known])
+    if values and _within(c, values):
         return replace(c, hint=tuple(c.shares(values).tolist()))
     return c if named else None
 
@@ -75,8 +74,12 @@ def _hinted(problem: Problem, c: Candidate) -> Candidate:
     at = problem.robot.sensor_names.index(c.target)
     read = [log.sensors[log.readings, at] for log in (t.log for t in problem.measured)]
     values = c.effect.shown_in(np.concatenate(read)) if read else {}
-    if not values or not all(
-        low <= values[p.name] <= high for p, (low, high) in zip(c.effect.parameters, c.bounds, strict=True)
-    ):
+    if not values or not _within(c, values):
         return c
     return replace(c, hint=tuple(c.shares(values).tolist()))
+
+
+def _within(c: Candidate, values: Mapping[str, float]) -> bool:
+    """Whether values are among those worth trying."""
+    ends = zip(c.effect.parameters, c.bounds, strict=True)
+    return all(low <= values[p.name] <= high for p, (low, high) in ends)
