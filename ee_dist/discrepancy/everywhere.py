@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.assumed import beside, puts_right
-from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, held_by_slopes, travelling, windows
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, held_by_slopes, travelling
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge
 from ee_dist.discrepancy.evidence.rule import least_energy
 from ee_dist.discrepancy.examine import FAR, Current
@@ -65,11 +65,6 @@ class Everywhere:
     current: Current
     rungs: list[Rung]
     held: float
-
-
-def held_out_by(problem: Problem) -> list[Cut]:
-    """What is held out: motions and settings, or, of a single motion, windows."""
-    return travelling(problem) or [windows(problem)]
 
 
 def looked_for_at_once(problem: Problem, pool: Sequence[Candidate]) -> list[Candidate]:

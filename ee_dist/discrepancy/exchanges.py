@@ -7,7 +7,7 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, travelling, windows
+from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, held_out_by
 from ee_dist.discrepancy.evidence.judge import surely_better
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.instead import Instead, instead_of
@@ -28,7 +28,7 @@ LOOKED_AT = 2
 
 def strictest(problem: Problem) -> Cut:
     """The strictest way of holding out that there is."""
-    return next(iter(travelling(problem)), windows(problem))
+    return held_out_by(problem)[0]
 
 
 def refitted(

@@ -14,8 +14,17 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
-from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, held_out_by, looked_for_at_once, stands_out
-from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, cross_fit, prior_of, travelling, windows
+from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, looked_for_at_once, stands_out
+from ee_dist.discrepancy.evidence.holdout import (
+    PRIOR,
+    Cut,
+    HeldOut,
+    cross_fit,
+    held_out_by,
+    prior_of,
+    travelling,
+    windows,
+)
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise, settled

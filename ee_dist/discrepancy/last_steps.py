@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from ee_dist.discrepancy.everywhere import AT_ONCE, Everywhere, everywhere, held_out_by, looked_for_at_once, stands_out
-from ee_dist.discrepancy.evidence.holdout import cross_fit, travelling
+from ee_dist.discrepancy.everywhere import AT_ONCE, Everywhere, everywhere, looked_for_at_once, stands_out
+from ee_dist.discrepancy.evidence.holdout import cross_fit, held_out_by, travelling
 from ee_dist.discrepancy.evidence.left import leftovers, settled
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.exchanges import nearest, refitted, strictest

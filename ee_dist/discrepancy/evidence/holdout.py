@@ -126,6 +126,11 @@ def travelling(problem: Problem) -> list[Cut]:
     return cuts
 
 
+def held_out_by(problem: Problem) -> list[Cut]:
+    """What is held out: motions and settings, or, of a single motion, windows."""
+    return travelling(problem) or [windows(problem)]
+
+
 def joint_by_joint(problem: Problem, kinds: Sequence[int] | None = None) -> bool:
     """Whether most joints that move do so in a single motion (of the numbers ``kinds``, by trial) each, or each way in a single
     one: what a joint is like there is then told by none of the others, and with its motion held out nothing says anything of
