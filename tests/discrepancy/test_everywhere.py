@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from way_samples import measured, problem_by, samples
 
-from ee_dist.discrepancy.everywhere import _Kept, _Look, everywhere
+from ee_dist.discrepancy.everywhere import _Kept, _Look, everywhere, looked_for_at_once
 from ee_dist.discrepancy.evidence.holdout import travelling, windows
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.improve import improve
@@ -13,6 +16,7 @@ from ee_dist.discrepancy.problem import Layout, Problem, error
 from ee_dist.discrepancy.pruning import pruned
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
 from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.pool import pool_of as candidates_of
 from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
@@ -246,3 +250,21 @@ def test_what_was_worth_its_place_before_is_let_loose_again(robot, monkeypatch):
     assert "load_friction" in names(found)
     without = everywhere(search, Current(), 0, pool, cuts)
     assert without is None or "load_friction" not in names(without)
+
+
+def test_of_a_single_motion_what_driven_joints_have_is_fitted_at_once_and_nothing_else():
+    problems = [problem_by("force_balance", measured("arm")[:n], samples()["arm"].robot) for n in (1, 2)]
+    one, two = (
+        {c.effect.name for c in looked_for_at_once(p, candidates_of(p)) if c.effect.everywhere} for p in problems
+    )
+    assert one == {"coulomb_friction", "viscous_friction", "rotor_inertia"}
+    assert one < two and {"part_mass", "mounting_tilt"} <= two
+    # What stands out by itself is tried beside them either way.
+    assert "backdrive_friction" in {c.effect.name for c in looked_for_at_once(problems[0], candidates_of(problems[0]))}
+
+
+def test_a_passive_joint_is_not_among_what_drives_have():
+    robot = samples()["arm"].robot.map_drive("elbow", lambda d: replace(d, command="none", kp=0.0, kd=0.0))
+    single = problem_by("force_balance", measured("arm")[:1], robot)
+    pool = [candidate(robot, "viscous_friction", "elbow"), candidate(robot, "viscous_friction", "shoulder")]
+    assert [c.target for c in looked_for_at_once(single, pool)] == ["shoulder"]
