@@ -111,6 +111,8 @@ class Mapping:
     """Gains of drives (kp, kd) that a file states and the robot's description only assumes, by joint or for all_joints."""
     reading: Options = Options()
     tables: Dictionary[str, Clock] = field(default_factory=dict)
+    side_by_side: Dictionary[str, str] = field(default_factory=dict)
+    """Names of the files that are one table, row by row, by what goes before the names of their columns, with {trial}."""
     split: Split | None = None
     rate_hz: float | None = None
     trial: str | None = None

@@ -27,8 +27,8 @@ UNKNOWN = "???"
 
 
 _KEYS = (
-    "robot", "format", "records", "separator", "header", "decimal", "tables", "split", "time", "rate_hz", "sensors",
-    "commands", "torques", "external", "supply", "enabled", "settings", "gains", "trial",
+    "robot", "format", "records", "separator", "header", "decimal", "tables", "side_by_side", "split", "time", "rate_hz",
+    "sensors", "commands", "torques", "external", "supply", "enabled", "settings", "gains", "trial",
 )  # fmt: skip
 
 
@@ -86,6 +86,7 @@ def mapping_of(data: Any, file: Path) -> Mapping:
             k: _clock(v, f"{where}: tables: {k}")
             for k, v in _table(data.get("tables") or {}, f"{where}: tables").items()
         },
+        side_by_side=_side_by_side(data.get("side_by_side"), f"{where}: side_by_side"),
         split=_split(data.get("split"), f"{where}: split"),
         rate_hz=_rate(data.get("rate_hz"), f"{where}: rate_hz"),
         trial=data.get("trial"),
@@ -126,6 +127,11 @@ def _same(mapping: Mapping, column: Column, one: tuple[str, str], two: tuple[str
 def _check_files(mapping: Mapping) -> None:
     """Where one table has a file of its own, every table and every channel has one. Raises MeasurementError."""
     filed = [k for k, c in mapping.tables.items() if c.file]
+    if mapping.side_by_side and mapping.tables:
+        raise MeasurementError(
+            f"{mapping.source}: tables, and side_by_side: files are either tables with a time each or stand side by side; leave "
+            "one of the two out"
+        )
     if not filed:
         return
     for name, clock in mapping.tables.items():
@@ -178,6 +184,21 @@ def _clock(value: Any, where: str) -> Clock:
         _time(entry.get("time"), f"{where}: time"),
         None if offset is None else _number(offset, f"{where}: offset_s"),
     )
+
+
+def _side_by_side(value: Any, where: str) -> dict[str, str]:
+    if value is None:
+        return {}
+    found = {str(k): str(v) for k, v in _table(value, where).items()}
+    for name, shape in found.items():
+        if not shape or shape.count("{trial}") > 1:
+            raise MeasurementError(
+                f"{where}: {name}: expected the name of a file such as '{{trial}}_{name}.csv', or '{name}.csv' where each trial "
+                f"has a folder, not {quoted(shape)}"
+            )
+    if len(found) == 1:
+        raise MeasurementError(f"{where}: expected two files or more, not {quoted(next(iter(found)))} alone")
+    return found
 
 
 def _split(value: Any, where: str) -> Split | None:

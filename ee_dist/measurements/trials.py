@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping as Dictionary
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +13,9 @@ import numpy as np
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.folders import own_names
-from ee_dist.measurements.mapping import Clock, Mapping
+from ee_dist.measurements.mapping import Mapping
 from ee_dist.measurements.readers import read
+from ee_dist.measurements.side_by_side import side_by_side
 from ee_dist.measurements.table import Recorded, Table
 
 FEWEST_ROWS = 2
@@ -22,8 +24,13 @@ MOST_TRIALS = 2000
 
 def trials_of(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
     """All trials of the files, each with a name of its own. Raises MeasurementError."""
-    if any(c.file for c in mapping.tables.values()):
-        found = _joined(files, mapping)
+    if mapping.side_by_side:
+        found = []
+        for r in _joined(files, mapping, mapping.side_by_side):
+            table = side_by_side({t.name: t for t in r.tables})
+            found += _split(Recorded(r.name, (table,)), mapping)
+    elif any(c.file for c in mapping.tables.values()):
+        found = _joined(files, mapping, {name: c.file for name, c in mapping.tables.items()})
     else:
         found = []
         names = own_names(files)
@@ -84,20 +91,23 @@ def _short(cell: str) -> str:
         return cell
 
 
-def _joined(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
+def _joined(files: Sequence[Path], mapping: Mapping, shapes: Dictionary[str, str]) -> list[Recorded]:
     """Trials whose tables are files of their own, matched by what stands at {trial} in their names."""
     parts: dict[Path, tuple[str, str]] = {}
     for file in files:
-        for name, clock in mapping.tables.items():
+        # That which says the most comes first: q_{trial}.csv is also like q_dot_run1.csv.
+        for name, shape in sorted(shapes.items(), key=lambda item: -len(item[1])):
             # As many folders as the pattern names count.
-            own = "/".join(file.absolute().parts[-1 - clock.file.count("/") :])
-            found = _pattern(clock).fullmatch(own)
+            own = "/".join(file.absolute().parts[-1 - shape.count("/") :])
+            found = _pattern(shape).fullmatch(own)
             if found:
                 parts[file] = (found.groupdict().get("trial", ""), name)
                 break
     if not parts:
-        shapes = ", ".join(c.file for c in mapping.tables.values())
-        raise MeasurementError(f"{mapping.source}: tables: none of the {len(files)} files is named like {shapes}")
+        which = "side_by_side" if mapping.side_by_side else "tables"
+        raise MeasurementError(
+            f"{mapping.source}: {which}: none of the {len(files)} files is named like {', '.join(shapes.values())}"
+        )
     # Where the names alone do not tell trials apart, each folder is one.
     apart = len(set(parts.values())) < len(parts)
     tables: dict[tuple[Path | None, str], dict[str, Table]] = {}
@@ -110,19 +120,19 @@ def _joined(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
     folders = own_names([f for f, _ in tables if f is not None])
     out = []
     for (folder, trial), halves in tables.items():
-        for name, clock in mapping.tables.items():
+        for name, shape in shapes.items():
             if name not in halves:
                 there = next(iter(halves.values())).path
                 raise MeasurementError(
-                    f"{there}: its other half is missing: no {clock.file.replace('{trial}', trial)} beside it "
+                    f"{there}: its other half is missing: no {shape.replace('{trial}', trial)} beside it "
                     f"for {quoted(name)}; name the folder, or both files"
                 )
         own = " ".join(w for w in (folders[folder] if folder else "", trial.strip("_- .")) if w)
         home = next(iter(halves.values())).path.absolute().parent.name
-        out.append(Recorded(own or trial or home or "trial", tuple(halves[n] for n in mapping.tables)))
+        out.append(Recorded(own or trial or home or "trial", tuple(halves[n] for n in shapes)))
     return out
 
 
-def _pattern(clock: Clock) -> re.Pattern[str]:
+def _pattern(shape: str) -> re.Pattern[str]:
     """What a file's name is like; without {trial} its folder is the trial."""
-    return re.compile(re.escape(clock.file).replace(re.escape("{trial}"), "(?P<trial>[^/]*)"), re.IGNORECASE)
+    return re.compile(re.escape(shape).replace(re.escape("{trial}"), "(?P<trial>[^/]*)"), re.IGNORECASE)

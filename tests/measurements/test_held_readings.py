@@ -112,14 +112,14 @@ def test_a_position_with_a_dot_is_a_speed(name: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize("timed", [False, True])
-def test_files_of_one_quantity_each_are_to_be_put_side_by_side(tmp_path: Path, timed: bool) -> None:
+def test_files_that_do_not_say_what_they_hold_are_to_be_put_side_by_side(tmp_path: Path, timed: bool) -> None:
     """Each would be a table with a clock of its own, and none of them has one."""
     robot, _ = load_robot(samples.robot_file(tmp_path))
-    names = {"q": motion(T, 2), "tau": motion(T + 1.0, 2)} | ({"time": T[:, None]} if timed else {})
+    names = {"first": motion(T, 2), "second": motion(T + 1.0, 2)} | ({"time": T[:, None]} if timed else {})
     files = [tmp_path / f"{n}.csv" for n in names]
     for file, values in zip(files, names.values(), strict=True):
         pd.DataFrame(values, columns=[f"{file.stem}{k}" for k in range(values.shape[1])]).to_csv(file, index=False)
-    with pytest.raises(MeasurementError, match="put their columns side by side") as found:
+    with pytest.raises(MeasurementError, match="put their columns side by side into one file") as found:
         proposal_for(files, robot, Hints())
     assert ("only time.csv says when" if timed else "none says when") in str(found.value)
     assert "4000 rows each" in str(found.value)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ee_dist.basics.names import listed
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.proposal.layouts import put_together
 from ee_dist.measurements.proposal.model import Hints, Proposal
 from ee_dist.measurements.proposal.stated import add_stated
 from ee_dist.measurements.proposal.time import TimeChoice, time_of
@@ -25,11 +26,17 @@ _CUT = re.compile(r"[_\-. ]+")
 _TRIALS = frozenset(["episode", "episodes", "trial", "trials", "run", "runs", "demo", "traj", "trajectory", "rollout"])
 
 
-def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints) -> Recorded:
-    """One trial to look at, and into ``proposal_head`` what the mapping must say to get all: ``tables`` for trials of several
-    files, ``split`` for several trials of one. Raises MeasurementError."""
+def gathered(
+    files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints, joints: Sequence[str] = ()
+) -> Recorded:
+    """One trial to look at, and into ``proposal_head`` what the mapping must say to get all: ``tables`` or ``side_by_side`` for
+    trials of several files, ``split`` for several trials of one. Raises MeasurementError."""
     first = read(files[0])[0]
     if len(files) > 1 and len(first.tables) == 1:
+        together = put_together(files, joints)
+        if isinstance(together, tuple):
+            proposal_head["side_by_side"] = dict(together[0].patterns)
+            return Recorded("", (together[1],))
         spread = _spread(files, first)
         if spread is not None:
             times = [time_of(table, hints) for _, table in spread.values()]
@@ -42,6 +49,8 @@ def gathered(files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints)
                     clock["time"] = {"column": found.column, "unit": found.unit}
                 proposal_head.setdefault("tables", {})[name] = clock
             return Recorded(first.name, tuple(tables))
+        if together is not None:
+            raise together
     if len(first.tables) == 1:
         return _first_of_split(first, proposal_head)
     return first
@@ -54,8 +63,8 @@ def _check_clocks(tables: Sequence[Table], times: Sequence[TimeChoice | None]) -
         return
     raise MeasurementError(
         f"{tables[0].path.parent}: {listed([t.path.name for t in tables])} have {len(tables[0])} rows each, and "
-        f"{f'only {timed[0].path.name}' if timed else 'none'} says when they were: put their columns side by side into one file "
-        "for each trial, with the time (a .mat or .npz may hold them as arrays)"
+        f"{f'only {timed[0].path.name}' if timed else 'none'} says when they were: call each after what it holds "
+        "(q.csv, tau.csv, time.csv), or put their columns side by side into one file for each trial, with the time"
     )
 
 
@@ -140,7 +149,7 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
     from ee_dist.measurements.proposal.choose import propose
 
     head: dict[str, Any] = {}
-    recorded = gathered(files, head, hints)
+    recorded = gathered(files, head, hints, robot.motor_names)
     if len(recorded.tables) > 1 and "tables" not in head:  # what is named as a file is to be named at each channel
         shown = [t for t in recorded.tables if len(t) > 20]
         recorded = replace(recorded, tables=tuple(shown) or recorded.tables)

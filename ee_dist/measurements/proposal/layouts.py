@@ -1,0 +1,140 @@
+"""Which files beside one another are one trial, a file for each quantity (q.csv, tau.csv) or for each joint (elbow.csv)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.proposal.blocks import joint_in, joint_words
+from ee_dist.measurements.proposal.words import OTHER, POSITION, TIME, Reading, read_name
+from ee_dist.measurements.readers import read
+from ee_dist.measurements.side_by_side import side_by_side
+from ee_dist.measurements.table import Table
+
+_WORD = re.compile(r"[^\W\d_]+|\d+")
+_BETWEEN = frozenset(["dot", "ddot", "joint", "joints", "motor", "of", "the", "all"])
+"""Words that may stand among those of a quantity and say nothing by themselves."""
+_NUMBERED = re.compile(r"(?:joint|motor|axis|servo|link|drive|dxl|actuator|j|m)[ _.\-]?\d+", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """``patterns``: the name of each kind of file, with {trial} for what tells trials apart; ``first``: those of the first."""
+
+    patterns: Mapping[str, str]
+    first: Mapping[str, Path]
+
+
+def put_together(files: Sequence[Path], joints: Sequence[str]) -> tuple[Layout, Table] | MeasurementError | None:
+    """How the files are one trial each few, and the first of them; what is in the way where they could be; None for files that
+    are nothing of the kind."""
+    layouts = (
+        ([_quantity(f.stem) for f in files], _of_one_quantity),
+        (_joints([f.stem for f in files], joints), _of_one_joint),
+    )
+    for spans, holds in layouts:
+        found = _layout(files, spans)
+        tables = None if found is None else _tables(found)
+        if found is None or tables is None or not holds(tables, joints):
+            continue
+        try:
+            return found, side_by_side(tables)
+        except MeasurementError as error:
+            return error
+    return None
+
+
+def _quantity(stem: str) -> tuple[int, int] | None:
+    """Where in the name of a file the quantity stands; None where it says none, or in two places."""
+    words = [(m.start(), m.end(), m[0].lower()) for m in _WORD.finditer(stem)]
+    telling = [k for k, (_, _, w) in enumerate(words) if _tells(w)]
+    if not telling:
+        return None
+    first, last = telling[0], telling[-1]
+    while last + 1 < len(words) and words[last + 1][2] in ("dot", "ddot"):
+        last += 1
+    if any(k not in telling and words[k][2] not in _BETWEEN for k in range(first, last + 1)):
+        return None
+    return words[first][0], words[last][1]
+
+
+def _tells(word: str) -> bool:
+    said = read_name(word)
+    return said.kind is not None or said.command is not None
+
+
+def _joints(stems: Sequence[str], joints: Sequence[str]) -> list[tuple[int, int] | None]:
+    """Where in the name of each file a joint's stands, or a word for one with its number."""
+    words = joint_words(joints)
+    out: list[tuple[int, int] | None] = []
+    for stem in stems:
+        joint = joint_in(stem, words) if len(joints) > 1 else None
+        at = re.search(re.escape(joint), stem, re.IGNORECASE) if joint else None
+        if at is None and joint:
+            own = [m for m in _WORD.finditer(stem) if m[0].lower() in words[joint]]
+            out.append((own[0].start(), own[-1].end()) if own else None)
+            continue
+        at = at or _NUMBERED.search(stem)
+        out.append(at.span() if at else None)
+    return out
+
+
+def _layout(files: Sequence[Path], spans: Sequence[tuple[int, int] | None]) -> Layout | None:
+    """Files by what they hold and by trial; None where some are missing, or what tells trials apart stands in two places."""
+    groups: dict[tuple[Path, str, str], dict[str, Path]] = {}
+    for file, span in zip(files, spans, strict=True):
+        if span is None:
+            return None
+        what = file.stem[slice(*span)]
+        group = groups.setdefault((file.parent, file.stem[: span[0]], file.stem[span[1] :]), {})
+        if what in group:
+            return None
+        group[what] = file
+    first = next(iter(groups.values()))
+    if len(first) < 2 or any(g.keys() != first.keys() for g in groups.values()):
+        return None
+    before, behind = {key[1] for key in groups}, {key[2] for key in groups}
+    if len(before) > 1 and len(behind) > 1:
+        return None
+    head = before.pop() if len(before) == 1 else "{trial}"
+    tail = behind.pop() if len(behind) == 1 else "{trial}"
+    return Layout({what: f"{head}{what}{tail}{file.suffix}" for what, file in first.items()}, first)
+
+
+def _tables(found: Layout) -> dict[str, Table] | None:
+    tables = {}
+    for what, file in found.first.items():
+        trials = read(file)
+        if len(trials) != 1 or len(trials[0].tables) != 1:
+            return None
+        tables[what] = trials[0].tables[0]
+    return tables
+
+
+def _of_one_quantity(tables: Mapping[str, Table], joints: Sequence[str]) -> bool:
+    """Whether each file is of one quantity, by its name and those of its columns, positions among them. A trial that is called
+    after what was commanded holds others too."""
+    said = {what: read_name(what) for what in tables}
+    kinds = [(r.kind, r.command) for r in said.values() if r.kind != OTHER]
+    if len(set(kinds)) < len(kinds) or not any(r.kind == POSITION and not r.weak for r in said.values()):
+        return False
+    words = joint_words(joints)
+    return all(_of_it(column, said[what], words) for what, t in tables.items() for column in t.columns)
+
+
+def _of_one_joint(tables: Mapping[str, Table], joints: Sequence[str]) -> bool:
+    """Whether each file is of one joint: as many as there are, with the same columns, and one position that was read."""
+    if len(tables) != len(joints) or len({frozenset(t.columns) for t in tables.values()}) > 1:
+        return False
+    said = [read_name(c) for c in next(iter(tables.values())).columns]
+    return sum(r.kind == POSITION and not r.command and not r.second for r in said) == 1
+
+
+def _of_it(column: str, file: Reading, words: Mapping[str, frozenset[str]]) -> bool:
+    """Whether a column may be of the quantity that its file is called after."""
+    joint = joint_in(column, dict(words))
+    own = read_name(column, words[joint] if joint else frozenset())
+    return own.kind in (None, TIME, OTHER, file.kind) or own.weak or file.kind is None

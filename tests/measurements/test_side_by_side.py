@@ -1,0 +1,192 @@
+"""Logs of which each file holds one quantity, or one joint: together they are a trial, and the same as one file of all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import measurement_files as samples
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.folders import recordings_in
+from ee_dist.measurements.importer import import_files
+from ee_dist.measurements.mapping_file import mapping_of, read_mapping
+from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.layouts import put_together
+from ee_dist.measurements.proposal.model import Hints
+from ee_dist.measurements.proposal.write import as_yaml
+from ee_dist.measurements.readers import read
+from ee_dist.measurements.side_by_side import side_by_side
+from ee_dist.robots.describe import load_robot
+from ee_dist.trials.log import SensorLog
+
+JOINTS = samples.JOINTS
+Motion = dict[str, np.ndarray]
+Write = Callable[[Path, Motion], None]
+
+
+def table(file: Path, values: np.ndarray, names: list[str] | None) -> None:
+    pd.DataFrame(values, columns=names).to_csv(file, index=False, header=names is not None)
+
+
+def without_names(folder: Path, m: Motion) -> None:
+    for stem, values in (("q", m["q"]), ("q_des", m["g"]), ("t", m["t"][:, None])):
+        table(folder / f"{stem}.csv", values, None)
+
+
+def arrays(folder: Path, m: Motion) -> None:
+    for stem, values in (("q", m["q"]), ("cmd", m["g"]), ("time", m["t"])):
+        np.save(folder / f"{stem}.npy", values)
+
+
+def by_quantity(folder: Path, m: Motion) -> None:
+    for stem, values in (("positions", m["q"]), ("commands", m["g"])):
+        table(folder / f"{stem}.csv", np.c_[m["t"], values], ["time", *JOINTS])
+
+
+def by_joint(folder: Path, m: Motion) -> None:
+    for k, joint in enumerate(JOINTS):
+        values = np.stack([m["t"], m["q"][:, k], m["g"][:, k]], axis=1)
+        table(folder / f"{joint}.csv", values, ["time", "position", "goal"])
+
+
+def by_number(folder: Path, m: Motion) -> None:
+    for k in range(len(JOINTS)):
+        values = np.stack([m["t"], m["q"][:, k], m["g"][:, k]], axis=1)
+        table(folder / f"motor_{k + 1}.csv", values, ["time", "position_rad", "goal_rad"])
+
+
+def in_turn(folder: Path, m: Motion) -> None:
+    for run, part in (("run1", slice(0, 300)), ("run2", slice(300, None))):
+        own = {"q": m["q"][part], "g": m["g"][part], "t": m["t"][part]}
+        for stem, values in (("pos", own["q"]), ("goal", own["g"])):
+            table(folder / f"{run}_{stem}.csv", np.c_[own["t"], values], ["time", *JOINTS])
+
+
+LAYOUTS: tuple[Write, ...] = (without_names, arrays, by_quantity, by_joint, by_number)
+
+
+def taken_in(folder: Path, files: list[Path]) -> list[SensorLog]:
+    robot, _ = load_robot(samples.robot_file(folder))
+    proposal = proposal_for(files, robot, Hints())
+    assert not proposal.questions, proposal.questions
+    (folder / "mapping.yaml").write_text(as_yaml(proposal, str(folder / "chain.yaml"), "them"))
+    return [r.log for r, _ in import_files(files, read_mapping(folder / "mapping.yaml"), robot)]
+
+
+@pytest.mark.parametrize("write", LAYOUTS)
+def test_they_are_the_trial_that_one_file_would_be(tmp_path: Path, write: Write) -> None:
+    m = samples.motion()
+    apart, one = tmp_path / "apart", tmp_path / "one"
+    apart.mkdir()
+    one.mkdir()
+    write(apart, m)
+    names = ["time", *(f"{j}_pos" for j in JOINTS), *(f"{j}_goal" for j in JOINTS)]
+    table(one / "log.csv", np.c_[m["t"], m["q"], m["g"]], names)
+    (found,) = taken_in(tmp_path, recordings_in(apart)[0])
+    (wanted,) = taken_in(one, [one / "log.csv"])
+    assert np.allclose(found.sensors, wanted.sensors, atol=1e-9) and np.allclose(
+        found.commands, wanted.commands, atol=1e-9
+    )
+
+
+def test_a_folder_for_each_trial_or_a_name_for_each(tmp_path: Path) -> None:
+    m = samples.motion()
+    for run in ("a", "b"):
+        (tmp_path / "logs" / run).mkdir(parents=True)
+        by_quantity(tmp_path / "logs" / run, m)
+    assert len(taken_in(tmp_path, recordings_in(tmp_path / "logs")[0])) == 2
+    (tmp_path / "flat").mkdir()
+    in_turn(tmp_path / "flat", m)
+    files = recordings_in(tmp_path / "flat")[0]
+    first, second = taken_in(tmp_path, files)
+    assert abs(len(first) - 300) < 5 and abs(len(second) - (len(m["t"]) - 300)) < 5
+
+
+def test_full_logs_that_are_called_after_what_was_done_are_trials(tmp_path: Path) -> None:
+    m = samples.motion()
+    names = ["time", *(f"{j}_pos" for j in JOINTS), *(f"{j}_goal" for j in JOINTS)]
+    both = ["time", *(f"{j}_pos" for j in JOINTS), *(f"{j}_vel" for j in JOINTS)]
+    table(tmp_path / "position.csv", np.c_[m["t"], m["q"], m["g"]], names)
+    table(tmp_path / "velocity.csv", np.c_[m["t"], m["q"], m["g"]], names)
+    files = [tmp_path / "position.csv", tmp_path / "velocity.csv"]
+    assert put_together(files, JOINTS) is None
+    table(tmp_path / "elbow.csv", np.c_[m["t"], m["q"], m["q"]], both)
+    table(tmp_path / "shoulder.csv", np.c_[m["t"], m["q"], m["q"]], both)
+    assert put_together([tmp_path / "elbow.csv", tmp_path / "shoulder.csv"], JOINTS) is None
+    assert put_together([tmp_path / "elbow.csv"] * 2, JOINTS) is None
+
+
+def test_rows_of_different_moments_do_not_stand_side_by_side(tmp_path: Path) -> None:
+    m = samples.motion()
+    by_quantity(tmp_path, m)
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    files = [tmp_path / "positions.csv", tmp_path / "commands.csv"]
+    late = pd.read_csv(files[1])
+    late.iloc[:-3].to_csv(files[1], index=False)
+    with pytest.raises(MeasurementError, match=r"positions.csv \(400 rows\), commands.csv \(397 rows\) cannot stand"):
+        side_by_side({f.stem: read(f)[0].tables[0] for f in files})
+    late.assign(time=late.time + 0.02).to_csv(files[1], index=False)
+    with pytest.raises(MeasurementError, match=r"commands\.csv: row .* was at .* cannot stand side by side"):
+        side_by_side({f.stem: read(f)[0].tables[0] for f in files})
+    # What cannot stand side by side, and is no trial each either, is said, not taken for trials.
+    third = tmp_path / "torques.csv"
+    late.iloc[:-3].to_csv(third, index=False)
+    with pytest.raises(MeasurementError, match="cannot stand side by side"):
+        proposal_for([*files, third], robot, Hints())
+
+
+def test_one_that_is_missing_is_named(tmp_path: Path) -> None:
+    m = samples.motion()
+    for run in ("a", "b"):
+        (tmp_path / run).mkdir()
+        by_quantity(tmp_path / run, m)
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    files = [f for run in ("a", "b") for f in recordings_in(tmp_path / run)[0]]
+    (tmp_path / "mapping.yaml").write_text(
+        as_yaml(proposal_for(files, robot, Hints()), str(tmp_path / "chain.yaml"), "")
+    )
+    with pytest.raises(MeasurementError, match=r"no positions\.csv beside it"):
+        import_files(files[:-1], read_mapping(tmp_path / "mapping.yaml"), robot)
+
+
+@pytest.mark.parametrize(
+    ("listed", "said"),
+    [
+        ({"q": "q.csv"}, "expected two files or more"),
+        ({"q": "", "tau": "tau.csv"}, "expected the name of a file"),
+        ({"q": "{trial}{trial}.csv", "tau": "tau.csv"}, "expected the name of a file"),
+        ("q.csv", "side_by_side"),
+    ],
+)
+def test_a_wrong_list_of_files_is_said(listed: object, said: str) -> None:
+    with pytest.raises(MeasurementError, match=said):
+        mapping_of({"sensors": {}, "side_by_side": listed}, Path("mapping.yaml"))
+    both = {"side_by_side": {"q": "q.csv", "tau": "tau.csv"}, "tables": {"q": {"file": "q.csv"}}}
+    with pytest.raises(MeasurementError, match="leave one of the two out"):
+        mapping_of({"sensors": {}} | both, Path("mapping.yaml"))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 4), st.integers(2, 30), st.booleans())
+def test_columns_are_called_after_their_file_and_keep_their_numbers(
+    tmp_path_factory: pytest.TempPathFactory, width: int, rows: int, named: bool
+) -> None:
+    folder = tmp_path_factory.mktemp("them")
+    values = np.random.default_rng(width * rows).normal(size=(2, rows, width))
+    names = [f"axis {k}" for k in range(width)] if named else None
+    for stem, part in zip(("q", "tau"), values, strict=True):
+        table(folder / f"{stem}.csv", part, names)
+    tables = {s: read(folder / f"{s}.csv")[0].tables[0] for s in ("q", "tau")}
+    found = side_by_side(tables)
+    addresses = list(found.addresses())
+    assert len(addresses) == 2 * width and len(found) == rows
+    wanted = np.concatenate(list(values), axis=1)
+    assert np.allclose(np.stack([found.numbers(a) for a in addresses], axis=1), wanted, rtol=1e-12)
+    if named:
+        assert addresses[0] == "q.axis 0" and addresses[-1] == f"tau.axis {width - 1}"
