@@ -18,8 +18,8 @@ WORSE = 1.01
 
 @dataclass(frozen=True, eq=False)
 class LastWord:
-    """Errors of the model ``before`` and the one ``after``, of all trials of ``problem`` together and of each by itself, as
-    ``compare`` gives them; ``changed``: whether they are two; ``left``: curves in which the second leaves more than noise;
+    """Errors of the model ``before`` and the one ``after``, of all trials of ``problem`` together and of each by itself, by
+    the measure of the search; ``changed``: whether they are two; ``left``: curves in which the second leaves more than noise;
     ``others``: the same errors as this way counts them elsewhere (of positions, say), in lines for people."""
 
     problem: Problem

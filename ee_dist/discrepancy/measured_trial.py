@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -75,6 +75,10 @@ def released(commands: Array) -> tuple[Array, Array | None]:
     rows = np.where(gone, 0, np.arange(len(commands)))
     first = int(np.argmin(gone))
     return np.nan_to_num(commands[np.maximum(np.maximum.accumulate(rows), first)]), (~gone).astype(float)
+
+
+ONE_PACE = 0.9
+"""Share of the slowest trial's step above which another is read as fast."""
 
 
 def evenly_read(log: SensorLog) -> SensorLog:
@@ -206,3 +210,15 @@ def _course(seen: Array, noise: float) -> Array:
         return seen
     smooth = scipy.signal.savgol_filter(seen, SMOOTHED, SMOOTH_ORDER)
     return np.where(np.abs(smooth - seen) > SUDDEN * noise, seen, smooth)
+
+
+def at_one_pace(logs: Sequence[SensorLog]) -> tuple[list[SensorLog], float]:
+    """The logs with those that are read faster thinned to the pace of the slowest, so that whatever is done to all of them at a
+    share of their rate is the same to each, and that pace, s. Paces that differ by less than a tenth are one."""
+    steps = [float(np.median(np.diff(log.times_s))) for log in logs]
+    slowest = max(steps)
+    thinned = [
+        evenly_read(read_every(log, slowest)) if step < ONE_PACE * slowest else log
+        for log, step in zip(logs, steps, strict=True)
+    ]
+    return thinned, slowest

@@ -209,6 +209,12 @@ class Problem(ABC):
         return self
 
     @property
+    def as_searched(self) -> Problem:
+        """The measure that a search goes by, of all of these trials, for what took no part in it: errors stand beside those of
+        the search."""
+        return self
+
+    @property
     def looped(self) -> tuple[int, ...]:
         """Trials in which a controller was in the loop: only there does wiring show."""
         return ()

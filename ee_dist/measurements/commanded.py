@@ -8,12 +8,19 @@ import numpy as np
 
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.robot_channels import command_kind
+from ee_dist.measurements.signals import AGAINST, lead, moves, relation
 from ee_dist.measurements.standing import REST, reach_of, stands_still
 from ee_dist.measurements.suspicious import command_suspicion
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 FEWEST_ROWS = 10
+FAR = 0.1
+"""Share of a joint's range from which it is far from its command."""
+FITS, BETTER = 0.7, 0.1
+"""Correlation of what was commanded and measured from which one follows the other, and by how much more than as they stand."""
+LATE_S, EARLY_S = 0.1, 0.01
+"""From when torques come late or early: current controllers take milliseconds, and answer nothing that they were not told."""
 MANY = 3.0
 """Times what a drive can give from which a command is in another unit."""
 
@@ -51,6 +58,55 @@ def beyond_the_drive(robot: Robot, commands: Array) -> Iterator[str]:
             yield (
                 f"command of {drive.joint}: reaches {most:.3g} {unit}, {most / drive.torque_limit:.2g} times what its drive can "
                 f"give ({drive.torque_limit:.3g}): another unit, or volts, which need a scale ('scale:' at the column)?"
+            )
+
+
+def far_from_commands(robot: Robot, commands: Array, position_of: dict[str, Array]) -> Iterator[str]:
+    """A line on joints that are said to obey positions, and stay farther from them than they move: they obey something else.
+    ``commands`` (T, M) are NaN where drives are released."""
+    for k, drive in enumerate(robot.drives):
+        obeyed = np.isfinite(commands[:, k])
+        if drive.joint not in position_of or obeyed.sum() <= FEWEST_ROWS or command_kind(drive) != "position":
+            continue
+        seen, joint = position_of[drive.joint][obeyed], robot.joint(drive.joint)
+        off, moved = float(np.median(np.abs(commands[obeyed, k] - seen))), float(np.ptp(seen))
+        if off > max(moved, FAR * reach_of(joint)) and moved > REST * reach_of(joint):
+            unit = "rad" if joint.kind == "hinge" else "m"
+            yield (
+                f"command of {drive.joint}: the joint lies {off:.3g} {unit} from it, more than the {moved:.3g} {unit} that it "
+                "moves: is it led by speeds or torques ('command:' in its description), or is one of the two zeros another one?"
+            )
+
+
+def torques_beside_commands(robot: Robot, commands: Array, torques: Array, step_s: float) -> Iterator[str]:
+    """A line on joints that are told torques, where those that were measured (T, M) run against them, come long after, or
+    before."""
+    for k, drive in enumerate(robot.drives):
+        both = np.isfinite(commands[:, k]) & np.isfinite(torques[:, k])
+        if (
+            command_kind(drive) != "torque"
+            or both.sum() <= FEWEST_ROWS
+            or np.array_equal(commands[both, k], torques[both, k])
+        ):
+            continue
+        asked, seen = commands[both, k : k + 1], torques[both, k : k + 1]
+        if not (moves(asked) and moves(seen)):
+            continue
+        now, found = relation(asked, seen).correlation, lead(asked, seen, step_s)
+        where = f"command of {drive.joint}: the torque that was measured"
+        if now <= AGAINST and found.correlation <= AGAINST:
+            yield f"{where} runs against it (correlation {now:.2f}): 'sign: -1' at one of the two?"
+        elif found.repeats or found.correlation < FITS or found.correlation - now < BETTER:
+            continue
+        elif found.lead_s > LATE_S:
+            yield (
+                f"{where} follows {1e3 * found.lead_s:.0f} ms later (correlation {found.correlation:.2f}; {now:.2f} as they "
+                "stand): were they logged by clocks that differ?"
+            )
+        elif found.lead_s < -max(EARLY_S, 2 * step_s):
+            yield (
+                f"{where} comes {-1e3 * found.lead_s:.0f} ms before it (correlation {found.correlation:.2f}): are the two "
+                "columns exchanged, or their clocks different?"
             )
 
 

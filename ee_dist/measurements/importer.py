@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import math
+from collections.abc import Mapping as AnyMapping
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,9 +18,10 @@ from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.clocks import Clocked, check_grid
 from ee_dist.measurements.errors import MeasurementError, nearest
+from ee_dist.measurements.held_readings import written_late
 from ee_dist.measurements.looking import Looked, repeats
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
-from ee_dist.measurements.reading import between_readings, rows_read
+from ee_dist.measurements.reading import between_readings, paces_of, rows_read, told_of
 from ee_dist.measurements.report import TORQUE, Report
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, grid, held, linear, smoothed
@@ -50,7 +52,13 @@ def import_file(path: str | Path, mapping: Mapping, robot: Robot, index: int = 0
 def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[tuple[TrialRecord, Report]]:
     """Every trial of the files. Raises MeasurementError: see ``readers``, ``trials``, ``clocks`` and ``check_names``."""
     check_names(mapping, robot)
-    found = [_Import(r, mapping, robot, i).run() for i, r in enumerate(trials_of(files, mapping))]
+    begun = [_Import(r, mapping, robot, i) for i, r in enumerate(trials_of(files, mapping))]
+    # One logger reads its sensors at one pace; of a trial in which hardly anything moves only others tell it.
+    paces: dict[str, float] = {}
+    for each in begun:
+        each.clocked()
+        paces |= {k: v for k, v in paces_of(each.clocks, each.read_at).items() if k not in paces}
+    found = [each.run(paces) for each in begun]
     names = [report.trial for _, report in found]
     for i, setting in enumerate(mapping.settings):
         for wanted in setting.trials:
@@ -70,9 +78,16 @@ class _Import:
         for table in recorded.tables:
             self.report.done += list(table.notes)
 
-    def run(self) -> tuple[TrialRecord, Report]:
+    def clocked(self) -> None:
+        """When rows were, and in which of them sensors were read. Raises MeasurementError."""
         self._time()
-        self.read_at = rows_read(self.mapping, self.clocks, self.report.done)
+        self.read_at = rows_read(self.mapping, self.clocks)
+
+    def run(self, paces: AnyMapping[str, float]) -> tuple[TrialRecord, Report]:
+        """``paces``: seconds between readings by table, of the trials in which that shows. Raises MeasurementError."""
+        if paces.keys() - paces_of(self.clocks, self.read_at).keys():
+            self.read_at = rows_read(self.mapping, self.clocks, paces)
+        self.report.done += told_of(self.clocks, self.read_at)
         positions = self._sensors()
         self.report.suspicious += repeats(self.mapping, self.clocks)
         torques = self._torques()
@@ -196,10 +211,14 @@ class _Import:
             raise MeasurementError(f"{own.table}: column {quoted(column.column)}: too large a number to be {name}")
         if column.unwrap:
             values = np.unwrap(values)
-        if reading and len(self.read_at[column.table]) < len(values):
-            # Between readings a state goes on: it does not stand still and jump.
-            rows = self.read_at[column.table]
-            values = linear(own.times_s - own.times_s[0], own.times_s[rows], values[rows])
+        rows = self.read_at.get(column.table)
+        if rows is not None and len(rows) < len(values):
+            late = written_late(raw, rows)
+            # Torques are readings too where they keep to their pace; what was told to drives does not.
+            if reading or (late is not None and name.startswith(TORQUE)):
+                # Between readings a state goes on: it does not stand still and jump.
+                read = values[np.minimum(rows + (late or 0), len(values) - 1)]
+                values = linear(own.times_s - own.times_s[0], own.times_s[rows], read)
         if not self._same_rows(own):
             # The grid begins where the main table does.
             at_s = self._rows_s() + (self.main.times_s[0] - own.times_s[0])

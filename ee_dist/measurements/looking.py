@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.measurements.clocks import Clocked
-from ee_dist.measurements.commanded import beyond_the_drive, command_flaws
+from ee_dist.measurements.commanded import beyond_the_drive, command_flaws, far_from_commands, torques_beside_commands
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Estimated, Mapping
 from ee_dist.measurements.need import torques_beside_need
@@ -60,6 +60,9 @@ class Looked:
         for name, flaw in command_flaws(self.robot, self.mapping, self.commands, self._positions, self.step_s):
             yield from self._judged(flaw, self.mapping.commands.get(name))
         yield from beyond_the_drive(self.robot, self.commands)
+        yield from far_from_commands(self.robot, self.commands, self._positions)
+        if self.torques is not None:
+            yield from torques_beside_commands(self.robot, self.commands, self.torques, self.step_s)
         if self.torques is not None and self.joints is not None:
             yield from self._torques(self.torques, self.joints)
 

@@ -16,9 +16,11 @@ from ee_dist.trials.log import Array
 Rows = NDArray[np.intp]
 
 
-def rows_read(mapping: Mapping, clocks: AnyMapping[str, Clocked], done: list[str]) -> dict[str, Rows]:
-    """The rows of each table that sensors are read from in which they were. Where these are not all, ``done`` hears of it.
-    Raises MeasurementError for cells that hold no number."""
+def rows_read(
+    mapping: Mapping, clocks: AnyMapping[str, Clocked], paces: AnyMapping[str, float] | None = None
+) -> dict[str, Rows]:
+    """The rows of each table that sensors are read from in which they were. ``paces``: the seconds between readings by table, in
+    other trials of the same logger. Raises MeasurementError for cells that hold no number."""
     by_table: dict[str, list[Column]] = {}
     for column in mapping.sensors.values():
         if isinstance(column, Column):
@@ -28,15 +30,31 @@ def rows_read(mapping: Mapping, clocks: AnyMapping[str, Clocked], done: list[str
         own = clocks[name]
         count = len(own.times_s)
         read = [own.table.numbers(c.column, gaps=c.gaps == "interpolate") for c in by_table[name]]
-        rows = held_readings(np.stack(read, axis=1))
+        pace = (paces or {}).get(name)
+        every = None if pace is None or not own.timing.median_s else pace / own.timing.median_s
+        rows = held_readings(np.stack(read, axis=1), every)
         out[name] = np.arange(count) if rows is None else rows
-        if rows is not None:
-            every = float(np.median(np.diff(own.times_s[rows])))
-            done.append(
-                f"the sensors were read every {1e3 * every:.4g} ms: {count - len(rows)} of {count} rows repeat all readings of "
-                "the row before, and count as none"
-            )
     return out
+
+
+def paces_of(clocks: AnyMapping[str, Clocked], read_at: AnyMapping[str, Rows]) -> dict[str, float]:
+    """Seconds between readings by table, of those in which not all rows are readings."""
+    return {
+        name: float(np.median(np.diff(clocks[name].times_s[rows])))
+        for name, rows in read_at.items()
+        if 1 < len(rows) < len(clocks[name].times_s)
+    }
+
+
+def told_of(clocks: AnyMapping[str, Clocked], read_at: AnyMapping[str, Rows]) -> list[str]:
+    """A line for each table of which not all rows are readings."""
+    paces = paces_of(clocks, read_at)
+    counts = {name: (len(clocks[name].times_s), len(read_at[name])) for name in paces}
+    return [
+        f"the sensors were read every {1e3 * paces[name]:.4g} ms: {count - read} of {count} rows repeat all readings of the row "
+        "before, and count as none"
+        for name, (count, read) in counts.items()
+    ]
 
 
 def between_readings(

@@ -96,6 +96,12 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     passive = [j.name for j in body.moving if j.name not in {d.joint for d in drives}]
     if passive:
         notes.append(f"joints without a drive swing freely: {', '.join(passive)}")
+    limited = [d.joint for d in drives if d.command == "torque" and math.isfinite(d.speed_limit)]
+    if limited:
+        notes.append(
+            f"speed_limit of {listed(limited)}: no torque falls with its speed there: a drive that obeys torques makes up for "
+            "back-EMF; it only says how fast the joint may be expected to be"
+        )
     if free and body.root_without_mass:
         notes.append(f"the base {quoted(body.parts[0].name)} has no mass in the file: 1 kg is assumed")
     robot = Robot(

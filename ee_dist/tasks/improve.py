@@ -134,9 +134,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
 
 def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis, fitted: Sequence[str]) -> LastWord:
     """How far the model as it was and the one with ``terms`` are from trials that nothing was fitted to, compared
-    in the same way; ``fitted``: the channels of what was."""
+    by the same measure; ``fitted``: the channels of what was."""
     models = (apart.model, terms)
-    return last_word([way.make(replace(apart, model=m), config) for m in models], models, fitted)
+    return last_word([way.make(replace(apart, model=m), config).as_searched for m in models], models, fitted)
 
 
 def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:

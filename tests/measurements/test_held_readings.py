@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.held_readings import held_readings
+from ee_dist.measurements.held_readings import held_readings, written_late
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
@@ -71,6 +71,54 @@ def test_few_steps_of_an_encoder_are_readings_all_the_same(step: float) -> None:
     assert held_readings(coarse) is None
     speeds = np.round(np.gradient(coarse, axis=0) / step) * step
     assert held_readings(np.hstack([coarse[:, :1], speeds[:, :1]])) is None
+
+
+@given(every=st.sampled_from([2, 3, 5, 8, 15]), seed=st.integers(0, 1000))
+@settings(max_examples=30, deadline=None)
+def test_a_pace_that_is_kept_tells_of_itself_though_columns_change_apart(every: int, seed: int) -> None:
+    """A position of few steps beside a speed with noise: they do not change together, and always at multiples of one step."""
+    rng = np.random.default_rng(seed)
+    rows = np.arange(0, len(T), every)
+    position = np.round(motion(T, 1) / 0.02) * 0.02
+    values = holding(np.hstack([position, rng.normal(0, 1, (len(T), 1))]), rows)
+    found = held_readings(values)
+    assert found is not None and len(np.setxor1d(found, rows)) <= 0.02 * len(rows)
+
+
+def test_a_constant_speed_over_the_steps_of_an_encoder_is_no_pace() -> None:
+    ramp = np.round(np.linspace(0, 40, len(T)))[:, None]
+    assert held_readings(ramp) is None
+
+
+def test_the_pace_of_one_trial_goes_for_another_in_which_little_moves(tmp_path: Path) -> None:
+    described = samples.robot_file(tmp_path)
+    described.write_text(described.read_text().replace("time_step_s: 0.01", "time_step_s: 0.001"))
+    robot, _ = load_robot(described)
+    rows = np.arange(0, len(T), 10)
+    lively = holding(motion(T, 2), rows)
+    # A joint that creeps, over steps of its encoder, says nothing of when it was read.
+    creeping = holding(np.round(np.stack([0.02 * T, 0.015 * T], axis=1) / 0.001) * 0.001, rows)
+    assert held_readings(creeping) is None and held_readings(lively) is not None
+    files = []
+    for name, values in (("moves", lively), ("creeps", creeping)):
+        (tmp_path / name).mkdir()
+        files.append(logs.written(tmp_path / name, logs.frame_of(T, values, motion(T + 0.04, 2))))
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal_for(files, robot, Hints()), str(described), "both"))
+    found = import_files(files, read_mapping(tmp_path / "mapping.yaml"), robot)
+    for _, report in found:
+        assert any("read every 10 ms" in n for n in report.done), report.done
+    # Alone it is taken as it stands.
+    ((_, alone),) = import_files(files[1:], read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert not any("read every" in n for n in alone.done)
+
+
+def test_a_torque_that_is_written_a_row_later_is_of_the_same_reading() -> None:
+    rows = np.arange(0, len(T), 15)
+    slow, late = holding(motion(T, 1), rows)[:, 0], holding(motion(T, 1), rows)
+    late = np.roll(late[:, 0], 2)
+    assert written_late(slow, rows) == 0 and written_late(late, rows) == 2
+    assert written_late(motion(T, 1)[:, 0], rows) is None, "what changes in every row is told, and not read"
+    assert written_late(np.zeros(len(T)), rows) is None
 
 
 def test_rest_noise_and_dead_channels_are_no_seldom_readings() -> None:

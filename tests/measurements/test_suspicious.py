@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from ee_dist.measurements.commanded import beyond_the_drive
+from ee_dist.measurements.commanded import beyond_the_drive, far_from_commands, torques_beside_commands
 from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
@@ -224,3 +224,36 @@ def test_a_command_that_no_drive_can_give_is_told() -> None:
     (line,) = beyond_the_drive(told, commands)
     assert "40 times" in line and "volts" in line
     assert list(beyond_the_drive(robot, commands)) == [], "a position is none"
+
+
+def test_a_joint_that_is_nowhere_near_its_command_is_told() -> None:
+    """The command that was logged is not what the joint obeys: it was led by its speed, and its position ran away."""
+    robot = servo_pendulum()
+    asked, near, away = (v[:, None] for v in (0.4 * WAVE, 0.4 * np.sin(2 * T - 0.3) - 0.2, 0.4 * WAVE + 3.0))
+    assert list(far_from_commands(robot, asked, {"servo": near[:, 0]})) == []
+    (line,) = far_from_commands(robot, asked, {"servo": away[:, 0]})
+    assert "lies 3 rad from it" in line and "led by speeds or torques" in line
+    assert list(far_from_commands(robot, asked, {"servo": 0.0 * away[:, 0] + 3.0})) == [], "one at rest says nothing"
+    told = robot.map_drive("servo", lambda d: replace(d, command="torque"))
+    assert list(far_from_commands(told, asked, {"servo": away[:, 0]})) == [], "a torque is no position"
+    assert list(far_from_commands(robot, np.full_like(asked, math.nan), {"servo": away[:, 0]})) == []
+
+
+@pytest.mark.parametrize(
+    ("late_s", "sign", "said"),
+    [(0.0, 1, None), (0.02, 1, None), (0.4, 1, "follows 400 ms later"), (-0.3, 1, "comes 300 ms before it"),
+     (0.0, -1, "runs against it"), (1.2, 1, "follows 1200 ms later")],
+)  # fmt: skip
+def test_torques_that_come_late_early_or_the_other_way_round_are_told(
+    late_s: float, sign: int, said: str | None
+) -> None:
+    robot = servo_pendulum().map_drive("servo", lambda d: replace(d, command="torque"))
+    rng = np.random.default_rng(0)
+    # Nothing that repeats itself: there a lag is any of many.
+    told = np.cumsum(rng.normal(size=len(T)))
+    told -= np.linspace(told[0], told[-1], len(T))
+    seen = sign * np.roll(told, round(late_s / 0.01)) + 0.2 * rng.normal(size=len(T))
+    lines = list(torques_beside_commands(robot, told[:, None], seen[:, None], 0.01))
+    assert (lines == []) if said is None else (len(lines) == 1 and said in lines[0]), lines
+    assert list(torques_beside_commands(robot, told[:, None], told[:, None], 0.01)) == [], "the same column twice"
+    assert list(torques_beside_commands(servo_pendulum(), told[:, None], -told[:, None], 0.01)) == []

@@ -187,7 +187,7 @@ def above(c: Judged) -> tuple[float, float]:
 def shown_gain(c: Judged) -> tuple[float, float, float]:
     """The gain of a candidate and the ends of its interval as they are told: no more than all of it, nor than the same lost."""
     low, high = above(c)
-    return max(-1.0, min(c.explained, 1.0)), max(low, -1.0), min(high, 1.0)
+    return max(-1.0, min(c.explained, 1.0)), max(-1.0, min(low, 1.0)), max(-1.0, min(high, 1.0))
 
 
 def taken_off(best: Judged) -> str:

@@ -10,7 +10,17 @@ import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import WINDOWS, HeldOut, bootstrap
 from ee_dist.discrepancy.evidence.intervals import half_widths
-from ee_dist.discrepancy.evidence.rule import NEAR, WORTH, least_energy, least_share, may_be_zero, told_in, why_not
+from ee_dist.discrepancy.evidence.rule import (
+    NEAR,
+    NOTHING,
+    WORTH,
+    above_noise,
+    least_energy,
+    least_share,
+    may_be_zero,
+    told_in,
+    why_not,
+)
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fitted import Model
@@ -124,8 +134,7 @@ def judge(
     gained = cut.by_unit(before - held)
     low, high = bootstrap(gained, groups=cut.groups)
     total, gain = float(before.sum()), float(gained.sum())
-    floor = float(problem.floor.sum())
-    above = max(total - floor, 1e-12)
+    above = above_noise(problem, total)
     why = why_not(problem, cut, proposal, before, held, tried, least)
     partly = False
     if why and fitted:
@@ -143,7 +152,11 @@ def judge(
         error_fit=math.sqrt(max(found.seen, 0.0)),
         error_heldout=error(found.residual) if np.isfinite(found.residual).all() else math.inf,
         gain=gain / share if math.isfinite(gain) else -math.inf,
-        explained=(gain / above if total > floor else 0.0) if math.isfinite(gain) else -math.inf,
+        explained=gain / above
+        if math.isfinite(gain) and above > NOTHING
+        else 0.0
+        if math.isfinite(gain)
+        else -math.inf,
         interval=(low / share, high / share),
         held=held,
         residual=found.residual,

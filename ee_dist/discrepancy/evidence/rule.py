@@ -33,6 +33,8 @@ of the drives). Windows of one motion share what a model gets wrong in it, and s
 without a load (UR10e) a payload takes 21 %, and a heavier last link as much."""
 STARTS = 3.0
 """Standard deviations of what starts that are off do to a residual, beyond which it is not theirs."""
+NOTHING = 1e-12
+"""Energy that is none, to be divided by."""
 LUCK = "its gain on held-out data is no more than luck"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes too little of what is above the noise"
@@ -74,9 +76,17 @@ def why_not(
     if may_be_zero(gained, low):
         return MAY_BE_ZERO
     worth = least_share(problem, cut, proposal, held)
-    if gain < LEAST_SHARE * total or gain < worth * max(total - floor, 1e-12):
+    if gain < LEAST_SHARE * total or gain < worth * above_noise(problem, total, values):
         return TOO_LITTLE_ALONE if worth == ALONE else TOO_LITTLE
     return ""
+
+
+def above_noise(problem: Problem, total: float, values: Mask | None = None) -> float:
+    """What of an energy ``total``, of the residual ``values`` (n,; all), is more than noise. A floor that lies above all of it is
+    known to be too high: there it is what is more than noise beyond doubt, lest nothing be there to explain and all do it."""
+    chosen = slice(None) if values is None else values
+    floor, sure = float(problem.floor[chosen].sum()), float(problem.sure[chosen].sum())
+    return max(total - (floor if total > floor else sure), NOTHING)
 
 
 def told_in(problem: Problem, found: HeldOut, without: Sequence[float], proposal: Proposal, tried: int) -> Mask:

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from ee_dist.basics.names import listed
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, evenly_read
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, at_one_pace, evenly_read
 from ee_dist.discrepancy.problem import Layout, Problem, Series
 from ee_dist.discrepancy.ways.force_balance.balance import INSTANT_S, Balance, told_by
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED, left_to_give
@@ -56,12 +56,15 @@ class ForceBalance(Problem):
 
     def __init__(self, trials: Sequence[MeasuredTrial], robot: Robot, processing: Processing | None = None) -> None:
         # Nothing is simulated, so that no time step but that of the readings is wanted.
-        as_read, trials = trials, [replace(t, log=evenly_read(t.log)) for t in trials]
+        own = [evenly_read(t.log) for t in trials]
+        logs, pace_s = at_one_pace(own)
+        thinned = any(a is not b for a, b in zip(own, logs, strict=True))
+        as_read, trials = trials, [replace(t, log=log) for t, log in zip(trials, logs, strict=True)]
         # Nor does a step of a simulation limit what a drive may have: how light a rotor its controller leaves steady.
         robot = replace(robot, time_step_s=INSTANT_S)
         self.robot, self.measured = robot, tuple(trials)
         self.models = [apply(robot, t.setup) for t in trials]
-        self.asked = processing or Processing.for_rate(float(np.median(np.diff(trials[0].log.times_s))))
+        self.asked = processing or Processing.for_rate(pace_s)
         ready = prepared(trials, self.models, self.asked, torque_steps(as_read, self.models))
         self.processing, self.motions, self.size, self.motion_noise = (
             ready.processing,
@@ -92,11 +95,12 @@ class ForceBalance(Problem):
         """(J,): the same of what is noise beyond doubt; the rest may be a force that changes quickly."""
         self.scale = self.size * self.noise_share
         self._lay_out(forces)
-        p, smooth = self.processing, self.processing.filter_for(float(np.median(np.diff(trials[0].log.times_s))))
+        p, smooth = self.processing, self.processing.filter_for(pace_s)
         self.error_definition = (
             "root mean square of the force left over, in standard deviations of the measured force's noise "
             f"({self.noise_share:.2%} of its root mean square); positions and forces through a {smooth}, central "
             f"differences, decimated by {p.keep_every}"
+            + (f", all trials at the {1 / pace_s:.4g} Hz of the one that was read the most seldom" if thinned else "")
         )
 
     def natural(self, error: float) -> float:

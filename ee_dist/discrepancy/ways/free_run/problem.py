@@ -267,6 +267,10 @@ class FreeRun(Problem):
         one_in = spared(found.pieces, steps)
         return found if one_in == steps == 1 else self._by(found.windows_s, one_in, steps)
 
+    @property
+    def as_searched(self) -> FreeRun:
+        return self if self.windows_s is not None else self._in_windows
+
     def beginning(self, seconds: float) -> Problem:
         """Windows from all over the trials, half as many as the beginning would have: each begins from what was measured, and
         they are less alike than one stretch."""
