@@ -102,8 +102,9 @@ class _Import:
         if all(m in positions for m in self.robot.motor_names):
             joints = np.stack([positions[m] for m in self.robot.motor_names], axis=1)
         looked = Looked(
-            self.robot, self.mapping, self.channels, commands, torques, joints, self.step_s, self.report.rate_read_hz
-        )
+            self.robot, self.mapping, self.channels, commands, torques, joints, self.step_s, self.report.rate_read_hz,
+            max(paces_of(self.clocks, self.read_at).values(), default=0.0),
+        )  # fmt: skip
         self.report.suspicious += looked.found()
         log = SensorLog(
             times_s=self.at_s,

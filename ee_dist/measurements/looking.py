@@ -47,6 +47,8 @@ class Looked:
     joints: Array | None
     step_s: float
     rate_read_hz: float
+    every_s: float = 0.0
+    """From one reading of the sensors to the next, where rows between them were filled in; 0: every row is one."""
 
     def found(self) -> Iterator[str]:
         """A line for everything that looks wrong."""
@@ -95,7 +97,10 @@ class Looked:
         position = np.stack([positions[s.target] for s in read], axis=1)
         # Where it stood still speeds are off for that.
         note = stall_suspicion(speed, position, self.step_s)
-        if note := note or pace_suspicion(speed, position, self.step_s, self.rate_read_hz):
+        # Lines between readings are slower than what moved: the change of what was read is that from one reading to the next.
+        stride = max(1, round(self.every_s / self.step_s))
+        pace = stride * self.step_s, self.rate_read_hz
+        if note := note or pace_suspicion(speed[::stride], position[::stride], *pace):
             yield note
         if len(read) > 1:
             names, joints = [s.name for s in read], [s.target for s in read]

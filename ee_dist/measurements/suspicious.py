@@ -39,6 +39,8 @@ STALE, SELDOM = 0.03, 0.45
 QUICK, STALLED, FEW_STALLS, MOST_STALLS = 0.3, 4.0, 3, 0.1
 """Share of a joint's higher speeds from which a row tells how long it took, times its own that a row takes before which a logger
 stood still, and of how few and of what share of all rows that is told."""
+SHORT_S, LONGER_S = 0.04, 0.5
+"""Means over which speeds are held against the change of positions."""
 PACE, CLEAR, ALIKE = 0.05, 0.95, 1.15
 """Share by which speeds must be off the change of their positions to be told (clocks and encoders are ten times as good);
 correlation from which a joint tells it, and the largest ratio between two joints that are off by the same."""
@@ -192,26 +194,39 @@ def pace_suspicion(speed: Array, position: Array, step_s: float, rate_hz: float)
     Noise, rounding and lags take from a correlation what they may add to or take off a ratio, so that joints that are slow or
     coarsely read tell nothing, and what one tells lies between ratio * correlation and ratio / correlation.
     """
-    if len(speed) < 3:
+    ratios = _pace(speed, position, step_s, SHORT_S)
+    if not ratios:
         return None
-    # Differences over two rows are means by Simpson's rule of what lies between; both are smoothed alike then.
-    both = (speed[:-2] + 4 * speed[1:-1] + speed[2:]) / 6, (position[2:] - position[:-2]) / (2 * step_s)
-    width = max(3, round(0.04 / step_s))
-    measured, change = (signals.smooth(signals.smooth(x, width), width) for x in both)
-    moving = signals.lively(speed, position)
-    fits = {k: r for k in moving if (r := signals.relation(change[:, [k]], measured[:, [k]]).correlation) > CLEAR}
-    ratios = {k: float(np.std(measured[:, k]) / np.std(change[:, k])) for k in fits}
-    if 2 * len(fits) <= len(moving):
+    # What goes to and fro between two readings is less in the change of a position than in a speed; over longer it is not.
+    longer = _pace(speed, position, step_s, LONGER_S)
+    if longer is not None and not longer:
         return None
-    least, most = min(ratios[k] * r for k, r in fits.items()), max(ratios[k] / r for k, r in fits.items())
     low, high, ratio = min(ratios.values()), max(ratios.values()), float(np.median([*ratios.values()]))
-    if not (least > 1 + PACE or most < 1 / (1 + PACE)) or high / low > ALIKE or not 0.5 < ratio < 2:
-        return None
-    joints = f"{len(fits)} joints ({low:.3g} to {high:.3g})" if len(fits) > 1 else "the joint"
+    joints = f"{len(ratios)} joints ({low:.3g} to {high:.3g})" if len(ratios) > 1 else "the joint"
     return (
         f"speeds: {ratio:.3g} times the change of the positions at {joints}: either the time is off (rows would come at "
         f"{rate_hz * ratio:.4g} Hz, not {rate_hz:.4g}), or the speeds are scaled by that"
     )
+
+
+def _pace(speed: Array, position: Array, step_s: float, over_s: float) -> dict[int, float] | None:
+    """The times that speeds are the change of positions, by joint, both smoothed over ``over_s`` twice, where these are alike and
+    surely not one; empty where they are not, None where that cannot be told."""
+    width = max(3, round(over_s / step_s))
+    if len(speed) < max(3, 2 * width):
+        return None
+    # Differences over two rows are means by Simpson's rule of what lies between; both are smoothed alike then.
+    both = (speed[:-2] + 4 * speed[1:-1] + speed[2:]) / 6, (position[2:] - position[:-2]) / (2 * step_s)
+    measured, change = (signals.smooth(signals.smooth(x, width), width) for x in both)
+    moving = signals.lively(speed, position)
+    fits = {k: r for k in moving if (r := signals.relation(change[:, [k]], measured[:, [k]]).correlation) > CLEAR}
+    if 2 * len(fits) <= len(moving):
+        return None
+    ratios = {k: float(np.std(measured[:, k]) / np.std(change[:, k])) for k in fits}
+    least, most = min(ratios[k] * r for k, r in fits.items()), max(ratios[k] / r for k, r in fits.items())
+    low, high, ratio = min(ratios.values()), max(ratios.values()), float(np.median([*ratios.values()]))
+    surely = least > 1 + PACE or most < 1 / (1 + PACE)
+    return ratios if surely and high / low <= ALIKE and 0.5 < ratio < 2 else {}
 
 
 def exchanged_suspicions(

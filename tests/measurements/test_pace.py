@@ -82,3 +82,11 @@ def test_a_logger_that_stood_still_is_told_and_not_its_speeds() -> None:
     assert stall_suspicion(1.2 * SPEED, POSITION, STEP_S) is None
     noisy = POSITION + 1e-3 * np.random.default_rng(0).standard_normal(POSITION.shape)
     assert stall_suspicion(SPEED, noisy, STEP_S) is None
+
+
+def test_speeds_that_are_off_in_quick_motion_alone_are_no_other_pace() -> None:
+    """A clock that is off is off over seconds too; what goes to and fro between two readings is not."""
+    slow, quick = 2.0 * np.sin(0.8 * T)[:, None], 0.12 * np.sin(21 * T)[:, None]
+    speed = 1.6 * np.cos(0.8 * T)[:, None], 2.52 * np.cos(21 * T)[:, None]
+    assert said(speed[0] + 1.3 * speed[1], slow + quick) is None
+    assert said(1.2 * (speed[0] + speed[1]), slow + quick) is not None
