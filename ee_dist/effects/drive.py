@@ -14,6 +14,7 @@ from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import (
     Assumed,
     gains_are_known,
+    governed_drives,
     motors,
     motors_with_speed_limit,
     motors_with_torque_limit,
@@ -158,7 +159,7 @@ def _slowness(robot: Robot, target: str) -> dict[str, Range]:
 @effect(
     "command_speed",
     family="drive",
-    targets=position_drives,
+    targets=governed_drives,
     parameters=(
         Parameter(
             "slowness_s_rad",
@@ -166,12 +167,14 @@ def _slowness(robot: Robot, target: str) -> dict[str, Range]:
             0.0,
             math.inf,
             0.0,
-            "least time that the controller takes for a commanded rad, on top of nominal: 0.2 s/rad is no faster than 5 rad/s",
+            "least time that the controller takes for a rad, on top of nominal: 0.2 s/rad is no faster than 5 rad/s",
             0.01,
         ),
     ),
-    physics="The controller leads the joint to its goal no faster than a set speed: a velocity limit or profile of the firmware.",
-    signature="Steps become ramps of one slope, whatever their size and the load; slow motions show nothing.",
+    physics="The controller leads the joint to its goal no faster than a set speed: a velocity limit or profile of the firmware. "
+    "Of a drive that obeys torques: near that speed none pushes on.",
+    signature="Steps become ramps of one slope, whatever their size and the load; slow motions show nothing. Torques that "
+    "push on are missing near one speed, and those that brake are not.",
     ranges=_slowness,
 )
 def command_speed(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:

@@ -71,6 +71,11 @@ def position_drives(robot: Robot) -> tuple[str, ...]:
     return tuple(d.joint for d in robot.drives if d.command == "position")
 
 
+def governed_drives(robot: Robot) -> tuple[str, ...]:
+    """Joints whose controller may keep them below a speed of its own."""
+    return tuple(d.joint for d in robot.drives if d.command in ("position", "torque"))
+
+
 def controlled(robot: Robot) -> tuple[str, ...]:
     """Joints under a controller of position or speed."""
     return tuple(d.joint for d in robot.drives if d.command in ("position", "speed"))

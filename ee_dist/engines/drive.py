@@ -36,6 +36,8 @@ from there on an engine takes the damping at the end of the step, if it can. The
 can be stopped at once; below the second one, of the joint's own, nothing needs to be looked at."""
 HOPELESS_SHARE = 2.0
 """Of the joint's own inertia, what no explicit step holds."""
+GOVERNED = 0.9
+"""Share of its top speed from which a controller of torques lets less of them push on."""
 STOP_SHARE = 0.5
 """How much of the needed change of speed a stop makes in one step: below 1, because felt inertia is an estimate."""
 
@@ -71,6 +73,8 @@ class DrivePath:
         self.pace = np.zeros(shape)
         """and how fast these go, where their acceleration is limited, rad/s."""
         self.led = np.isfinite(p["command_speed"]) & (self.kind <= SPEED)
+        self.governed = np.isfinite(p["command_speed"]) & (self.kind == TORQUE)
+        self.uses_governor = bool(self.governed.any())
         self.eased = np.isfinite(p["command_acceleration"]) & (self.kind == POSITION)
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
@@ -244,6 +248,8 @@ class DrivePath:
             self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, sloped,
             self.integral, self.last_active, self.current, active, stiffness, damping,
         )  # fmt: skip
+        if self.uses_governor:
+            self._governed(speed, active, damping if sloped else None)
         if self.uses["back_emf"]:
             # Taken with the friction, at the end of the step; the current is less by it all the same.
             lost = self.p["back_emf"] * speed * closed
@@ -251,6 +257,18 @@ class DrivePath:
         if self.uses["current_gain"]:
             self.current = self.current / self.p["current_gain"]
         return active, stiffness, damping
+
+    def _governed(self, speed: Array, active: Array, damping: Array | None) -> None:
+        """Near its top speed the controller of a torque lets less of it push on, and none beyond; what slows the joint down
+        it lets through. Changes ``active``, and how that falls with speed, ``damping`` (all (B, M))."""
+        top = np.where(self.governed, self.p["command_speed"], 1.0)
+        width = (1.0 - GOVERNED) * top
+        room = np.where(self.governed, np.clip((top - np.sign(active) * speed) / width, 0.0, 1.0), 1.0)
+        if damping is not None:
+            damping += np.where((room > 0) & (room < 1), np.abs(active) / width, 0.0)
+        active *= room
+        for taken in (self.last_active, self.current):
+            taken *= room
 
 
 MOTOR = ("kp", "ki", "kd", "zero_offset", "deadband", "torque_limit", "strength", "own_emf", "integral_limit")

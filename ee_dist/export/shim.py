@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-STOP_SHARE = 0.5
+STOP_SHARE, GOVERNED = 0.5, 0.9
 LOAD_LIMIT, GEAR_LIMIT, LIGHTEST_ROTOR = 2.0, 3.0, 0.05
 TOUCHING, LIFTED = 1.0, -1.0
 
@@ -147,7 +147,12 @@ class Shim:
             np.where(by_position, d["kd"], np.where(by_speed, d["kp"], 0.0)),
         )
         active = (given * left - emf * turning) * d["strength"]
-        return active, stiff * free * d["strength"], (damped * free + emf) * d["strength"]
+        governed = np.isfinite(d["command_speed"]) & by_torque
+        top = np.where(governed, d["command_speed"], 1.0)
+        room = np.where(governed, np.clip((top - np.sign(active) * turning) / ((1 - GOVERNED) * top), 0.0, 1.0), 1.0)
+        steep = np.where((room > 0) & (room < 1), np.abs(active) / ((1 - GOVERNED) * top), 0.0)
+        self.last_active, active = given * room, active * room
+        return active, stiff * free * d["strength"], (damped * free + emf) * d["strength"] + steep
 
     def _motor_side(self, q: Array, qd: Array, elastic: Array) -> Any:
         flying = (self.d["backlash"] > 0) & (self.side == 0)

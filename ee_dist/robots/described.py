@@ -100,7 +100,7 @@ def robot_of_body(body: Body, data: Mapping[str, Any], where: str) -> tuple[Robo
     if limited:
         notes.append(
             f"speed_limit of {listed(limited)}: no torque falls with its speed there: a drive that obeys torques makes up for "
-            "back-EMF; it only says how fast the joint may be expected to be"
+            "back-EMF; a controller that lets a joint go no faster is 'command_speed'"
         )
     if free and body.root_without_mass:
         notes.append(f"the base {quoted(body.parts[0].name)} has no mass in the file: 1 kg is assumed")

@@ -136,8 +136,9 @@ class Drive:
     command: str = "position"
     """One of COMMANDS."""
     command_speed: float = float("inf")
-    """Velocity limit of the controller, rad/s: how fast it lets a commanded position move, or how large a commanded speed it
-    obeys. It has nothing to do with ``speed_limit``, which is the motor's."""
+    """Velocity limit of the controller, rad/s: how fast it lets a commanded position move, how large a commanded speed it
+    obeys, or from which speed on no commanded torque pushes (less of it from nine tenths of that speed on). It has nothing to
+    do with ``speed_limit``, which is the motor's."""
     command_acceleration: float = float("inf")
     """Acceleration limit of a controller of positions, rad/s^2: how fast the goal to which it leads its joint gathers speed, and
     loses it again before it arrives (a trapezoidal profile)."""

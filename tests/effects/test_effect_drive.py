@@ -130,6 +130,35 @@ def test_command_speed_makes_a_ramp_of_a_step(bench: Bench) -> None:
     np.testing.assert_allclose(capped.channel("position"), ramp.channel("position"), atol=1e-9)
 
 
+def test_command_speed_takes_what_pushes_on_from_a_torque_and_not_what_brakes(bench: Bench) -> None:
+    robot, top, pull = slider(command="torque"), 0.5, PULL_N / MASS_KG
+    limit = term("command_speed", "joint", slowness_s_rad=1.0 / top)
+    speed = bench.run(robot, limit, steps=600, command=PULL_N).channel("velocity")
+    # As fast as without it up to nine tenths of the speed, then ever less.
+    reached = round(0.9 * top / pull / 0.001)
+    np.testing.assert_allclose(speed[: reached - 2], pull * 0.001 * np.arange(1, reached - 1), atol=6e-3)
+    after = 0.001 * np.arange(len(speed) - reached)
+    np.testing.assert_allclose(speed[reached:], top - 0.1 * top * np.exp(-after * pull / (0.1 * top)), atol=0.01)
+    there_and_back = np.where(np.arange(600) < 300, PULL_N, -PULL_N)
+    free = bench.run(robot, steps=600, command=there_and_back).channel("velocity")
+    held = bench.run(robot, limit, steps=600, command=there_and_back).channel("velocity")
+    np.testing.assert_allclose(np.diff(held)[310:390], np.diff(free)[310:390], atol=1e-9)
+    again = bench.run(slider(command="torque", command_speed=top), steps=600, command=PULL_N).channel("velocity")
+    np.testing.assert_array_equal(again, speed)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.46, 0.49, 0.6, -0.49, -2.0])
+def test_the_shim_lets_as_little_push_on_near_a_top_speed(speed: float) -> None:
+    model = apply(slider(command="torque"), [term("command_speed", "joint", slowness_s_rad=2.0)])
+    at, moving = np.zeros((1, 1)), np.full((1, 1), speed)
+    path, shim = DrivePath([model], model.time_step_s), Shim(parameters(model))
+    for t, told in enumerate((5.0, -5.0, 5.0)):
+        asked = np.full((1, 1), told)
+        wanted = told * float(np.clip((0.5 - np.sign(told) * speed) / 0.05, 0.0, 1.0))
+        assert path.step(0.001 * t, asked, at, moving)[0] == pytest.approx([wanted])
+        assert shim.torque(0.001 * t, asked[0], at[0], moving[0]) == pytest.approx([wanted])
+
+
 def test_command_acceleration_makes_a_trapezoid_of_a_step(bench: Bench) -> None:
     times, far = 0.001 * np.arange(1, 2501), 0.4
     for slowest, most in ((np.inf, 0.5), (0.25, 0.5)):

@@ -16,8 +16,10 @@ from ee_dist.trials.log import Array
 
 
 def limited(drive: Drive) -> bool:
-    """Whether its controller has limits of its own."""
-    return bool(np.isfinite(drive.command_speed) or np.isfinite(drive.command_acceleration))
+    """Whether its controller leads its joint to goals within limits of its own."""
+    return drive.command != "torque" and bool(
+        np.isfinite(drive.command_speed) or np.isfinite(drive.command_acceleration)
+    )
 
 
 @dataclass(frozen=True, eq=False)
