@@ -53,9 +53,10 @@ def check_times(times_s: Array, table: Table, column: str) -> Timing:
         how = "runs backwards" if steps[row - 1] < 0 else "stands still"
         first = float(np.median(np.abs(steps)))
         several = "; several trials in one file? add 'split: restarts'" if steps[row - 1] < -10 * first else ""
+        more = f", and in {len(wrong) - 1} rows more" if len(wrong) > 1 and not several else ""
         raise MeasurementError(
             f"{table}: row {table.line(row)}, column {quoted(column)}: time {how} "
-            f"({times_s[row - 1]:.9g} s, then {times_s[row]:.9g} s){several}"
+            f"({times_s[row - 1]:.9g} s, then {times_s[row]:.9g} s){more}{several}"
         )
     median = float(np.median(steps))
     long = np.flatnonzero(steps > GAP * median)
