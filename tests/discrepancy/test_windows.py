@@ -10,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from way_samples import evaluator_for, measure, samples
 
+from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.evidence.holdout import windows as windows_cut
 from ee_dist.discrepancy.explain import UNEXPLAINED, explain
+from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import candidate
@@ -187,6 +189,13 @@ def test_what_explains_by_standing_still_is_not_what_is_missing() -> None:
     (found,) = friction.candidates
     assert found.explained > 0.5 and friction.best is None and friction.verdict == UNEXPLAINED
     assert "says next to nothing of the motion" in found.why_not and friction.left
+    # Who asks for it all the same is told before how much is explained.
+    wanted = [candidate(loose, "coulomb_friction", joint)]
+    improved = improve(problem, wanted, wanted=wanted)
+    also = problem.other_errors(improved.ladder[0].terms, improved.terms)
+    account = improve_account(problem, improved, also=also)
+    assert "says next to nothing of the motion" in account.words[1] and not account.good
+    assert sum("says next to nothing of the motion" in line for line in account.words) == 1
 
 
 def test_a_right_model_of_a_robot_at_rest_is_not_told_to_stand_still() -> None:

@@ -136,6 +136,11 @@ def improve_account(
     advice = slower(unsure) if unsure else MEND if wrong else advice
     tied = bool(found.twins) or any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
+    nothing = problem.says_nothing(found.terms) if len(found.ladder) > 1 else ""
+    if nothing:
+        # Nobody should read how much is explained without it.
+        warnings = (*warnings, f"{nothing[0].upper()}{nothing[1:]}.")
+        also = [line for line in also if nothing[1:] not in line]
     good = settled and not warnings and not unsure and not any(ties.values())
     more = (*(word.lines if word is not None else ()), *also, *lines, *held_out_notes(problem), *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
