@@ -108,6 +108,16 @@ def test_a_folder_for_each_trial_or_a_name_for_each(tmp_path: Path) -> None:
     assert abs(len(first) - 300) < 5 and abs(len(second) - (len(m["t"]) - 300)) < 5
 
 
+def test_what_lies_beside_them_and_says_nothing_of_itself_is_left_out(tmp_path: Path) -> None:
+    m = samples.motion()
+    by_quantity(tmp_path, m)
+    table(tmp_path / "calibration.csv", np.arange(6.0).reshape(3, 2), ["a", "b"])
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    proposal = proposal_for(recordings_in(tmp_path)[0], robot, Hints())
+    assert not proposal.questions and any("left out" in n and "calibration.csv" in n for n in proposal.notes)
+    assert len(taken_in(tmp_path, recordings_in(tmp_path)[0])) == 1
+
+
 def test_full_logs_that_are_called_after_what_was_done_are_trials(tmp_path: Path) -> None:
     m = samples.motion()
     names = ["time", *(f"{j}_pos" for j in JOINTS), *(f"{j}_goal" for j in JOINTS)]

@@ -27,15 +27,19 @@ _TRIALS = frozenset(["episode", "episodes", "trial", "trials", "run", "runs", "d
 
 
 def gathered(
-    files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints, joints: Sequence[str] = ()
+    files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints, joints: Sequence[str], notes: list[str]
 ) -> Recorded:
     """One trial to look at, and into ``proposal_head`` what the mapping must say to get all: ``tables`` or ``side_by_side`` for
-    trials of several files, ``split`` for several trials of one. Raises MeasurementError."""
+    trials of several files, ``split`` for several trials of one; into ``notes`` what is left out. Raises MeasurementError."""
     first = read(files[0])[0]
     if len(files) > 1 and len(first.tables) == 1:
         together = put_together(files, joints)
         if isinstance(together, tuple):
             proposal_head["side_by_side"] = dict(together[0].patterns)
+            left = sorted({f.name for f in together[0].others})
+            notes += [f"left out, since their names say nothing of what they hold: {listed(left[:MOST_SHOWN])}"] * bool(
+                left
+            )
             return Recorded("", (together[1],))
         spread = _spread(files, first)
         if spread is not None:
@@ -149,12 +153,14 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
     from ee_dist.measurements.proposal.choose import propose
 
     head: dict[str, Any] = {}
-    recorded = gathered(files, head, hints, robot.motor_names)
+    notes: list[str] = []
+    recorded = gathered(files, head, hints, robot.motor_names, notes)
     if len(recorded.tables) > 1 and "tables" not in head:  # what is named as a file is to be named at each channel
         shown = [t for t in recorded.tables if len(t) > 20]
         recorded = replace(recorded, tables=tuple(shown) or recorded.tables)
     proposal = propose(recorded, robot, hints)
     proposal.head = head | proposal.head
+    proposal.notes[:0] = notes
     add_stated(proposal, files, recorded, robot)
     used = {c.column for c in proposal.choices}
     left = [name for name in proposal.unused if name not in used]

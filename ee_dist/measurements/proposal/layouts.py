@@ -22,10 +22,12 @@ _NUMBERED = re.compile(r"(?:joint|motor|axis|servo|link|drive|dxl|actuator|j|m)[
 
 @dataclass(frozen=True)
 class Layout:
-    """``patterns``: the name of each kind of file, with {trial} for what tells trials apart; ``first``: those of the first."""
+    """``patterns``: the name of each kind of file, with {trial} for what tells trials apart; ``first``: those of the first;
+    ``others``: files beside them that do not say what they hold."""
 
     patterns: Mapping[str, str]
     first: Mapping[str, Path]
+    others: tuple[Path, ...] = ()
 
 
 def put_together(files: Sequence[Path], joints: Sequence[str]) -> tuple[Layout, Table] | MeasurementError | None:
@@ -83,11 +85,15 @@ def _joints(stems: Sequence[str], joints: Sequence[str]) -> list[tuple[int, int]
 
 
 def _layout(files: Sequence[Path], spans: Sequence[tuple[int, int] | None]) -> Layout | None:
-    """Files by what they hold and by trial; None where some are missing, or what tells trials apart stands in two places."""
+    """Files by what they hold and by trial; None where some are missing, or what tells trials apart stands in two places, or most
+    do not say what they hold."""
     groups: dict[tuple[Path, str, str], dict[str, Path]] = {}
+    others = [file for file, span in zip(files, spans, strict=True) if span is None]
+    if 2 * len(others) >= len(files):
+        return None
     for file, span in zip(files, spans, strict=True):
         if span is None:
-            return None
+            continue
         what = file.stem[slice(*span)]
         group = groups.setdefault((file.parent, file.stem[: span[0]], file.stem[span[1] :]), {})
         if what in group:
@@ -101,7 +107,7 @@ def _layout(files: Sequence[Path], spans: Sequence[tuple[int, int] | None]) -> L
         return None
     head = before.pop() if len(before) == 1 else "{trial}"
     tail = behind.pop() if len(behind) == 1 else "{trial}"
-    return Layout({what: f"{head}{what}{tail}{file.suffix}" for what, file in first.items()}, first)
+    return Layout({what: f"{head}{what}{tail}{file.suffix}" for what, file in first.items()}, first, tuple(others))
 
 
 def _tables(found: Layout) -> dict[str, Table] | None:
