@@ -13,32 +13,43 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.measurements.signals import MOST_ROWS, lead
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import SensorLog
+from ee_dist.trials.log import Array, SensorLog
 
 FOLLOWS = 0.8
-"""Correlation from which a position follows its command, and is not only on the same side of things."""
+"""Correlation from which a reading follows its command, and is not only on the same side of things."""
 
 
 def with_lags(robot: Robot, trials: Sequence[MeasuredTrial]) -> Robot:
-    """The robot with the lag (s) of each joint that is told positions, the median of its trials; the same robot where no reading
-    follows a command."""
-    at = {s.target: k for k, s in enumerate(robot.sensors) if s.kind == "position"}
+    """The robot with the lag (s) of each driven joint, the median of its trials: of its position, its speed or the torque of its
+    motor behind what it was told of that; the same robot where no reading follows a command."""
     lags = {}
     for k, drive in enumerate(robot.drives):
-        if drive.command == "position" and drive.joint in at:
-            seen = [_lag(t.log, k, at[drive.joint]) for t in trials]
-            lags[drive.joint] = float(np.median([s for s in seen if s is not None] or [0.0]))
+        told = [(t.log, seen) for t in trials if (seen := _obeying(t.log, robot, k)) is not None]
+        found = [s for log, seen in told if (s := _lag(log, k, seen)) is not None]
+        if found:
+            lags[drive.joint] = float(np.median(found))
     if not any(lags.values()):
         return robot
     return replace(robot, joints=tuple(replace(j, lag_s=lags.get(j.name, 0.0)) for j in robot.joints))
 
 
-def _lag(log: SensorLog, motor: int, sensor: int) -> float | None:
+def _obeying(log: SensorLog, robot: Robot, motor: int) -> Array | None:
+    """(T,) what was read of what a drive is told: None where that was not read, or is no more than what was told."""
+    drive = robot.drives[motor]
+    if drive.command == "torque":
+        seen = None if log.torques is None else log.torques[:, motor]
+        return None if seen is None or np.array_equal(seen, log.commands[:, motor]) else seen
+    kind = {"position": "position", "speed": "velocity"}.get(drive.command)
+    at = [i for i, s in enumerate(robot.sensors) if s.kind == kind and s.target == drive.joint]
+    return log.sensors[:, at[0]] if at else None
+
+
+def _lag(log: SensorLog, motor: int, seen: Array) -> float | None:
     """None where it cannot be told: the joint rests, repeats itself, or follows nothing."""
-    told, seen = log.commands[:MOST_ROWS, [motor]], log.sensors[:MOST_ROWS, [sensor]]
-    if not (np.isfinite(told).all() and np.isfinite(seen).all()):
+    told, read = log.commands[:MOST_ROWS, [motor]], seen[:MOST_ROWS, None]
+    if not (np.isfinite(told).all() and np.isfinite(read).all()):
         return None
-    found = lead(told, seen, float(np.median(np.diff(log.times_s))))
+    found = lead(told, read, float(np.median(np.diff(log.times_s))))
     if abs(found.correlation) < FOLLOWS or found.repeats:
         return None
     return max(found.lead_s, 0.0)

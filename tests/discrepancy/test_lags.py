@@ -79,3 +79,22 @@ def test_what_most_joints_wait_for_is_no_sluggishness_of_theirs() -> None:
     assert longest_delay(waiting) == pytest.approx(1.05 * 0.9)
     quick = replace(arm, joints=tuple(replace(j, lag_s=s / 3) for j, s in zip(arm.joints, lags, strict=True)))
     assert longest_delay(quick) == pytest.approx(1.25 * 0.23)
+
+
+def test_a_speed_and_a_torque_come_late_too():
+    """Of a drive that obeys speeds its speed follows, of one that obeys torques what its motor gives."""
+    speed = next(k for k, s in enumerate(ROBOT.sensors) if s.kind == "velocity")
+    seen = trial("a", 0.4, 1)
+    moved = seen.log.sensors[:, [POSITION]]
+    by_speed = ROBOT.map_drive("servo", lambda d: replace(d, command="speed"))
+    sensors = np.zeros_like(seen.log.sensors)
+    sensors[:, [speed]] = moved
+    read = replace(seen, log=replace(seen.log, sensors=sensors))
+    assert with_lags(by_speed, [read]).joint("servo").lag_s == pytest.approx(0.4, abs=STEP_S)
+    by_torque = ROBOT.map_drive("servo", lambda d: replace(d, command="torque"))
+    given = replace(seen, log=replace(seen.log, sensors=np.zeros_like(sensors), torques=moved))
+    assert with_lags(by_torque, [given]).joint("servo").lag_s == pytest.approx(0.4, abs=STEP_S)
+    # A torque that was only commanded, and written down twice, says nothing; nor one that was not read at all.
+    for torques in (seen.log.commands, None):
+        twice = replace(seen, log=replace(seen.log, sensors=np.zeros_like(sensors), torques=torques))
+        assert with_lags(by_torque, [twice]) is by_torque
