@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.robot_channels import command_kind
 from ee_dist.measurements.signals import AGAINST, lead, moves, relation
 from ee_dist.measurements.standing import REST, reach_of, stands_still
 from ee_dist.measurements.suspicious import command_suspicion
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, SensorLog
 
 FEWEST_ROWS = 10
 FAR = 0.1
@@ -108,6 +109,21 @@ def torques_beside_commands(robot: Robot, commands: Array, torques: Array, step_
                 f"{where} comes {-1e3 * found.lead_s:.0f} ms before it (correlation {found.correlation:.2f}): are the two "
                 "columns exchanged, or their clocks different?"
             )
+
+
+def disobeying(robot: Robot, logs: Sequence[tuple[str, SensorLog]]) -> list[str]:
+    """A line on each joint that does not do what it was told in some of the named ``logs``: as in the first of these."""
+    where: dict[str, tuple[str, list[str]]] = {}
+    for name, log in logs:
+        if len(log) < 2:
+            continue
+        position_of = {} if log.joints is None else dict(zip(robot.motor_names, log.joints.T, strict=True))
+        lines = [*far_from_commands(robot, log.commands, position_of)]
+        if log.torques is not None:
+            lines += torques_beside_commands(robot, log.commands, log.torques, float(log.times_s[1] - log.times_s[0]))
+        for line in lines:
+            where.setdefault(line.partition(":")[0], (line, []))[1].append(name)
+    return [f"During {listed(trials)}: {line}" for line, trials in where.values()]
 
 
 def _alike(robot: Robot, mapping: Mapping, one: str, other: str) -> bool:

@@ -18,6 +18,7 @@ from ee_dist.discrepancy.ways.open_loop.scale import channel_scale
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, from_entries
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
+from ee_dist.measurements.commanded import disobeying
 from ee_dist.measurements.jumps import jumping
 from ee_dist.measurements.taking import taking
 from ee_dist.recording.reader import read_run
@@ -100,6 +101,7 @@ def load(config: Config) -> Measurements:
     held_out = tuple(names[k].name for k in apart)
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
     remarks += taking(robot, [(t.name, t.log) for t in trials if t.commands_held is not False])
+    remarks += disobeying(robot, [(t.name, t.log) for t in trials if t.commands_held is not False])
     remarks += jumping(robot, [(t.name, t.log) for t in trials])
     if short:
         more = f", and {len(short) - 1} more as short" if len(short) > 1 else ""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from ee_dist.measurements.commanded import beyond_the_drive, far_from_commands, torques_beside_commands
+from ee_dist.measurements.commanded import beyond_the_drive, disobeying, far_from_commands, torques_beside_commands
 from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
@@ -257,3 +257,15 @@ def test_torques_that_come_late_early_or_the_other_way_round_are_told(
     assert (lines == []) if said is None else (len(lines) == 1 and said in lines[0]), lines
     assert list(torques_beside_commands(robot, told[:, None], told[:, None], 0.01)) == [], "the same column twice"
     assert list(torques_beside_commands(servo_pendulum(), told[:, None], -told[:, None], 0.01)) == []
+
+
+def test_what_a_log_says_of_commands_is_said_again_when_it_is_compared() -> None:
+    robot = servo_pendulum().map_drive("servo", lambda d: replace(d, command="torque"))
+    rng = np.random.default_rng(1)
+    told = np.cumsum(rng.normal(size=(len(T), 1)), axis=0)
+    sensors, units = np.zeros((len(T), len(robot.sensors))), tuple(s.unit for s in robot.sensors)
+    log = SensorLog(T, sensors, told, robot.sensor_names, units, robot.motor_names, torques=-told)
+    right = replace(log, torques=told + 0.1 * rng.normal(size=told.shape))
+    (line,) = disobeying(robot, [("a", log), ("b", right), ("c", log)])
+    assert line.startswith("During a, c: command of servo: the torque that was measured runs against it")
+    assert disobeying(robot, [("b", right)]) == [] and disobeying(robot, [("b", replace(log, torques=None))]) == []
