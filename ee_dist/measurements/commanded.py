@@ -63,15 +63,20 @@ def beyond_the_drive(robot: Robot, commands: Array) -> Iterator[str]:
 
 
 def far_from_commands(robot: Robot, commands: Array, position_of: dict[str, Array]) -> Iterator[str]:
-    """A line on joints that are said to obey positions, and stay farther from them than they move: they obey something else.
-    ``commands`` (T, M) are NaN where drives are released."""
+    """A line on joints that are said to obey positions, and stay farther from them than they move, and than a soft controller
+    under load would: they obey something else. ``commands`` (T, M) are NaN where drives are released."""
     for k, drive in enumerate(robot.drives):
         obeyed = np.isfinite(commands[:, k])
         if drive.joint not in position_of or obeyed.sum() <= FEWEST_ROWS or command_kind(drive) != "position":
             continue
         seen, joint = position_of[drive.joint][obeyed], robot.joint(drive.joint)
         off, moved = float(np.median(np.abs(commands[obeyed, k] - seen))), float(np.ptp(seen))
-        if off > max(moved, FAR * reach_of(joint)) and moved > REST * reach_of(joint):
+        asks = drive.kp * off
+        if (
+            off > max(moved, FAR * reach_of(joint))
+            and moved > REST * reach_of(joint)
+            and asks > MANY * drive.torque_limit
+        ):
             unit = "rad" if joint.kind == "hinge" else "m"
             yield (
                 f"command of {drive.joint}: the joint lies {off:.3g} {unit} from it, more than the {moved:.3g} {unit} that it "

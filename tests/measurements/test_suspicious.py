@@ -230,6 +230,8 @@ def test_a_joint_that_is_nowhere_near_its_command_is_told() -> None:
     """The command that was logged is not what the joint obeys: it was led by its speed, and its position ran away."""
     robot = servo_pendulum()
     asked, near, away = (v[:, None] for v in (0.4 * WAVE, 0.4 * np.sin(2 * T - 0.3) - 0.2, 0.4 * WAVE + 3.0))
+    soft = robot.map_drive("servo", lambda d: replace(d, kp=0.1 * d.torque_limit))
+    assert list(far_from_commands(soft, asked, {"servo": away[:, 0]})) == [], "a load may hold it there"
     assert list(far_from_commands(robot, asked, {"servo": near[:, 0]})) == []
     (line,) = far_from_commands(robot, asked, {"servo": away[:, 0]})
     assert "lies 3 rad from it" in line and "led by speeds or torques" in line
