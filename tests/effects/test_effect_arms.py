@@ -214,7 +214,7 @@ def test_effects_act_where_the_kind_of_command_has_them() -> None:
     for name, targets in (
         ("zero_offset", ()),
         ("deadband", ()),
-        ("command_speed", ()),
+        ("command_speed", ("elbow",)),
         ("command_acceleration", ()),
         ("speed_gain", ()),
         ("motor_weak", ("elbow",)),
