@@ -169,3 +169,16 @@ def test_a_trial_at_one_slow_speed_is_not_near_a_reversal() -> None:
     assert found == {"speeding up or slowing down": 1 / 600, "cruising up": 599 / 600}
     still = {r.name: r.time_share for r in remains("joint", left, x, v * np.repeat([0.001, 1], 300), a, which).regimes}
     assert still["near a reversal"] == 0.5, "what stands still has no pace of its own"
+
+
+@pytest.mark.parametrize("way", ["open_loop", "free_run", "force_balance"])
+def test_what_is_known_of_a_trial_is_not_changed_by_what_is_believed_of_the_robot(way: str) -> None:
+    """A load that was weighed weighs that, however light the part is that carries it."""
+    sample, load = samples()["arm"], term("payload", "lower", mass_kg=0.4, x_m=0.2)
+    trials = tuple(replace(t, setup=(load,)) for t in measured("arm"))
+    lighter = term("part_mass", "lower", change=-0.8)
+    found = problem_by(way, trials, sample.robot)
+    by_hand = problem_by(way, trials, apply(sample.robot, (lighter,)))
+    told, described = found.raw(found.residuals([(lighter,)])[0]), by_hand.raw(by_hand.residuals([()])[0])
+    bare = found.raw(found.residuals([()])[0])
+    assert np.nanmax(np.abs(told - described)) < 0.02 * np.nanmax(np.abs(bare - described))

@@ -136,3 +136,20 @@ def test_qd_is_a_speed_where_it_goes_with_the_change_and_what_was_desired_where_
         )
         proposal = proposal_for([logs.written(tmp_path, pd.DataFrame(frame))], robot, Hints())
         assert {c.group for c in proposal.choices if c.column.startswith("qd")} == {group}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "unit"),
+    [
+        ("timestamps", "time", None),
+        ("stamps", "time", None),
+        ("motor_amps", CURRENT, "A"),
+        ("tau_amps", CURRENT, "A"),
+        ("vel_mps", SPEED, "m/s"),
+        ("slide_mmps", SPEED, "mm/s"),
+        ("velradps", SPEED, "rad/s"),
+    ],
+)
+def test_the_end_of_a_word_is_no_unit(name: str, kind: str, unit: str | None) -> None:
+    found = read_name(name)
+    assert (found.kind, found.unit) == (kind, unit)

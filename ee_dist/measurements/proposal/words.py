@@ -16,7 +16,7 @@ _QUANTITY = {
     CURRENT: "cur curr current currents amps ampere strom iq amperage",
     OTHER: "acc accel acceleration qdd ddq qddot volt voltage volts temp temperature pwm err error fric friction duty status "
     "flag mode supply battery load enable enabled counter seq id ticks cycle wrench imu",
-    TIME: "t time times timestamp timestamps stamp zeit clock sec secs seconds elapsed uptime tstamp date datetime",
+    TIME: "t time times timestamp timestamps stamp stamps zeit clock sec secs seconds elapsed uptime tstamp date datetime",
 }
 _KIND = {w: k for k, words in _QUANTITY.items() for w in words.split()}
 _COMMAND = frozenset(
@@ -109,7 +109,7 @@ _LETTERS = {"s": "s", "m": "m", "a": "A", "v": "V", "n": "N"}
 _SHORT = {"v": SPEED, "w": SPEED, "qd": SPEED, "i": CURRENT, "p": POSITION, "u": OTHER, "f": TORQUE, "x": POSITION}
 """Letters that stand for a quantity where nothing else does; what the signals say goes before them (qd is a speed, or what was
 desired)."""
-_PER_SECOND = re.compile(r"(rad|deg|m|mm|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg|(?<![^\W_])mm?)_s$", re.I)
+_PER_SECOND = re.compile(r"(rad|deg|(?<![^\W_])mm?|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg|(?<![^\W_])mm?)_s$", re.I)
 
 
 @dataclass(frozen=True)

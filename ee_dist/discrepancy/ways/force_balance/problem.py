@@ -155,7 +155,9 @@ class ForceBalance(Problem):
         out = np.zeros((len(hypotheses), len(self.segment_of)))
         own = self.scale * self.own_noise
         for k in chosen:
-            for row, model in enumerate(applied(self.models[k], hypotheses)):
+            # What is known of a trial comes last: a load that was weighed is none of a part that is lighter than described.
+            setup = self.measured[k].setup
+            for row, model in enumerate(applied(self.robot, [(*h, *setup) for h in hypotheses])):
                 kept = self.balances[k](model)
                 if kept is None:
                     out[row, self.slices[k]] = np.inf
