@@ -22,6 +22,10 @@ AGAIN = 0.03
 """Finite differences where the values are nearly right already."""
 SURE = 0.01
 """What a channel is at least believed to vary, as a share of the one that varies most: a computed command has no noise."""
+TOGETHER = 0.2
+"""Share of the held-out energy that all terms that go at once may cost, where luck once is less than that."""
+FITTED = 0.25
+"""Share of the energy of what was fitted by which it may rise without all that goes at once."""
 ROUNDS = 3
 """How often terms are left out and the rest is fitted anew."""
 
@@ -85,6 +89,8 @@ def as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: 
     known, first = held_by_slopes(search, [whole, fewer[most]], cut)
 
     def may_go(n: int, without: HeldOut) -> bool:
+        if not _fits_as_well(whole, fewer[n]):
+            return False
         return without.energy - known.energy <= _may_cost(search.problem, known.energy, cut, tried, n, each)
 
     if may_go(most, first):
@@ -96,6 +102,12 @@ def as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: 
             if may_go(n, without):
                 return n
     return 0
+
+
+def _fits_as_well(whole: Fit, without: Fit) -> bool:
+    """Whether what was fitted is still fitted without some terms. Of two motions neither tells from the other what only both do:
+    then no term is told by itself from neutral, and what is held out speaks for none of many that are there together."""
+    return without.energy <= (1.0 + FITTED) * whole.energy
 
 
 def _made_up_for(inverse: Array, gone: Array, u: Array) -> Array:
@@ -177,7 +189,9 @@ def _may_cost(problem: Problem, energy: float, cut: Cut, tried: int, count: int,
     # Many small effects may each be below the resolution at which channels are compared, and not all together.
     least = float(problem.floor.mean())
     if each:
-        return allowed_loss(problem, energy, cut, tried, least, count)
+        # Of few values luck is a large part each time, and the best of all that were tried does not come as often as terms go.
+        most = max(luck(problem, energy, tried, least), TOGETHER * energy)
+        return min(allowed_loss(problem, energy, cut, tried, least, count), most)
     return min(allowed_loss(problem, energy, cut, tried, least), count * luck(problem, energy, tried, least))
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
 
-from ee_dist.discrepancy.evidence.holdout import travelling
+from ee_dist.discrepancy.evidence.holdout import WINDOWS, travelling
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.examine import Current
-from ee_dist.discrepancy.pruning import _luck, as_many, luck, pruned, without_these
+from ee_dist.discrepancy.pruning import _luck, _may_cost, as_many, luck, pruned, without_these
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
@@ -130,4 +130,28 @@ def test_far_from_the_noise_each_term_that_goes_may_cost_luck(monkeypatch, rises
         "ee_dist.discrepancy.pruning.held_by_slopes",
         lambda _search, fits, _cut: [SimpleNamespace(energy=held[f]) for f in fits],
     )
+    monkeypatch.setattr("ee_dist.discrepancy.pruning._fits_as_well", lambda _whole, _without: True)
     assert as_many(Search(problem), 0, {n: n for n in rises}, cut, 50) == go  # type: ignore[arg-type, dict-item]
+
+
+@pytest.mark.parametrize(("values", "share"), [(80, 0.25), (20_000, 0.08)])
+def test_of_few_values_what_goes_may_not_take_the_model_along(values: int, share: float) -> None:
+    """Eight terms that luck may tell cost what it does once, or a fifth of all that is left: eight times that of eighty
+    values would be three times the error."""
+    problem = SimpleNamespace(floor=np.ones(values))
+    energy = 4.0 * values
+    most = _may_cost(problem, energy, SimpleNamespace(name=WINDOWS), 100, 8, True)
+    assert luck(problem, energy, 100, 1.0) <= most <= share * energy
+    assert most <= 8 * luck(problem, energy, 100, 1.0)
+
+
+def test_what_is_told_together_stays_though_nothing_held_out_speaks_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fitted to one motion alone many values foretell the other badly, and yet both are fitted by them and not without."""
+    problem = Linear((term("coulomb_friction", JOINTS[0], torque_nm=0.3),), motions=2)
+    monkeypatch.setattr(
+        "ee_dist.discrepancy.pruning.held_by_slopes", lambda _s, fits, _c: [SimpleNamespace(energy=1.0) for _ in fits]
+    )
+    whole, close, far = (SimpleNamespace(energy=e) for e in (100.0, 120.0, 290.0))
+    cut = travelling(problem)[0]
+    assert as_many(Search(problem), whole, {6: far, 3: close, 1: whole}, cut, 50) == 3  # type: ignore[arg-type, dict-item]
+    assert as_many(Search(problem), whole, {6: far}, cut, 50) == 0  # type: ignore[arg-type, dict-item]

@@ -109,7 +109,9 @@ _LETTERS = {"s": "s", "m": "m", "a": "A", "v": "V", "n": "N"}
 _SHORT = {"v": SPEED, "w": SPEED, "qd": SPEED, "i": CURRENT, "p": POSITION, "u": OTHER, "f": TORQUE, "x": POSITION}
 """Letters that stand for a quantity where nothing else does; what the signals say goes before them (qd is a speed, or what was
 desired)."""
-_PER_SECOND = re.compile(r"(rad|deg|(?<![^\W_])mm?|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg|(?<![^\W_])mm?)_s$", re.I)
+_PER_SECOND = re.compile(
+    r"(rad|deg|(?<![^\W_])mm?|turn|rev)[_ ]?(?:/|per|p)[_ ]?s(?:ec)?$|(rad|deg|(?<![^\W_])mm?)_s$", re.I
+)
 
 
 @dataclass(frozen=True)
