@@ -16,6 +16,7 @@ import numpy as np
 from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
 from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.pool import as_slow
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
@@ -72,17 +73,18 @@ def assumed_drives(
     joints, names = robot.assumed_joints("kp"), {c.effect.name for c in pool}
     if not joints or TOGETHER[0] not in names:
         return None
-    parts = tuple(c for name in TOGETHER if name in names for c in _at(robot, _by_factor(robot, name, joints), joints))
+    found = [c for name in TOGETHER if name in names for c in _at(robot, _by_factor(robot, name, joints), joints)]
+    parts = tuple(as_slow(search.problem, c) for c in found)
     if len(parts) < 2 or {c.name for c in parts} & set(taken):
         return None
-    found, u, energy = _fitted(search, joints, parts)
+    best, u, energy = _fitted(search, joints, parts)
     carried = tuple(c for c in pool if c.effect.name == CARRIED and c.name not in taken)
     if carried:
         noise = float(search.problem.floor[search.everything].sum())
         other = _fitted(search, joints, (*parts, *carried))
         if other[2] - noise < LESS * (energy - noise):
-            found, u, _ = other
-    return Proposal(found, LABEL), u
+            best, u, _ = other
+    return Proposal(best, LABEL), u
 
 
 def _fitted(

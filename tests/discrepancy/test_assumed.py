@@ -25,6 +25,7 @@ from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import Proposal, candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.pool import as_slow
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import Hypothesis, apply, find, term
 from ee_dist.robots.model import Robot
@@ -326,3 +327,26 @@ def test_a_shared_effect_that_istaken_apart_is_not_called_dropped() -> None:
         "position_gain@elbow",
     ]
     assert taken_apart(robot, candidate(robot, "position_gain", "elbow")) == []
+
+
+def test_friction_that_slows_as_back_emf_does_is_worth_trying_where_the_stated_speed_is_nobodys() -> None:
+    """A file's 20 rad/s, and a motor that is slowed to 3: all of its torque at a speed that the joint had is not too much."""
+    sample = samples()["arm"]
+    stated = replace(sample.robot, joints=tuple(replace(j, top_speed=40.0) for j in sample.robot.joints))
+    problem = problem_by("open_loop", measure(sample, ()), stated)
+    own = candidate(stated, "viscous_friction", "elbow")
+    assert as_slow(problem, own) is own, "where the drives are known the range is as it was"
+    unknown = replace(stated, assumed=tuple((j, "kp") for j in stated.motor_names))
+    guess = problem_by("open_loop", measure(sample, ()), unknown)
+    wider = as_slow(guess, candidate(unknown, "viscous_friction", "elbow"))
+    fastest = max(
+        float(np.quantile(np.abs(np.gradient(t.log.sensors[:, 1], t.log.times_s)), 0.99)) for t in guess.measured
+    )
+    drive = unknown.drives[unknown.motor_names.index("elbow")]
+    assert wider.bounds[0][1] == pytest.approx(min(1.2 * drive.torque_limit / fastest, 10 * own.bounds[0][1]), rel=0.2)
+    # A motor whose own speed is stated is believed, and other effects are as they were.
+    believed = unknown.map_drive("elbow", lambda d: replace(d, speed_limit=40.0))
+    known = candidate(believed, "viscous_friction", "elbow")
+    assert as_slow(problem_by("open_loop", measure(sample, ()), believed), known).bounds == known.bounds
+    dry = candidate(unknown, "coulomb_friction", "elbow")
+    assert as_slow(guess, dry) is dry

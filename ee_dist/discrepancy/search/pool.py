@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -10,6 +11,13 @@ import numpy as np
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates
 from ee_dist.effects.groups import JOIN
+from ee_dist.robots.ranges import drive_of, top_speed
+
+SPARE, MOST_SLOWED = 1.2, 10.0
+"""How much more friction than would have stopped a joint at the highest speed that it had, and times what is worth trying
+else;"""
+OFTEN = 0.99
+"""share of the readings below that highest speed: the rest may be noise."""
 
 
 def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] = ()) -> list[Candidate]:
@@ -21,7 +29,7 @@ def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] =
     seen = (c if c.effect.seen_at is None else _seen_at(problem, c, c.effect.name in named) for c in able)
     judged = (as_long(problem, c) for c in (_judged(problem, c) for c in seen if c is not None) if c is not None)
     # Several groups may be one where joints that nothing is known of are left out.
-    return list({c.name: _hinted(problem, c) for c in judged}.values())
+    return list({c.name: _hinted(problem, as_slow(problem, c)) for c in judged}.values())
 
 
 def as_long(problem: Problem, c: Candidate) -> Candidate:
@@ -34,6 +42,36 @@ def as_long(problem: Problem, c: Candidate) -> Candidate:
         for p, (low, high) in zip(c.effect.parameters, c.bounds, strict=True)
     )
     return replace(c, bounds=bounds)
+
+
+def as_slow(problem: Problem, c: Candidate) -> Candidate:
+    """Viscous friction up to what would take all of a drive's torque at a speed that its joint had, of drives whose gains were
+    only assumed: their files carry speeds that nobody meant, and a motor that slows down as back-EMF does would be beyond what
+    is worth trying. A motor's own speed is believed."""
+    robot = problem.robot
+    joints = c.members(robot) or (c.target,)
+    if c.effect.name != "viscous_friction" or not {*joints} <= {*robot.assumed_joints("kp")}:
+        return c
+    had, slower = _fastest(problem), [1.0]
+    for j in joints:
+        if had.get(j) and not math.isfinite(drive_of(robot, j).speed_limit):
+            slower.append(min(SPARE * top_speed(robot.joint(j)) / had[j], MOST_SLOWED))
+    return replace(c, bounds=tuple((low, high * max(slower)) for low, high in c.bounds))
+
+
+def _fastest(problem: Problem) -> dict[str, float]:
+    """The highest speed of each joint of which positions were read, but for a few readings, rad/s (m/s)."""
+    found: dict[str, float] = {}
+    for k, s in enumerate(problem.robot.sensors):
+        if s.kind != "position":
+            continue
+        for log in (t.log for t in problem.measured):
+            read = log.readings
+            if len(read) < 3:
+                continue
+            speed = np.abs(np.gradient(log.sensors[read, k], log.times_s[read]))
+            found[s.target] = max(found.get(s.target, 0.0), float(np.quantile(speed, OFTEN)))
+    return found
 
 
 def _judged(problem: Problem, c: Candidate) -> Candidate | None:
