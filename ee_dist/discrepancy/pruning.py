@@ -87,9 +87,10 @@ def as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: 
         return 0
     most, *rest = fewer
     known, first = held_by_slopes(search, [whole, fewer[most]], cut)
+    two = cut.name != WINDOWS and len(np.unique(cut.unit_of)) == 2
 
     def may_go(n: int, without: HeldOut) -> bool:
-        if not _fits_as_well(whole, fewer[n]):
+        if two and not _fits_as_well(whole, fewer[n]):
             return False
         return without.energy - known.energy <= _may_cost(search.problem, known.energy, cut, tried, n, each)
 
