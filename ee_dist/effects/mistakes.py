@@ -12,7 +12,7 @@ import numpy as np
 
 from ee_dist.basics.altered import altered
 from ee_dist.effects.catalogue import effect
-from ee_dist.effects.targets import has_few_joints, is_arm, joint_pairs, motors, powered, takes_torques
+from ee_dist.effects.targets import has_few_joints, is_bolted, joint_pairs, motors, powered, takes_torques
 from ee_dist.robots.kinematics import quat_multiply
 from ee_dist.robots.model import Quat, Robot
 
@@ -92,7 +92,7 @@ def _sides(robot: Robot) -> tuple[str, ...]:
     "gravity pulls along another axis of it. Mend it in the file, by a fixed joint or body that carries the base turned.",
     signature="All that weight does to the joints is wrong at once, and right again if gravity comes from a quarter of a turn or "
     "half a turn away.",
-    worth_proposing=is_arm,
+    worth_proposing=is_bolted,
     mistake=True,
 )
 def base_turned(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:

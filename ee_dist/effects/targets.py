@@ -155,6 +155,12 @@ def is_arm(robot: Robot) -> bool:
     return not robot.free_base and len(robot.drives) > 1
 
 
+def is_bolted(robot: Robot) -> bool:
+    """Bolted down, with a driven hinge that weight may turn."""
+    kinds = {j.name: j.kind for j in robot.joints}
+    return not robot.free_base and any(kinds[d.joint] == "hinge" for d in robot.drives)
+
+
 def takes_torques(robot: Robot) -> bool:
     """Whether some motor is told a torque, or a voltage in its place."""
     return any(d.command == "torque" for d in robot.drives)

@@ -54,3 +54,13 @@ def test_whether_a_motor_turns_round_is_asked_of_those_that_are_told_torques() -
 def test_no_robot_catches_a_mistake_of_its_description() -> None:
     rng, robot = np.random.default_rng(0), samples()["arm"].robot
     assert not any(draw(robot, rng)[0].effect.mistake for _ in range(300))
+
+
+def test_a_pendulum_that_hangs_and_is_described_upright_is_told_so() -> None:
+    """One joint is enough to hang upside down; and a slide, which weight does not turn, is not asked."""
+    sample = samples()["pendulum"]
+    rivals = ("base_turned", "part_mass", "parallel_spring", "coulomb_friction", "com_shifted")
+    p = problem_by("open_loop", measure(sample, (term("base_turned", "upside_down"),), seed=5), sample.robot)
+    found = explain(p, pool_of(p, only=rivals), effort=QUICK)
+    assert found.verdict == EFFECT and found.best is not None and found.best.name == "base_turned@upside_down"
+    assert CATALOGUE["base_turned"].proposed(samples()["stage"].robot) == ()
