@@ -47,6 +47,8 @@ class Explanation:
     unsure: list[str] = field(default_factory=list)
     parameters: list[ParameterReport] = field(default_factory=list)
     """How sure each value of ``after`` is that was fitted, where an effect was found."""
+    given: Hypothesis = ()
+    """The model as it was given, whose terms ``before`` has with their values fitted anew."""
 
     @property
     def candidates(self) -> list[Judged]:
@@ -147,8 +149,9 @@ def explain(
     unsure = may_be_noise(problem, found.base if found.best is None else found.best.residual)
     told = [] if found.best is None else _how_sure(replace(search, fixed=fixed), found.best, found)
     return Explanation(
-        verdict, error(as_it_is), error(found.base), floor, source, model, fixed, found, kept is not None, unsure, told
-    )
+        verdict, error(as_it_is), error(found.base), floor, source, model, fixed, found, kept is not None, unsure, told,
+        tuple(before),
+    )  # fmt: skip
 
 
 def _how_sure(search: Search, best: Judged, found: Examined) -> list[ParameterReport]:

@@ -41,12 +41,34 @@ from ee_dist.discrepancy.evidence.rule import LUCK
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import known
 from ee_dist.discrepancy.words import is_less, percent, percents, phrase, placed, plain, told_all
-from ee_dist.effects.catalogue import CATALOGUE
+from ee_dist.effects.catalogue import CATALOGUE, Term
+from ee_dist.robots.model import Robot
 
 NAMED = 3
-"""Terms whose intervals are told in a sentence."""
+"""Terms whose intervals are told in a sentence, and values of a model that moved."""
+MOVED = 0.02
+"""Share of its range by which one must have moved for that."""
 NOTHING_STANDS_OUT = "Nothing else stands out."
+
+
+def moved(found: Explanation, robot: Robot) -> str:
+    """Which values of the model moved most when they were fitted to these measurements, for that may be what happened."""
+    pairs = [
+        (was, now) for was, now in zip(found.given, found.before, strict=False) if was.name == now.name and now.values
+    ]
+
+    def far(was: Term, now: Term) -> float:
+        of = known(robot, was)
+        return float(np.abs(of.shares(dict(now.values)) - of.shares(dict(was.values))).max())
+
+    def inside(t: Term) -> str:
+        return phrase((t,), robot).rpartition(" (")[2].removesuffix(")")
+
+    those = sorted((p for p in pairs if far(*p) > MOVED), key=lambda p: -far(*p))[:NAMED]
+    told = [f"{phrase((now,), robot).removesuffix(')')}; {inside(was)} in the model)" for was, now in those]
+    return f"; what moved most: {', '.join(told)}" if told else ""
 
 
 def explain_account(
@@ -69,7 +91,7 @@ def explain_account(
     last, advice = found.baseline_error, ""
     unsure = [] if found.left else found.unsure
     if found.refitted_error != found.baseline_error:
-        lines.append(f"Its own values fitted anew leave {problem.told(found.refitted_error)}.")
+        lines.append(f"Its own values fitted anew leave {problem.told(found.refitted_error)}{moved(found, robot)}.")
         last = found.refitted_error
     if found.as_it_was:
         lines.append(
