@@ -7,11 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.basics.altered import altered
+from ee_dist.basics.names import listed
 from ee_dist.measurements import signals
 from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.model import Robot, RobotError
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import Array, SensorLog
 
+HELD, BEYOND, HELD_ROWS = 0.05, 1.2, 500
+"""Share of the readings in which more than so many times the limit of a drive is held from which that is told, of how many."""
 WINDOW_S = 0.06
 """Of the means through which torques are compared with what the motion needs."""
 
@@ -62,3 +65,35 @@ def torques_beside_need(
             need, speed = (of_all[:, known] for of_all in needed)
             found.append(beside_need(torques[:, known], (need, speed), step_s))
     return [max(of_one, key=lambda r: abs(r.correlation)) for of_one in zip(*found, strict=True)] if found else None
+
+
+def held_beyond(robots: Sequence[Robot], logs: Sequence[tuple[str, SensorLog]]) -> list[str]:
+    """A line on joints that were led slowly to where the model's weight asks more of a drive than its limit: a drive that is led
+    to positions held it there. ``robots``: as they were in each of the named ``logs``."""
+    where: dict[str, list[str]] = {}
+    most: dict[str, tuple[float, float]] = {}
+    for robot, (name, log) in zip(robots, logs, strict=True):
+        if log.joints is None or robot.free_base or len(log) < 3:
+            continue
+        rows = log.readings[:: max(1, len(log.readings) // HELD_ROWS)]
+        q = log.joints[rows]
+        if not np.isfinite(q).all() or len(q) < 3:
+            continue
+        speed = np.abs(np.gradient(q, log.times_s[rows], axis=0))
+        try:
+            need = np.abs(joint_torques(robot, q, np.zeros_like(q), np.zeros_like(q)))
+        except (RobotError, np.linalg.LinAlgError):
+            continue
+        for k, d in enumerate(robot.drives):
+            if d.command != "position" or not 0 < d.torque_limit < np.inf:
+                continue
+            slow = speed[:, k] <= np.median(speed[:, k])
+            if (need[slow, k] > BEYOND * d.torque_limit).sum() >= HELD * len(q):
+                where.setdefault(d.joint, []).append(name)
+                most[d.joint] = max(most.get(d.joint, (0.0, 0.0)), (float(need[slow, k].max()), d.torque_limit))
+    kinds = {j.name: "N.m" if j.kind == "hinge" else "N" for j in robots[0].joints} if robots else {}
+    return [
+        f"{joint} was led to where its weight takes {most[joint][0]:.3g} {kinds[joint]} by the model, during {listed(trials)}, "
+        f"and its torque_limit is {most[joint][1]:.3g}: is the effort in the file nobody's, or are parts described too heavy?"
+        for joint, trials in where.items()
+    ]

@@ -20,6 +20,7 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.measurements.commanded import disobeying
 from ee_dist.measurements.jumps import jumping
+from ee_dist.measurements.need import held_beyond
 from ee_dist.measurements.taking import taking
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import HARDWARE, RunRecord
@@ -101,6 +102,8 @@ def load(config: Config) -> Measurements:
     held_out = tuple(names[k].name for k in apart)
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
     remarks += taking(robot, [(t.name, t.log) for t in trials if t.commands_held is not False])
+    real = [t for t in trials if t.commands_held is not False]
+    remarks += held_beyond([apply(robot, t.setup) for t in real], [(t.name, t.log) for t in real])
     remarks += disobeying(robot, [(t.name, t.log) for t in trials if t.commands_held is not False])
     remarks += jumping(robot, [(t.name, t.log) for t in trials])
     if short:

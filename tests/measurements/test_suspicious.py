@@ -10,6 +10,7 @@ import pytest
 from scipy import signal
 
 from ee_dist.measurements.commanded import beyond_the_drive, disobeying, far_from_commands, torques_beside_commands
+from ee_dist.measurements.need import held_beyond
 from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.suspicious import (
@@ -25,6 +26,7 @@ from ee_dist.measurements.suspicious import (
     unlike_suspicion,
 )
 from ee_dist.measurements.taking import power_suspicion, taking, work_taken
+from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import SensorLog
 
@@ -271,3 +273,22 @@ def test_what_a_log_says_of_commands_is_said_again_when_it_is_compared() -> None
     (line,) = disobeying(robot, [("a", log), ("b", right), ("c", log)])
     assert line.startswith("During a, c: command of servo: the torque that was measured runs against it")
     assert disobeying(robot, [("b", right)]) == [] and disobeying(robot, [("b", replace(log, torques=None))]) == []
+
+
+def test_a_drive_that_held_more_than_its_limit_is_told() -> None:
+    """A URDF's effort that nobody meant: the joint was led to where the load asks for twice as much, and stayed there."""
+    robot = servo_pendulum()
+    kinds = [s.kind for s in robot.sensors]
+    at = np.where((T % 4) < 2, 1.2, -0.3)[:, None]
+    sensors = np.zeros((len(T), len(kinds)))
+    sensors[:, kinds.index("position")] = at[:, 0]
+    units = tuple(s.unit for s in robot.sensors)
+    log = SensorLog(T, sensors, at, robot.sensor_names, units, robot.motor_names, joints=at)
+    needs = float(np.abs(joint_torques(robot, at, 0 * at, 0 * at)).max())
+    weak = robot.map_drive("servo", lambda d: replace(d, torque_limit=0.5 * needs))
+    assert held_beyond([robot], [("a", log)]) == []
+    (line,) = held_beyond([weak, robot, weak], [("a", log), ("b", log), ("c", log)])
+    assert f"takes {needs:.3g} N.m by the model, during a, c" in line and f"limit is {0.5 * needs:.3g}" in line
+    led = weak.map_drive("servo", lambda d: replace(d, command="torque"))
+    assert held_beyond([led], [("a", log)]) == [], "who swings a pendulum up holds it nowhere"
+    assert held_beyond([weak], [("a", replace(log, joints=None))]) == []
