@@ -17,7 +17,7 @@ from ee_dist.measurements.table import Table
 _WORD = re.compile(r"[^\W\d_]+|\d+")
 _BETWEEN = frozenset(["dot", "ddot", "joint", "joints", "motor", "of", "the", "all"])
 """Words that may stand among those of a quantity and say nothing by themselves."""
-_NUMBERED = re.compile(r"(?:joint|motor|axis|servo|link|drive|dxl|actuator|j|m)[ _.\-]?\d+", re.IGNORECASE)
+_NUMBERED = re.compile(r"(?<![^\W_])(?:joint|motor|axis|servo|link|drive|dxl|actuator|j|m)[ _.\-]?\d+", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
