@@ -42,6 +42,7 @@ def made_up() -> SimpleNamespace:
         doubts="",
         trials=("a",),
         measured=(),
+        says_nothing=lambda model: "",
     )
 
 
