@@ -42,7 +42,7 @@ def made_up() -> SimpleNamespace:
         doubts="",
         trials=("a",),
         measured=(),
-        says_nothing=lambda model: "",
+        says_nothing=lambda _: "",
     )
 
 
