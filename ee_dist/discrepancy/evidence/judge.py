@@ -145,6 +145,9 @@ def judge(
     dispersion = max(least, float(held.sum()) / len(base))
     values = np.mean([f.u for f in found.fits], axis=0) if _agree(found) else _best(found)
     share = total if total > 0 else 1.0
+    explained = 0.0 if above <= NOTHING else gain / above
+    if not math.isfinite(gain):
+        explained = -math.inf
     return Judged(
         proposal=proposal,
         model=model,
@@ -152,11 +155,7 @@ def judge(
         error_fit=math.sqrt(max(found.seen, 0.0)),
         error_heldout=error(found.residual) if np.isfinite(found.residual).all() else math.inf,
         gain=gain / share if math.isfinite(gain) else -math.inf,
-        explained=gain / above
-        if math.isfinite(gain) and above > NOTHING
-        else 0.0
-        if math.isfinite(gain)
-        else -math.inf,
+        explained=explained,
         interval=(low / share, high / share),
         held=held,
         residual=found.residual,
