@@ -10,7 +10,7 @@ import numpy as np
 import scipy  # which loads its parts when they are used: signals take a second
 
 from ee_dist.discrepancy.steps import SPEEDS, between_steps, held
-from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.effects.catalogue import Hypothesis, applied, term
 from ee_dist.effects.fixture import STAND
 from ee_dist.engines.drivers import Commands, Driver, Network
 from ee_dist.engines.halfway import goes_halfway
@@ -27,7 +27,7 @@ class MeasuredTrial:
     """``driver`` is what the experimenter sent; None where only the log's own commands are known.
 
     Trials of one ``name`` are repeats of one another: the noise floor is measured from them. ``setup`` is what is known
-    to be special about the trial (a gain, a payload); it is applied to the model as well as any hypothesis. ``commands_held``:
+    to be special about the trial (a gain, a payload); it is applied on top of any hypothesis. ``commands_held``:
     whether the drives held each command until the next one, as those of real robots do, rather than obeyed it in one step of a
     simulation; None where that is not known yet.
     """
@@ -47,6 +47,11 @@ class MeasuredTrial:
         if not self.commands_held or goes_halfway(robot):
             return ()
         return tuple(i for i, s in enumerate(robot.sensors) if s.kind in SPEEDS)
+
+    def models(self, robot: Robot, hypotheses: Iterable[Hypothesis]) -> list[Robot]:
+        """The robot in this trial by each hypothesis. What is known of the trial comes last: a load that was weighed is none of a
+        part that is lighter than described."""
+        return applied(robot, [(*h, *self.setup) for h in hypotheses])
 
     def simulated(self, model: Robot) -> Robot:
         """The model as the steps of a simulation take it."""
@@ -75,10 +80,6 @@ def released(commands: Array) -> tuple[Array, Array | None]:
     rows = np.where(gone, 0, np.arange(len(commands)))
     first = int(np.argmin(gone))
     return np.nan_to_num(commands[np.maximum(np.maximum.accumulate(rows), first)]), (~gone).astype(float)
-
-
-ONE_PACE = 0.9
-"""Share of the slowest trial's step above which another is read as fast."""
 
 
 def evenly_read(log: SensorLog) -> SensorLog:
@@ -210,6 +211,10 @@ def _course(seen: Array, noise: float) -> Array:
         return seen
     smooth = scipy.signal.savgol_filter(seen, SMOOTHED, SMOOTH_ORDER)
     return np.where(np.abs(smooth - seen) > SUDDEN * noise, seen, smooth)
+
+
+ONE_PACE = 0.9
+"""Share of the slowest trial's step above which another is read as fast."""
 
 
 def at_one_pace(logs: Sequence[SensorLog]) -> tuple[list[SensorLog], float]:

@@ -44,8 +44,13 @@ def without_unit(key: str, unit: str) -> str:
 
 def told(term: Term, robot: Robot | None = None) -> str:
     """``coulomb friction at knee front left (torque 0.3 N.m)``."""
-    shown = [f"{quantity(term, key, robot)} {_value(term, key, value, robot)}".strip() for key, value in term.values]
-    return named(term) + (f" ({', '.join(shown)})" if shown else "")
+    shown = amounts(term, robot)
+    return named(term) + (f" ({shown})" if shown else "")
+
+
+def amounts(term: Term, robot: Robot | None = None) -> str:
+    """``torque 0.3 N.m``: how much of it, without what and where."""
+    return ", ".join(f"{quantity(term, k, robot)} {_value(term, k, v, robot)}".strip() for k, v in term.values)
 
 
 def much(term: Term, robot: Robot | None = None) -> str:

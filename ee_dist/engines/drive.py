@@ -76,6 +76,7 @@ class DrivePath:
         self.governed = np.isfinite(p["command_speed"]) & (self.kind == TORQUE)
         self.uses_governor = bool(self.governed.any())
         self.eased = np.isfinite(p["command_acceleration"]) & (self.kind == POSITION)
+        self.leads = bool((self.led | self.eased).any())
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
         limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
@@ -158,7 +159,7 @@ class DrivePath:
         open: no torque and no back-EMF; what sits on the joint (friction, spring, stops) stays.
         """
         wanted = self._command(command)
-        if self.uses["command_speed"] or self.uses["command_acceleration"]:
+        if self.leads:
             wanted = self._limited(wanted, q, enabled)
         position, speed = (q, qd) if self.transmission is None else self.transmission.motor_side(q, qd)
         for function, rows, columns, context in self.speeds:

@@ -213,10 +213,10 @@ class _Import:
         if column.unwrap:
             values = np.unwrap(values)
         rows = self.read_at.get(column.table)
-        if rows is not None and len(rows) < len(values):
+        if (reading or name.startswith(TORQUE)) and rows is not None and len(rows) < len(values):
             late = written_late(raw, rows)
             # Torques are readings too where they keep to their pace; what was told to drives does not.
-            if reading or (late is not None and name.startswith(TORQUE)):
+            if reading or late is not None:
                 # Between readings a state goes on: it does not stand still and jump.
                 read = values[np.minimum(rows + (late or 0), len(values) - 1)]
                 values = linear(own.times_s - own.times_s[0], own.times_s[rows], read)

@@ -135,16 +135,21 @@ def _check_files(mapping: Mapping) -> None:
     if not filed:
         return
     for name, clock in mapping.tables.items():
-        if not clock.file or clock.file.count("{trial}") > 1:
-            raise MeasurementError(
-                f"{mapping.source}: tables: {name}: file: expected a name such as '{{trial}}_{name}.csv' or "
-                f"'{{trial}}/{name}.csv', or '{name}.csv' where each trial has a folder, not {quoted(clock.file)}"
-            )
+        _check_shape(clock.file, name, f"{mapping.source}: tables: {name}: file: expected a name")
     for group, name, c in mapping.columns():
         if c.table not in mapping.tables:
             raise MeasurementError(
                 f"{mapping.source}: {group}: {name}: which file? add 'table: {filed[0]}'; there are: {', '.join(filed)}"
             )
+
+
+def _check_shape(shape: str, name: str, wanted: str) -> None:
+    """Raises MeasurementError for what is no name of the files of one kind, with {trial} once at most."""
+    if not shape or shape.count("{trial}") > 1:
+        raise MeasurementError(
+            f"{wanted} such as '{{trial}}_{name}.csv' or '{{trial}}/{name}.csv', or '{name}.csv' where each trial has a folder, "
+            f"not {quoted(shape)}"
+        )
 
 
 def _rate(value: Any, where: str) -> float | None:
@@ -191,11 +196,7 @@ def _side_by_side(value: Any, where: str) -> dict[str, str]:
         return {}
     found = {str(k): str(v) for k, v in _table(value, where).items()}
     for name, shape in found.items():
-        if not shape or shape.count("{trial}") > 1:
-            raise MeasurementError(
-                f"{where}: {name}: expected the name of a file such as '{{trial}}_{name}.csv', or '{name}.csv' where each trial "
-                f"has a folder, not {quoted(shape)}"
-            )
+        _check_shape(shape, name, f"{where}: {name}: expected the name of a file")
     if len(found) == 1:
         raise MeasurementError(f"{where}: expected two files or more, not {quoted(next(iter(found)))} alone")
     return found

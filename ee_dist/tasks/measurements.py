@@ -101,10 +101,11 @@ def load(config: Config) -> Measurements:
     trials, files = [trials[k] for k in kept], list(dict.fromkeys(of_file[k] for k in kept))
     held_out = tuple(names[k].name for k in apart)
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
-    remarks += taking(robot, [(t.name, t.log) for t in trials if t.commands_held is not False])
     real = [t for t in trials if t.commands_held is not False]
-    remarks += held_beyond([apply(robot, t.setup) for t in real], [(t.name, t.log) for t in real])
-    remarks += disobeying(robot, [(t.name, t.log) for t in trials if t.commands_held is not False])
+    logs = [(t.name, t.log) for t in real]
+    remarks += taking(robot, logs)
+    remarks += held_beyond([apply(robot, t.setup) for t in real], logs)
+    remarks += disobeying(robot, logs)
     remarks += jumping(robot, [(t.name, t.log) for t in trials])
     if short:
         more = f", and {len(short) - 1} more as short" if len(short) > 1 else ""

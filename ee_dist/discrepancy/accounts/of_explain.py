@@ -42,7 +42,7 @@ from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import known
-from ee_dist.discrepancy.words import is_less, percent, percents, phrase, placed, plain, told_all
+from ee_dist.discrepancy.words import amounts, is_less, named, percent, percents, phrase, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.robots.model import Robot
 
@@ -63,11 +63,8 @@ def moved(found: Explanation, robot: Robot) -> str:
         of = known(robot, was)
         return float(np.abs(of.shares(dict(now.values)) - of.shares(dict(was.values))).max())
 
-    def inside(t: Term) -> str:
-        return phrase((t,), robot).rpartition(" (")[2].removesuffix(")")
-
     those = sorted((p for p in pairs if far(*p) > MOVED), key=lambda p: -far(*p))[:NAMED]
-    told = [f"{phrase((now,), robot).removesuffix(')')}; {inside(was)} in the model)" for was, now in those]
+    told = [f"{named(now)} ({amounts(now, robot)}; {amounts(was, robot)} in the model)" for was, now in those]
     return f"; what moved most: {', '.join(told)}" if told else ""
 
 

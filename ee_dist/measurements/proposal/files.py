@@ -37,9 +37,8 @@ def gathered(
         if isinstance(together, tuple):
             proposal_head["side_by_side"] = dict(together[0].patterns)
             left = sorted({f.name for f in together[0].others})
-            notes += [f"left out, since their names say nothing of what they hold: {listed(left[:MOST_SHOWN])}"] * bool(
-                left
-            )
+            if left:
+                notes.append(f"left out, since their names say nothing of what they hold: {listed(left[:MOST_SHOWN])}")
             return Recorded("", (together[1],))
         spread = _spread(files, first)
         if spread is not None:

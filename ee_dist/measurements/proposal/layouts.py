@@ -139,8 +139,8 @@ def _of_one_joint(tables: Mapping[str, Table], joints: Sequence[str]) -> bool:
     return sum(r.kind == POSITION and not r.command and not r.second for r in said) == 1
 
 
-def _of_it(column: str, file: Reading, words: Mapping[str, frozenset[str]]) -> bool:
+def _of_it(column: str, file: Reading, words: dict[str, frozenset[str]]) -> bool:
     """Whether a column may be of the quantity that its file is called after."""
-    joint = joint_in(column, dict(words))
+    joint = joint_in(column, words)
     own = read_name(column, words[joint] if joint else frozenset())
     return own.kind in (None, TIME, OTHER, file.kind) or own.weak or file.kind is None

@@ -27,7 +27,7 @@ from ee_dist.discrepancy.ways.force_balance.motion import Processing, judged_in
 from ee_dist.discrepancy.ways.force_balance.noise import RESOLVED, prepared, resting, torque_steps, with_energy
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
-from ee_dist.effects.catalogue import Hypothesis, applied, apply, find, term
+from ee_dist.effects.catalogue import Hypothesis, apply, find, term
 from ee_dist.engines.friction import LOADED as LOADS
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.model import Robot
@@ -63,7 +63,7 @@ class ForceBalance(Problem):
         # Nor does a step of a simulation limit what a drive may have: how light a rotor its controller leaves steady.
         robot = replace(robot, time_step_s=INSTANT_S)
         self.robot, self.measured = robot, tuple(trials)
-        self.models = [apply(robot, t.setup) for t in trials]
+        self.models = [t.models(robot, [()])[0] for t in trials]
         self.asked = processing or Processing.for_rate(pace_s)
         ready = prepared(trials, self.models, self.asked, torque_steps(as_read, self.models))
         self.processing, self.motions, self.size, self.motion_noise = (
@@ -155,9 +155,7 @@ class ForceBalance(Problem):
         out = np.zeros((len(hypotheses), len(self.segment_of)))
         own = self.scale * self.own_noise
         for k in chosen:
-            # What is known of a trial comes last: a load that was weighed is none of a part that is lighter than described.
-            setup = self.measured[k].setup
-            for row, model in enumerate(applied(self.robot, [(*h, *setup) for h in hypotheses])):
+            for row, model in enumerate(self.measured[k].models(self.robot, hypotheses)):
                 kept = self.balances[k](model)
                 if kept is None:
                     out[row, self.slices[k]] = np.inf

@@ -27,7 +27,7 @@ from ee_dist.discrepancy.starting import speeds_off
 from ee_dist.discrepancy.ways.free_run.longer_steps import SLIGHT, every_row_is_known, moved_by
 from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
 from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, ToPositions, in_turn, pieces, spared, thinned
-from ee_dist.effects.catalogue import Hypothesis, applied
+from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
@@ -203,8 +203,7 @@ class FreeRun(Problem):
             t = self.measured[k]
             how = t.setup, t.commands_held
             if how not in alike:
-                # What is known of a trial comes last: a load that was weighed is none of a part that is lighter than described.
-                models = applied(self.bare, [(*h, *t.setup) for h in hypotheses])
+                models = t.models(self.bare, hypotheses)
                 if steps > 1:
                     models = [altered(m, time_step_s=m.time_step_s * steps) for m in models]
                 alike[how] = [t.simulated(m) for m in models]
