@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -71,12 +72,10 @@ def far_from_commands(robot: Robot, commands: Array, position_of: dict[str, Arra
             continue
         seen, joint = position_of[drive.joint][obeyed], robot.joint(drive.joint)
         off, moved = float(np.median(np.abs(commands[obeyed, k] - seen))), float(np.ptp(seen))
-        asks = drive.kp * off
-        if (
-            off > max(moved, FAR * reach_of(joint))
-            and moved > REST * reach_of(joint)
-            and asks > MANY * drive.torque_limit
-        ):
+        # Of a joint that turns without end a share of its reach is many turns.
+        reach = min(reach_of(joint), math.pi) if joint.kind == "hinge" else reach_of(joint)
+        beyond_a_load = drive.kp * off > MANY * drive.torque_limit
+        if off > max(moved, FAR * reach) and moved > REST * reach and beyond_a_load:
             unit = "rad" if joint.kind == "hinge" else "m"
             yield (
                 f"command of {drive.joint}: the joint lies {off:.3g} {unit} from it, more than the {moved:.3g} {unit} that it "

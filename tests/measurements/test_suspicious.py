@@ -27,6 +27,7 @@ from ee_dist.measurements.suspicious import (
 )
 from ee_dist.measurements.taking import power_suspicion, taking, work_taken
 from ee_dist.robots.inverse_dynamics import joint_torques
+from ee_dist.robots.model import CONTINUOUS_RAD
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import SensorLog
 
@@ -238,6 +239,10 @@ def test_a_joint_that_is_nowhere_near_its_command_is_told() -> None:
     (line,) = far_from_commands(robot, asked, {"servo": away[:, 0]})
     assert "lies 3 rad from it" in line and "led by speeds or torques" in line
     assert list(far_from_commands(robot, asked, {"servo": 0.0 * away[:, 0] + 3.0})) == [], "one at rest says nothing"
+    endless = replace(
+        robot, joints=tuple(replace(j, lower=-CONTINUOUS_RAD, upper=CONTINUOUS_RAD) for j in robot.joints)
+    )
+    assert list(far_from_commands(endless, asked, {"servo": away[:, 0]})) == [line], "one that turns without end too"
     told = robot.map_drive("servo", lambda d: replace(d, command="torque"))
     assert list(far_from_commands(told, asked, {"servo": away[:, 0]})) == [], "a torque is no position"
     assert list(far_from_commands(robot, np.full_like(asked, math.nan), {"servo": away[:, 0]})) == []
