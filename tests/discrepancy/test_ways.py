@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from way_samples import measure, measured, problem, problem_by, samples
 
 from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.evidence.rule import above_noise
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
+from ee_dist.discrepancy.measured_trial import evenly_read, read_every
 from ee_dist.discrepancy.problem import error, joined
 from ee_dist.discrepancy.search.candidates import candidate, candidates
 from ee_dist.discrepancy.search.fit import fit_one
@@ -182,3 +185,23 @@ def test_what_is_known_of_a_trial_is_not_changed_by_what_is_believed_of_the_robo
     told, described = found.raw(found.residuals([(lighter,)])[0]), by_hand.raw(by_hand.residuals([()])[0])
     bare = found.raw(found.residuals([()])[0])
     assert np.nanmax(np.abs(told - described)) < 0.02 * np.nanmax(np.abs(bare - described))
+
+
+def test_the_order_of_trials_that_were_read_at_two_paces_changes_nothing() -> None:
+    """One filter for all of them, at the pace of the slowest: the first trial's had decided it."""
+    first, second = measured("arm")
+    step = float(np.median(np.diff(first.log.times_s)))
+    slow = replace(second, log=evenly_read(read_every(second.log, 3 * step)))
+    robot = samples()["arm"].robot
+    one, other = (problem_by("force_balance", trials, robot) for trials in ((first, slow), (slow, first)))
+    assert one.error_definition == other.error_definition and "read the most seldom" in one.error_definition
+    errors = [error(p.residuals([()])[0]) for p in (one, other)]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-4)
+    assert "read the most seldom" not in problem_by("force_balance", (first, second), robot).error_definition
+
+
+def test_a_floor_above_all_of_an_error_is_no_floor() -> None:
+    bound = SimpleNamespace(floor=np.full(10, 5.0), sure=np.full(10, 1.0))
+    assert above_noise(bound, 80.0) == pytest.approx(30.0), "above it, what it leaves"  # type: ignore[arg-type]
+    assert above_noise(bound, 40.0) == pytest.approx(30.0), "below it, what is noise beyond doubt"  # type: ignore[arg-type]
+    assert above_noise(bound, 5.0) < 1e-9  # type: ignore[arg-type]
