@@ -26,6 +26,9 @@ FILLED = 1.5
 """Rows for each reading from which most rows are no readings, and only those that are count."""
 GAP = 5.0
 """Steps longer than this many medians are gaps."""
+AGAIN = 0.05
+"""Share of the rows that may bear the time of the row before: loggers that stamp to the millisecond, or when they write, have
+some."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,18 @@ def check_times(times_s: Array, table: Table, column: str) -> Timing:
     long = np.flatnonzero(steps > GAP * median)
     gaps = tuple((table.line(int(i) + 1), float(steps[i])) for i in long)
     return Timing(median, float(steps.min()), float(steps.max()), gaps)
+
+
+def once_a_moment(times: Array) -> Array | None:
+    """(K,) the last row of each moment, where a few rows of ``times`` (T,) bear that of the row before; None where none do, or
+    so many that it is the clock that is wrong, or where time runs backwards: that is for ``check_times`` to say."""
+    if len(times) < 3 or not np.isfinite(times).all():
+        return None
+    steps = np.diff(times)
+    again = int((steps == 0).sum())
+    if not again or again > AGAIN * len(steps) or (steps < 0).any():
+        return None
+    return np.flatnonzero(np.r_[steps > 0, True])
 
 
 def grid(times_s: Array, step_s: float) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ee_dist.basics.names import counted
 from ee_dist.measurements.alignment import Match, match, one_clock
 from ee_dist.measurements.clocks import Clocked, clocked, loosely_clocked
 from ee_dist.measurements.errors import MeasurementError
@@ -30,11 +31,20 @@ class TrialClocks:
         time = self._time(self.first)
         self.unit = time.unit if isinstance(time, Column) else "s"
         self.main = clocked(self._table(self.first), time, self.where)
+        self._tell_moments()
         self.clocks = {self.first: self.main}
         for name in dict.fromkeys(c.table for _, _, c in used):
             if name != self.first:
                 self.clocks[name] = loosely_clocked(self._table(name), self._time(name), self.where)
         self._align()
+
+    def _tell_moments(self) -> None:
+        every, kept = len(self._table(self.first)), len(self.main.table)
+        if kept < every:
+            self.done.append(
+                f"{self.first or self.main.table.path.name}: {counted(every - kept, 'row')} of {every} bear the time of the row "
+                "before: of such rows the last counts"
+            )
 
     def _table(self, name: str) -> Table:
         return self.recorded.table(name, self.where)

@@ -49,7 +49,7 @@ def cut(rows: int) -> Callable[[pd.DataFrame], pd.DataFrame]:
         (put("position_m", 41, "oops"), r"row (42|43), column 'position_m': 'oops' is not a number"),
         (put("position_m", 41, None), r"row (42|43), column 'position_m' is (empty|nan)"),
         (put("t", 41, 0.0), r"row (42|43), column 't': time runs backwards \(0.04 s, then 0 s\)"),
-        (put("t", 41, 0.040), r"row (42|43), column 't': time stands still"),
+        (lambda f: f.assign(t=f["t"].round(1)), r"row (2|3), column 't': time stands still .*, and in \d+ rows more"),
         (cut(0), "no rows in it"),
         (cut(1), "one row only"),
     ],

@@ -19,7 +19,6 @@ def frame() -> pd.DataFrame:
 @pytest.mark.parametrize(
     ("column", "row", "value", "message"),
     [
-        ("time", 70, 0.69, "row 72, column 'time': time stands still"),
         ("time", 70, "x", "row 72, column 'time': 'x' is not a number"),
         ("elbow_pos_rad", 30, "-", "row 32, column 'elbow_pos_rad': '-' is not a number"),
         ("elbow_goal_rad", 30, "-", "row 32, column 'elbow_goal_rad': '-' is not a number"),
@@ -52,3 +51,21 @@ def test_dates_are_times(tmp_path: Path, zone: str) -> None:
     log, report = logs.imported(tmp_path, logs.written(tmp_path, table))
     assert np.allclose(log.commands, m["g"])
     assert not report.resampled
+
+
+def test_rows_that_bear_the_time_of_the_row_before(tmp_path: Path) -> None:
+    """A logger that stamps a few rows twice: of these the last counts, it is said, and nothing else moves."""
+    table, m = frame(), motion()
+    again = np.arange(20, len(table) - 1, 40)
+    twice = pd.concat([table, table.iloc[again]]).sort_index(kind="stable")
+    assert len(again) > 2
+    log, report = logs.imported(tmp_path, logs.written(tmp_path, twice))
+    assert np.allclose(log.commands, m["g"])
+    assert any(f"{len(again)} rows of {len(twice)} bear the time of the row before" in line for line in report.done)
+
+
+def test_a_clock_that_stands_still_is_no_clock(tmp_path: Path) -> None:
+    table = frame()
+    table["time"] = np.floor(np.asarray(table["time"], float) / 0.04) * 0.04
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, table))
+    assert proposal.questions

@@ -15,7 +15,7 @@ from ee_dist.measurements.proposal.positions import add_positions, ask_for_posit
 from ee_dist.measurements.proposal.rate import rate_by_speeds
 from ee_dist.measurements.proposal.rest import add_rest, add_switches
 from ee_dist.measurements.proposal.speeds import add_speeds
-from ee_dist.measurements.proposal.time import time_flaw, time_of
+from ee_dist.measurements.proposal.time import once_each_moment, time_flaw, time_of
 from ee_dist.measurements.proposal.torques import add_torques
 from ee_dist.measurements.proposal.units import position_units
 from ee_dist.measurements.proposal.view import View
@@ -27,6 +27,8 @@ from ee_dist.robots.model import Robot
 def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     """A mapping for a trial and a robot. Raises MeasurementError for hints that are not the robot's."""
     _check_hints(robot, hints)
+    if not hints.rate_hz:
+        recorded = replace(recorded, tables=tuple(once_each_moment(t) for t in recorded.tables))
     v = View(recorded, robot, hints)
     flaws = _add_times(v)
     if not v.timed.tables:

@@ -11,7 +11,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.blocks import series_of
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Hints
 from ee_dist.measurements.proposal.words import TIME, Reading, read_name, unit_word
-from ee_dist.measurements.sampling import check_times
+from ee_dist.measurements.sampling import check_times, once_a_moment
 from ee_dist.measurements.table import Table
 from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
@@ -54,6 +54,22 @@ def time_of(table: Table, hints: Hints) -> TimeChoice | None:
             return TimeChoice(None, "s", rows / table.rate_hz, LIKELY, "the file's own rate")
         return None
     return _chosen(table, candidates, rising, bool(named))
+
+
+def once_each_moment(table: Table) -> Table:
+    """The table without rows that bear the time of the row after them, where that is all that its time lacks."""
+    found = None
+    for address in table.addresses():
+        if _reading(address).kind != TIME:
+            continue
+        try:
+            times = table.numbers(address)
+        except MeasurementError:
+            continue
+        if len(times) > 2 and (np.diff(times) > 0).all():
+            return table
+        found = once_a_moment(times) if found is None else found
+    return table if found is None else table.part(found)
 
 
 def time_flaw(table: Table) -> MeasurementError | None:
