@@ -27,6 +27,7 @@ from omegaconf.errors import OmegaConfBaseException
 from ee_dist.tasks.compose import check_flags, check_sweep, check_used, config_folder, handling, plain, quoted, settings
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.errors import (
+    UNREAD,
     USER_ERRORS,
     RayGoneError,
     RayLostError,
@@ -185,6 +186,9 @@ def _folder(hydra_settings: Any) -> Path:
 
 
 def _unwritten(error: OSError) -> str:
+    if isinstance(error, BrokenPipeError):
+        _print_no_more()
+        return UNREAD
     where = shown(Path(error.filename)) if error.filename else "the output folder"
     room = "make room on the disk, or " if error.errno in FULL else ""
     settings: Any = HydraConfig.get() if HydraConfig.initialized() else None
@@ -203,8 +207,7 @@ def main() -> int:
     try:
         told = answer(sys.argv[1:])
         if told is not None:
-            print(told)
-            return 0
+            return _answered(told)
         check_flags(sys.argv[1:])
         check_sweep(sys.argv[1:])
         folder = config_folder()
@@ -228,6 +231,20 @@ def main() -> int:
     finally:
         leaving.disarm()
     return 0
+
+
+def _answered(text: str) -> int:
+    """Prints what was asked for; whoever reads only its beginning (``| head``) made no mistake."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        _print_no_more()
+    return 0
+
+
+def _print_no_more() -> None:
+    """What is still to be printed goes nowhere: at the end of a process Python would try once more, and complain."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(text: str, status: int = MISTAKE) -> int:

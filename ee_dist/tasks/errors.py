@@ -65,6 +65,9 @@ USER_ERRORS = (
 )
 
 
+UNREAD = "whoever read what this prints has ended, and so the run has"
+
+
 def abandon_evaluators() -> None:
     """End what this process started beside itself, for one that ends without more ado."""
     abandon_ray()
@@ -73,7 +76,7 @@ def abandon_evaluators() -> None:
 def unasked_end(error: BaseException) -> str:
     """A run that was ended from within: by code of the user's that calls ``sys.exit``, or for want of memory."""
     if isinstance(error.__context__, BrokenPipeError):
-        return "whoever read what this prints has ended, and so the run has"
+        return UNREAD
     where = _of_plugin(error)
     if isinstance(error, MemoryError):
         return (

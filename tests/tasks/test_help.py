@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import fields
 
 import numpy as np
@@ -109,3 +111,15 @@ def test_an_unstable_trial_is_blamed_on_what_there_is(hidden, said):
     body = PhysicalRobot(Diverging(), robot, hidden, np.random.SeedSequence(0))
     with pytest.raises(EngineError, match=said):
         body.trial(None, 3)
+
+
+def test_who_reads_only_its_beginning_made_no_mistake():
+    """As ``| head`` does it: the reader is gone before anything is printed."""
+    asked = subprocess.Popen(
+        [sys.executable, "-m", "ee_dist", "--help"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert asked.stdout is not None
+    asked.stdout.close()
+    asked.stdout = None
+    _, err = asked.communicate(timeout=60)
+    assert (asked.returncode, err) == (0, "")
