@@ -105,3 +105,14 @@ def test_a_currents_gain(file: Path) -> None:
     )
     with pytest.raises(MeasurementError, match=r"write 'unit: N.m, scale: GAIN' with the N.m of one A"):
         import_file(file, mapping(torques={"servo": {"column": "tau", "unit": "A"}}), robot("torque"))
+
+
+def test_a_motor_that_was_led_by_its_voltage(tmp_path: Path) -> None:
+    """What it was led by is no torque yet: it is said how it becomes one."""
+    file = tmp_path / "log.csv"
+    table = {"time_s": T, "position_rad": np.sin(T), "current_a": np.cos(3 * T), "goal_pwm": 300 * np.cos(3 * T)}
+    pd.DataFrame(table).to_csv(file, index=False)
+    found = proposal_for([file], robot("torque"), Hints())
+    said = [n for n in found.notes + found.questions if "goal_pwm is a voltage or duty cycle" in n]
+    assert len(said) == 1
+    assert "'scale:' the torque at rest" in said[0]

@@ -15,7 +15,7 @@ from ee_dist.measurements.proposal.speeds import speed_units
 from ee_dist.measurements.proposal.torque_scale import torque_units
 from ee_dist.measurements.proposal.units import LOOSE, UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View
-from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE
+from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE, VOLTAGES, read_name, tokens
 from ee_dist.measurements.robot_channels import command_kinds
 from ee_dist.measurements.standing import reach_of, stands_still
 from ee_dist.measurements.units import UNITS
@@ -44,14 +44,14 @@ def add_commands(v: View) -> None:
     if chosen is None:
         if any(c.group == "torques" for c in v.out.choices) and not found:
             v.out.notes.append(
-                "no commands were found: the measured torques are taken as what was asked for"
+                f"no commands were found: the measured torques are taken as what was asked for{_voltages(v, kind)}"
                 if kind == "torque"
                 else "no commands were found: a balance of forces is the way to compare"
             )
             return
         rivals = " or ".join(s.block.name for s in sorted(found, key=lambda s: -s.score)[:3])
         told = f"commands: {rivals}?" if rivals else f"commands: no columns look like {kind}s that were asked for;"
-        v.out.ask(f"{told} write the right ones into the mapping{_goals(v, kind)}")
+        v.out.ask(f"{told} write the right ones into the mapping{_voltages(v, kind) or _goals(v, kind)}")
         for n in names:
             v.out.choices.append(Choice("commands", n, {"column": "???"}, UNKNOWN, "not found"))
         return
@@ -67,6 +67,19 @@ def add_commands(v: View) -> None:
     certain = chosen.block.reading.command and (kind == "torque" or _goes_with_the_motion(v, chosen.block, kind))
     level = SURE if certain else LIKELY
     v.add("commands", names, chosen.block, units, chosen.why, level)
+
+
+def _voltages(v: View, kind: str) -> str:
+    """What to do where drives obey torques, and voltages or duty cycles were asked for."""
+    names = [a for t in v.timed.tables for a in t.addresses()] if kind == "torque" else []
+    asked = [a for a in names if read_name(a).command and VOLTAGES & set(tokens(a))]
+    if not asked:
+        return ""
+    what = "is a voltage or duty cycle" if len(asked) == 1 else "are voltages or duty cycles"
+    return (
+        f"; but {listed(asked)} {what} that a motor was led by: name it as the command, with 'scale:' the torque at rest (behind "
+        "the gear) of one of its units, and give the drive the 'viscous:' of its back-EMF"
+    )
 
 
 def _goals(v: View, kind: str) -> str:

@@ -18,6 +18,8 @@ _QUANTITY = {
     "flag mode supply battery load enable enabled counter seq id ticks cycle wrench imu",
     TIME: "t time times timestamp timestamps stamp stamps zeit clock sec secs seconds elapsed uptime tstamp date datetime",
 }
+VOLTAGES = frozenset(["pwm", "duty", "volt", "volts", "voltage"])
+"""Of what is asked of a motor without a controller of its torque."""
 _KIND = {w: k for k, words in _QUANTITY.items() for w in words.split()}
 _COMMAND = frozenset(
     [
