@@ -20,7 +20,8 @@ WORSE = 1.01
 class LastWord:
     """Errors of the model ``before`` and the one ``after``, of all trials of ``problem`` together and of each by itself, by
     the measure of the search; ``changed``: whether they are two; ``left``: curves in which the second leaves more than noise;
-    ``others``: the same errors as this way counts them elsewhere (of positions, say), in lines for people."""
+    ``others``: the same errors as this way counts them elsewhere (of positions, say), in lines for people; ``farther``: in
+    which plain numbers the second is the worse one although its error fell, if it is."""
 
     problem: Problem
     before: float
@@ -30,6 +31,7 @@ class LastWord:
     left: tuple[Leftover, ...]
     changed: bool
     others: tuple[str, ...] = ()
+    farther: str = ""
 
     @property
     def more(self) -> bool:
@@ -50,7 +52,9 @@ class LastWord:
             f"{HELD_APART} ({listed(self.problem.trials)}): model {told(self.before)}, {improved}noise floor "
             f"{told(self.floor)}."
         )
-        return f"{text} There the improved model is the worse one: do not use it for such motions." if worse else text
+        if worse:
+            return f"{text} There the improved model is the worse one: do not use it for such motions."
+        return f"{text} {self.farther}." if self.farther else text
 
 
 def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis], fitted: Sequence[str]) -> LastWord:
@@ -65,7 +69,8 @@ def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis], fitted:
     left = tuple(leftovers(last, residuals[1]))
     changed = models[0] != models[1]
     others = (*last.other_errors(*models if changed else models[:1]), *_elsewhere(last.channels, fitted))
-    return LastWord(last, before, after, last.noise_floor()[0], tuple(by_trial), left, changed, others)
+    farther = last.farther_off(*models) if changed else ""
+    return LastWord(last, before, after, last.noise_floor()[0], tuple(by_trial), left, changed, others, farther)
 
 
 def _elsewhere(channels: Sequence[str], fitted: Sequence[str]) -> list[str]:

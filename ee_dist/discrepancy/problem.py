@@ -189,6 +189,11 @@ class Problem(ABC):
         """Errors of a model, or of one and another made from it, as this way counts them elsewhere, in lines for people."""
         return []
 
+    def farther_off(self, before: Hypothesis, after: Hypothesis) -> str:
+        """Where the model ``after`` is farther off than the one ``before`` in plain numbers, though the error fell, for
+        people; empty: nowhere, or the error itself is such a number."""
+        return ""
+
     @property
     def notes(self) -> list[str]:
         """What of these measurements is not compared, or not as it was recorded, and why: every verb says so."""

@@ -7,7 +7,7 @@ positions and its own lag explain, it is taken.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,6 +24,7 @@ from ee_dist.discrepancy.measured_trial import (
 from ee_dist.discrepancy.slow_noise import slow_noise
 from ee_dist.engines.halfway import goes_halfway
 from ee_dist.robots.model import Robot
+from ee_dist.robots.standing import stood
 from ee_dist.trials.log import Array, SensorLog, State
 
 AROUND, CUBIC = (9, 5), 3
@@ -35,12 +36,25 @@ BEYOND = 3.0
 
 
 def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
-    """Where a measured robot on a fixed base began; None where it stood at position zero, or that is not known."""
+    """Where a measured robot began; None where it stood at position zero, or that is not known. One that walks about begins where
+    its description says if it is simulated; a real one with its joints as they were read, tilted as its sensors say, and on the
+    floor."""
     log = trial.log
-    if robot.free_base or log.joints is None or not np.abs(log.joints[0]).max() > 0:
+    if log.joints is None or not np.abs(log.joints[0]).max() > 0 or (robot.free_base and not trial.commands_held):
         return None
     speeds, _ = _first_speeds(trial, speed_sensors(robot), goes_halfway(robot))
-    return State(log.joints[0].copy(), speeds.copy())
+    base = (
+        stood(robot, log.joints[0], _first(log, robot, "roll"), _first(log, robot, "pitch"))
+        if robot.free_base
+        else None
+    )
+    return State(log.joints[0].copy(), speeds.copy(), base)
+
+
+def _first(log: SensorLog, robot: Robot, kind: str) -> float | None:
+    """What a sensor of this kind said first; None where there is none, or it said nothing."""
+    read = [float(log.sensors[0, c]) for c, s in enumerate(robot.sensors) if s.kind == kind]
+    return next((v for v in read if np.isfinite(v)), None)
 
 
 def starts_beside(trial: MeasuredTrial, robot: Robot) -> list[State]:
@@ -50,7 +64,7 @@ def starts_beside(trial: MeasuredTrial, robot: Robot) -> list[State]:
     if start is None:
         return []
     _, off = _first_speeds(trial, speed_sensors(robot), goes_halfway(robot))
-    return [State(start.joints, start.speeds + step) for step in np.diag(off) if step.any()]
+    return [replace(start, speeds=start.speeds + step) for step in np.diag(off) if step.any()]
 
 
 @lru_cache(maxsize=64)

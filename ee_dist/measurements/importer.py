@@ -89,7 +89,7 @@ class _Import:
             self.read_at = rows_read(self.mapping, self.clocks, paces)
         self.report.done += told_of(self.clocks, self.read_at)
         positions = self._sensors()
-        self.report.suspicious += repeats(self.mapping, self.clocks)
+        self.report.suspicious += repeats(self.mapping, self.clocks, paces_of(self.clocks, self.read_at))
         torques = self._torques()
         commands = self._commands(torques)
         self._on_one_turn(commands)

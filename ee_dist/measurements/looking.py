@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Container, Iterator
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass
 
@@ -32,6 +33,11 @@ from ee_dist.robots.model import Robot, Sensor
 from ee_dist.robots.reached import told
 from ee_dist.trials.log import Array
 
+MOST_TILTED = {"roll": math.pi, "pitch": math.pi / 2}
+"""How far a base turns by these, rad, whatever it does,"""
+TURNED = 1.05
+"""and times that beyond which they are in another unit."""
+
 
 @dataclass(frozen=True)
 class Looked:
@@ -55,6 +61,10 @@ class Looked:
         for s in self.robot.sensors:
             if s.kind == "position":
                 yield from self._position(s)
+            elif s.kind in MOST_TILTED:
+                most = MOST_TILTED[s.kind]
+                flaw = unit_suspicion(s.name, self.channels[s.name], -most, most, s.unit, far=TURNED, whose="a base")
+                yield from self._judged(flaw, self.mapping.sensors[s.name])
             elif s.kind == "velocity" and s.target in self._positions:
                 flaw = speed_suspicion(s.name, self.channels[s.name], self._positions[s.target], self.step_s)
                 yield from self._judged(flaw, self.mapping.sensors[s.name])
@@ -134,13 +144,16 @@ class Looked:
         yield note
 
 
-def repeats(mapping: Mapping, clocks: AnyMapping[str, Clocked]) -> Iterator[str]:
-    """Rows in which nothing was read anew: what sensors say in one table, as the file has it."""
+def repeats(mapping: Mapping, clocks: AnyMapping[str, Clocked], seldom: Container[str]) -> Iterator[str]:
+    """Rows in which nothing was read anew: what sensors say in one table, as the file has it. Of tables that were read ``seldom``
+    such rows count as none already."""
     by_table: dict[str, list[str]] = {}
     for column in mapping.sensors.values():
         if isinstance(column, Column):
             by_table.setdefault(column.table, []).append(column.column)
     for table, names in by_table.items():
         own = clocks[table].table
+        if table in seldom:
+            continue
         if note := repeat_suspicion(np.stack([own.numbers(n, gaps=True) for n in names], axis=1)):
             yield note

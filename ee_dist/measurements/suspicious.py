@@ -15,6 +15,7 @@ CLIPPED_SHARE = 0.02
 CLIPPED_DROP = 0.15
 STUCK_SHARE = 0.5
 COUNTERS = (8, 10, 12, 14, 16, 32)
+JOINT = "the joint"
 FAR, STILL, LIVELY = 3.0, 0.03, 0.15
 """Positions beyond this many times the joint's reach cannot be; a span below the second share of it is suspiciously
 small, where in another unit it would be above the third."""
@@ -88,11 +89,18 @@ def time_suspicion(median_s: float, length_s: float, declared: str) -> str | Non
 
 
 def unit_suspicion(
-    name: str, values: Array, low: float, high: float, unit: str, declared: str = ""
+    name: str,
+    values: Array,
+    low: float,
+    high: float,
+    unit: str,
+    declared: str = "",
+    far: float = FAR,
+    whose: str = JOINT,
 ) -> tuple[str, bool] | None:
     """Whether a joint position was taken for another unit than it is in (degrees for radians, millimetres for metres): a
     sentence, and whether it is certain enough to stop. ``values`` (T,) are in ``unit``; they were ``declared`` to be in
-    another.
+    another. ``far``: times its reach that it cannot be; ``whose`` reach that is, of a joint or of what may hardly move.
     """
     reach = max(abs(low), abs(high))
     if not (np.isfinite(reach) and reach > 0):
@@ -105,11 +113,12 @@ def unit_suspicion(
         for u, (k, s) in UNITS.items()
         if k == kind and u not in (declared or unit, "turn", "in", "cm")
     }
-    if seen > FAR * reach:
-        likely = [u for u, s in fits.items() if LIVELY * reach <= s <= 1.2 * reach]
+    if seen > far * reach:
+        least = LIVELY * reach if whose == JOINT else 0.0
+        likely = [u for u, s in fits.items() if least <= s <= 1.2 * reach]
         cure = f": say unit: {' or '.join(likely)}" if likely else ""
         return (
-            f"{name}: reaches {seen:.4g} {unit}, the joint only {reach:.4g}; not in {declared or unit!r}?{cure}",
+            f"{name}: reaches {seen:.4g} {unit}, {whose} only {reach:.4g}; not in {declared or unit!r}?{cure}",
             True,
         )
     # A joint without an end reaches far on paper, and yet moves by a turn or two.

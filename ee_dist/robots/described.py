@@ -56,6 +56,16 @@ UNITS = {
     ("motor_torque", "hinge"): "N.m",
     ("motor_torque", "slide"): "N",
 }
+OF_BASE = {
+    "height": "m",
+    "x": "m",
+    "y": "m",
+    "roll": "rad",
+    "pitch": "rad",
+    "speed_x": "m/s",
+    "turn_rate": "rad/s",
+}
+"""Units of what sensors say of a base that moves."""
 ASSUMED = "assumed"
 """Key of a drive: names of those of its numbers that nobody knows; a search puts them right first."""
 SCALE, OBEYED = "scale", "obeyed"
@@ -274,7 +284,8 @@ def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Se
         if allowed is not None and target not in allowed:
             what = "part" if kind == "touch" else "driven joint"
             raise RobotError(f"{here}: no {what} named {quoted(target)}; {near(target, allowed)}")
-        unit = str(entry.get("unit", UNITS.get((kind, joints[target].kind if target in joints else ""), "1")))
+        usual = OF_BASE.get(kind) or UNITS.get((kind, joints[target].kind if target in joints else ""), "1")
+        unit = str(entry.get("unit", usual))
         numbers = {
             str(k): number(v, f"{here}: {k}") for k, v in entry.items() if k not in ("name", "kind", "target", "unit")
         }

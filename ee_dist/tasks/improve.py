@@ -102,7 +102,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
     also = (*also, *way.instead(bool(found.left)))
     word = None if apart is None else told_of(apart, way, config, found.terms, problem.channels)
-    account = improve_account(problem, found, planning(out, problem.robot), also, word).warned(measured.remarks)
+    farther = problem.farther_off(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ""
+    warnings = (*measured.remarks, *([f"{farther}."] if farther else []))
+    account = improve_account(problem, found, planning(out, problem.robot), also, word).warned(warnings)
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
     write_model(path, measured.source, measured.folder, found.terms, account.words)

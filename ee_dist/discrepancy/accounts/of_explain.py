@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.basics.names import counted
+from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.accounts.account import (
     BEYOND,
     CONTENT,
@@ -35,6 +35,7 @@ from ee_dist.discrepancy.accounts.account import (
 from ee_dist.discrepancy.accounts.ranges import ranges
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
 from ee_dist.discrepancy.confidence import COUNTED_WAY
+from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.discrepancy.evidence.judge import Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.evidence.rule import LUCK
@@ -110,8 +111,10 @@ def explain_account(
         more = "at least " if len(best.tied_with) + 1 == len(looked_at) < found.tried else ""
         less = is_less(best.terms)
         rest = left_beside_noise(found.left, best.terms, robot)
-        head = f"{'Too much' if less else 'Missing'}{', among other things' if rest else ''}: "
-        head += f"{told_all(best.terms, robot)}{_twins(best, more, bool(rest))}."
+        guessed = best.proposal.label == LABEL
+        begins = "Not what was assumed" if guessed else "Too much" if less else "Missing"
+        head = f"{begins}{', among other things' if rest else ''}: "
+        head += f"{_what(found, best, robot)}{_twins(best, more, bool(rest))}."
         nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
         nothing = BEYOND if unsure else nothing
         head += " More than noise is left with it." if rest else f" {THAT_NOISE if found.left else nothing}"
@@ -121,8 +124,7 @@ def explain_account(
         values = ranges(found.after, found.parameters, some, robot, len(best.terms) > 1)
         sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}{values}."
         advice = slower(unsure) if unsure else MEND if entry.mistake else ""
-        guessed = best.proposal.label == LABEL
-        lines.append(GUESSED if guessed else entry.physics)
+        lines.append(f"{GUESSED}{_still(problem)}" if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""
         lines += [] if guessed else [f"Its mark in a residual: {entry.signature}{turned}"]
         lines += [GUESS] if best.proposal.guess and not guessed else []
@@ -165,6 +167,39 @@ def explain_account(
         planner if tied else "",
         more=found.verdict == EFFECT and bool(rest),
     )
+
+
+def _what(found: Explanation, best: Judged, robot: Robot) -> str:
+    """The terms of the best explanation; of drives that were only assumed, those of whose values these data tell something."""
+    if best.proposal.label != LABEL:
+        return told_all(best.terms, robot)
+    flags = {found.after[p.term]: p.flag for p in found.parameters}
+    vague = [t for t in best.terms if any(f in flags.get(t, "") for f in (NEUTRAL, HARDLY, NOT_DETERMINED))]
+    told = tuple(t for t in best.terms if t not in vague)
+    if not vague:
+        return told_all(told, robot)
+    several = listed(dict.fromkeys(plain(t.effect) for t in vague))
+    if not told:
+        return f"{several} together, of which these data tell none by itself"
+    return f"{told_all(told, robot)} (with {several}, of which these data tell none by itself)"
+
+
+def _still(problem: Problem) -> str:
+    """A word where most joints of which drives were assumed do not move: what all share is what the others show."""
+    robot = problem.robot
+    assumed = robot.assumed_joints("kp")
+    moved = [j for j in assumed if any(np.nanstd(t.log.commands[:, _motor(robot, j)]) > 0 for t in problem.measured)]
+    if 2 * len(moved) >= len(assumed):
+        return ""
+    one = len(moved) == 1
+    return (
+        f" Only {counted(len(moved), 'joint')} of {len(assumed)} {'is' if one else 'are'} commanded to move here: one number for "
+        f"all is what {'this one shows' if one else 'these show'}, and what holds the others still."
+    )
+
+
+def _motor(robot: Robot, joint: str) -> int:
+    return robot.motor_names.index(joint)
 
 
 def _rivals(tried: int, tied: Sequence[str], more: str) -> str:

@@ -7,10 +7,15 @@ from collections.abc import Iterable, Sequence
 
 from ee_dist.measurements.proposal.words import POSITION, SPEED, TORQUE, Reading, role_of, split_unit, tokens, unit_word
 from ee_dist.measurements.units import UNITS
+from ee_dist.robots.described import OF_BASE
 from ee_dist.robots.instruments import MOTOR_TORQUE
 from ee_dist.robots.model import Sensor
 
 KINDS = {"position": POSITION, "velocity": SPEED, "torque": TORQUE, MOTOR_TORQUE: TORQUE}
+OF_A_BASE = frozenset(
+    ["imu", "base", "body", "trunk", "torso", "root", "orientation", "euler", "rpy", "attitude", "angle"]
+)
+"""Words beside what is said of a base, which say nothing by themselves."""
 _PATH = re.compile(r"[./:\[\]]+")
 
 
@@ -38,14 +43,27 @@ def called_as_sensors(
     return out
 
 
+def _of_base(words: Sequence[str], kind: str) -> bool:
+    """Whether a column is called after what a sensor of a kind says of the base (``imu_roll``, ``base.orientation.pitch``)."""
+    return kind in OF_BASE and [w for w in words if w not in OF_A_BASE] == tokens(kind)
+
+
+def tilt_of(address: str) -> bool:
+    """Whether a column is called after a tilt of the base, and nothing else."""
+    words = tokens(split_unit(address)[0])
+    return any(_of_base(words, kind) and len(words) > 1 for kind in ("roll", "pitch"))
+
+
 def _called(address: str, sensor: Sensor) -> str | None:
     """The unit that a column states ("" for none) if it is called as a sensor is; else None."""
     name, unit = split_unit(address)
     steps = [step for step in _PATH.split(name) if step]
     words, wanted = tokens(steps[-1]) if steps else [], tokens(sensor.name)
-    if unit is None and len(words) == len(wanted) + 1:
-        unit, words = unit_word(words[-1]), words[: 0 if unit_word(words[-1]) is None else -1]
-    if words != wanted or role_of(" ".join(steps[:-1])) is True:
+    if unit is None and words and unit_word(words[-1]) is not None and len(words) > 1:
+        bare = words[:-1]
+        if bare == wanted or _of_base(bare, sensor.kind):
+            unit, words = unit_word(words[-1]), bare
+    if role_of(" ".join(steps[:-1])) is True or (words != wanted and not _of_base(words, sensor.kind)):
         return None
     if unit is None:
         return ""

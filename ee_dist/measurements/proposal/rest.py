@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.measurements.proposal.blocks import series_of
-from ee_dist.measurements.proposal.by_sensor import column_of
+from ee_dist.measurements.proposal.by_sensor import column_of, tilt_of
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.view import View
-from ee_dist.measurements.proposal.words import role_of, tokens
+from ee_dist.measurements.proposal.words import read_name, role_of, tokens
 from ee_dist.measurements.units import UNITS
 from ee_dist.robots.model import Sensor
 
@@ -19,6 +23,8 @@ OTHER_SWITCHES = frozenset([
     "camera", "heater",
 ])  # fmt: skip
 """What else is switched on and off: 0 in such a column says nothing about whether drives obey."""
+ROCKS = 0.1
+"""rad by which a base that is bolted down does not tilt."""
 SUPPLY = frozenset(["supply", "volt", "volts", "voltage", "vin", "vbat", "battery", "bus"])
 
 
@@ -78,3 +84,18 @@ def add_switches(v: View) -> None:
             else:
                 left.append(name)
     v.out.unused += left
+    if not v.robot.free_base:
+        v.out.notes += _not_bolted(v, left)
+
+
+def _not_bolted(v: View, left: Sequence[str]) -> list[str]:
+    """A line where columns that nobody uses say that a base tilts which is described as bolted down."""
+    read = {a: x for t in v.timed.tables for a, x in series_of(t, filled=True).items() if a in left}
+    tilts = [a for a in read if read_name(a).command is not True and tilt_of(a)]
+    moved = [a for a in tilts if np.ptp(read[a]) > (ROCKS if np.abs(read[a]).max() < math.pi else math.degrees(ROCKS))]
+    if not moved:
+        return []
+    return [
+        f"{listed(moved)} {'says' if len(moved) == 1 else 'say'} that the base tilts, which is described as bolted down: if it "
+        "stands on the floor, say free_base: true and list sensors of kind roll and pitch"
+    ]

@@ -15,6 +15,7 @@ import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
 from ee_dist.discrepancy.problem import Layout, Problem, Series, joints_of
+from ee_dist.discrepancy.ways.open_loop.in_units import InUnits, farther_off, in_units, told_in_units
 from ee_dist.discrepancy.ways.open_loop.predictability import MEMBERS, ensemble
 from ee_dist.discrepancy.ways.open_loop.prediction import (
     Digest,
@@ -387,19 +388,19 @@ class OpenLoop(Problem):
                 out.append(Series(k, c, sensor.unit, log.times_s[read], log.sensors[read, c], values[read, c]))
         return out
 
+    def remarks(self, hypothesis: Hypothesis) -> list[str]:
+        return self.other_errors(hypothesis)
+
     def other_errors(self, *models: Hypothesis) -> list[str]:
         """In the units of the channels: root mean squares over all rows, by kind of sensor."""
-        told: dict[tuple[str, str], list[str]] = {}
-        for model in models:
-            squares: dict[tuple[str, str], list[Array]] = {}
-            for s in self.series(model):
-                squares.setdefault((self.robot.sensors[s.channel].kind, s.unit), []).append(
-                    (s.measured - s.predicted) ** 2
-                )
-            for of, rows in squares.items():
-                told.setdefault(of, []).append(_in_unit(float(np.sqrt(np.mean(np.concatenate(rows)))), of[1]))
-        parts = [f"{kind.replace('_', ' ')} {' -> '.join(each)}" for (kind, _), each in told.items() if kind != "touch"]
+        parts = told_in_units([self._in_units(m) for m in models])
         return [f"Root mean squares over all rows of these trials: {'; '.join(parts)}."] if parts else []
+
+    def farther_off(self, before: Hypothesis, after: Hypothesis) -> str:
+        return farther_off(self._in_units(before), self._in_units(after))
+
+    def _in_units(self, model: Hypothesis) -> InUnits:
+        return in_units(self.series(model), self.robot.sensors)
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         believed = apply(self.robot, hypothesis)
@@ -414,13 +415,6 @@ class OpenLoop(Problem):
         jobs = [Job(r, ToSensors(t.early(self.robot))) for t, r in zip(self.measured, rollouts, strict=True)]
         true = self.evaluator.evaluate(jobs)
         return [report(m, v) for m, v in zip(models, true, strict=True)]
-
-
-def _in_unit(value: float, unit: str) -> str:
-    small = {"rad": "mrad", "m": "mm"}.get(unit)
-    if small is not None and value < 1:
-        return f"{1e3 * value:.3g} {small}"
-    return f"{value:.3g}" + ("" if unit == "1" else f" {unit}")
 
 
 def _spans(robot: Robot) -> Array:

@@ -1,0 +1,56 @@
+"""What a model leaves in the units of the channels: plain root mean squares, beside an error in standard deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from ee_dist.discrepancy.problem import Series
+from ee_dist.robots.model import Sensor
+from ee_dist.trials.log import Array
+
+FARTHER = 1.05
+"""Times a root mean square from which a model is called farther off."""
+
+InUnits = Mapping[tuple[str, str], float]
+"""Root mean squares by kind of sensor and unit."""
+
+
+def in_units(series: Iterable[Series], sensors: Sequence[Sensor]) -> InUnits:
+    """Of all rows of all channels but touch, which is there or not."""
+    squares: dict[tuple[str, str], list[Array]] = {}
+    for s in series:
+        kind = sensors[s.channel].kind
+        if kind != "touch":
+            squares.setdefault((kind, s.unit), []).append((s.measured - s.predicted) ** 2)
+    return {of: float(np.sqrt(np.mean(np.concatenate(rows)))) for of, rows in squares.items()}
+
+
+def told_in_units(each: Sequence[InUnits]) -> list[str]:
+    """``position 25.1 mrad -> 12 mrad`` of one model after another, by kind of sensor."""
+    return [_told(of, [found[of] for found in each]) for of in each[0]]
+
+
+def farther_off(was: InUnits, now: InUnits) -> str:
+    """A warning for people where a second model, better by its error, is farther off in any of these; empty: nowhere."""
+    worse = [_told(of, [was[of], now[of]]) for of in was if now[of] > FARTHER * was[of]]
+    if not worse:
+        return ""
+    return (
+        f"Farther off than before in plain numbers, though the error fell: {'; '.join(worse)}. The error counts in standard "
+        "deviations of what equally good models do, and next to nothing where these part: look at the curves before you "
+        "believe the model"
+    )
+
+
+def _told(of: tuple[str, str], values: Sequence[float]) -> str:
+    kind, unit = of
+    return f"{kind.replace('_', ' ')} {' -> '.join(_in_unit(v, unit) for v in values)}"
+
+
+def _in_unit(value: float, unit: str) -> str:
+    small = {"rad": "mrad", "m": "mm"}.get(unit)
+    if small is not None and value < 1:
+        return f"{1e3 * value:.3g} {small}"
+    return f"{value:.3g}" + ("" if unit == "1" else f" {unit}")
