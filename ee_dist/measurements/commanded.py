@@ -10,7 +10,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.robot_channels import command_kind
-from ee_dist.measurements.signals import AGAINST, lead, moves, relation
+from ee_dist.measurements.signals import AGAINST, lead, lively, moves, relation
 from ee_dist.measurements.standing import REST, reach_of, stands_still
 from ee_dist.measurements.suspicious import command_suspicion
 from ee_dist.robots.model import Robot
@@ -23,6 +23,11 @@ FITS, BETTER = 0.7, 0.1
 """Correlation of what was commanded and measured from which one follows the other, and by how much more than as they stand."""
 LATE_S, EARLY_S = 0.1, 0.01
 """From when torques come late or early: current controllers take milliseconds, and answer nothing that they were not told."""
+FORESEEN_S, SLOW_S, CLEARER = 0.02, 0.5, 0.5
+"""How far before its command a joint cannot move, and how long after it none in order does, by what share of what is lacking to a
+correlation of one at most;"""
+EXCHANGED, APART = 0.95, 0.4
+"""correlation with what another joint is told from which it may be that one's, and by how much less with its own."""
 MANY = 3.0
 """Times what a drive can give from which a command is in another unit."""
 
@@ -48,6 +53,40 @@ def command_flaws(
             unit = "rad" if robot.joint(joint).kind == "hinge" else "m"
             found = (f"{joint} does not move although it is commanded by {np.ptp(asked):.2g} {unit}", False)
         yield joint, found
+
+
+def beside_their_commands(robot: Robot, commands: Array, position_of: dict[str, Array], step_s: float) -> Iterator[str]:
+    """Lines on joints that obey positions, of which all move before they are told to, or long after; or of which one does what
+    another is told. ``commands`` (T, M) are NaN where drives are released."""
+    kinds = [command_kind(d) for d in robot.drives]
+    led = [k for k, d in enumerate(robot.drives) if kinds[k] == "position" and d.joint in position_of]
+    if not led or len(commands) <= FEWEST_ROWS or not np.isfinite(commands[:, led]).all():
+        return
+    asked, seen = commands[:, led], np.stack([position_of[robot.drives[k].joint] for k in led], axis=1)
+    both = lively(asked, seen)
+    if not both:
+        return
+    asked, seen, names = asked[:, both], seen[:, both], [robot.drives[led[k]].joint for k in both]
+    found, now = lead(asked, seen, step_s), abs(relation(asked, seen).correlation)
+    clear = abs(found.correlation) > FITS and 1 - abs(found.correlation) < CLEARER * (1 - now)
+    who = f"command of {names[0]}: the joint is" if len(names) == 1 else "commands: the joints are"
+    told = f"(correlation {abs(found.correlation):.3g}; {now:.3g} as they stand)"
+    if clear and found.lead_s < -max(FORESEEN_S, 2 * step_s):
+        yield (
+            f"{who} {-1e3 * found.lead_s:.0f} ms ahead {told}: are commands and positions exchanged, or their clocks different?"
+        )
+    elif clear and found.lead_s > SLOW_S and not found.repeats:
+        yield f"{who} {1e3 * found.lead_s:.0f} ms behind {told}: were they logged by clocks that differ?"
+    shift = round(found.lead_s / step_s) if clear else 0
+    ahead, behind = asked[max(0, -shift) : len(asked) - max(0, shift)], seen[max(0, shift) : len(seen) - max(0, -shift)]
+    fits = np.nan_to_num(np.corrcoef(ahead.T, behind.T)[: len(names), len(names) :])
+    for j, name in enumerate(names):
+        other = int(np.argmax(fits[:, j]))
+        if -EXCHANGED < fits[j, j] < FITS and fits[other, j] > EXCHANGED and fits[other, j] - fits[j, j] > APART:
+            yield (
+                f"position of {name}: it does what {names[other]} is told (correlation {fits[other, j]:.3g}), not what it is "
+                f"told itself ({fits[j, j]:.2g}): exchanged columns?"
+            )
 
 
 def beyond_the_drive(robot: Robot, commands: Array) -> Iterator[str]:

@@ -22,7 +22,7 @@ from ee_dist.measurements.held_readings import written_late
 from ee_dist.measurements.looking import Looked, repeats
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.reading import between_readings, paces_of, rows_read, told_of
-from ee_dist.measurements.report import TORQUE, Report
+from ee_dist.measurements.report import TORQUE, Report, in_one_line
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import suspicions, time_suspicion
@@ -92,6 +92,7 @@ class _Import:
         self.report.suspicious += repeats(self.mapping, self.clocks, paces_of(self.clocks, self.read_at))
         torques = self._torques()
         commands = self._commands(torques)
+        self.report.suspicious = in_one_line(self.report.suspicious)
         self._on_one_turn(commands)
         supply = None
         if self.mapping.supply is not None:

@@ -10,7 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.measurements.clocks import Clocked
-from ee_dist.measurements.commanded import beyond_the_drive, command_flaws, far_from_commands, torques_beside_commands
+from ee_dist.measurements.commanded import (
+    beside_their_commands,
+    beyond_the_drive,
+    command_flaws,
+    far_from_commands,
+    torques_beside_commands,
+)
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Estimated, Mapping
 from ee_dist.measurements.need import torques_beside_need
@@ -33,10 +39,8 @@ from ee_dist.robots.model import Robot, Sensor
 from ee_dist.robots.reached import told
 from ee_dist.trials.log import Array
 
-MOST_TILTED = {"roll": math.pi, "pitch": math.pi / 2}
-"""How far a base turns by these, rad, whatever it does,"""
 TURNED = 1.05
-"""and times that beyond which they are in another unit."""
+"""Times half a turn beyond which the tilt of a base is in another unit."""
 
 
 @dataclass(frozen=True)
@@ -61,16 +65,15 @@ class Looked:
         for s in self.robot.sensors:
             if s.kind == "position":
                 yield from self._position(s)
-            elif s.kind in MOST_TILTED:
-                most = MOST_TILTED[s.kind]
-                flaw = unit_suspicion(s.name, self.channels[s.name], -most, most, s.unit, far=TURNED, whose="a base")
-                yield from self._judged(flaw, self.mapping.sensors[s.name])
+            elif s.kind in ("roll", "pitch"):
+                yield from self._tilt(s)
             elif s.kind == "velocity" and s.target in self._positions:
                 flaw = speed_suspicion(s.name, self.channels[s.name], self._positions[s.target], self.step_s)
                 yield from self._judged(flaw, self.mapping.sensors[s.name])
         yield from self._speeds()
         for name, flaw in command_flaws(self.robot, self.mapping, self.commands, self._positions, self.step_s):
             yield from self._judged(flaw, self.mapping.commands.get(name))
+        yield from beside_their_commands(self.robot, self.commands, self._positions, self.step_s)
         yield from beyond_the_drive(self.robot, self.commands)
         yield from far_from_commands(self.robot, self.commands, self._positions)
         if self.torques is not None:
@@ -92,6 +95,17 @@ class Looked:
         yield from self._judged(unit_suspicion(sensor.name, at, *joint.ends, sensor.unit, unit), column)
         for words in told(joint, float(at.min()), float(at.max()), sensor.noise):
             yield f"{sensor.name}: {words}: is the description's zero another one, or its stop elsewhere?"
+
+    def _tilt(self, sensor: Sensor) -> Iterator[str]:
+        at = self.channels[sensor.name]
+        flaw = unit_suspicion(sensor.name, at, -math.pi, math.pi, sensor.unit, far=TURNED, whose="a base")
+        yield from self._judged(flaw, self.mapping.sensors[sensor.name])
+        most = float(np.abs(at).max())
+        if flaw is None and sensor.kind == "pitch" and most > TURNED * math.pi / 2:
+            yield (
+                f"{sensor.name}: reaches {most:.3g} rad, and no pitch does as it is counted here (up to 1.57, roll tells the "
+                "rest): leave out what comes after the robot fell, or count it so"
+            )
 
     def _speeds(self) -> Iterator[str]:
         """Measured speeds beside the change of positions: of all joints together, and each beside those of the others."""

@@ -8,6 +8,8 @@ from typing import Any
 
 TORQUE = "torque of"
 """How the report names what a drive gave, before its joint."""
+COMMAND, STUCK_AT, MANY = "command of", ": stuck at ", 3
+"""How it names commands, what it says of a channel that never changes, and of how many of them in one line."""
 ROUNDING = 1e-12
 """Share of the larger end of a range below which the other end is what rounding left."""
 
@@ -32,6 +34,15 @@ class Report:
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
+
+
+def in_one_line(suspicious: Sequence[str]) -> list[str]:
+    """The lines, those on commands that stay as they are in one: trials in which a joint or two move have many of them."""
+    still = [s for s in suspicious if s.startswith(COMMAND) and STUCK_AT in s]
+    if len(still) < MANY:
+        return list(suspicious)
+    line = f"commands of {len(still)} joints stay as they are for the whole record, first {still[0].partition(' (')[0]}"
+    return [line if s == still[0] else s for s in suspicious if s == still[0] or s not in still]
 
 
 def describe(reports: Sequence[Report]) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.measurements import signals
+from ee_dist.measurements.report import STUCK_AT
 from ee_dist.measurements.units import TURN, TURNS_ON, UNITS
 from ee_dist.trials.log import Array
 
@@ -52,7 +53,7 @@ def suspicions(name: str, values: Array, turn: float = TURN) -> list[str]:
     found: list[str] = []
     spread = float(np.ptp(values))
     if spread == 0:
-        return [f"{name}: stuck at {values[0]:.6g} for the whole record"]
+        return [f"{name}{STUCK_AT}{values[0]:.6g} for the whole record"]
     run, start = _longest_run(values)
     if run > STUCK_SHARE * len(values):
         found.append(f"{name}: does not change for {run} rows of {len(values)}, from row {start}")
