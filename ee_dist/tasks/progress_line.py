@@ -14,6 +14,15 @@ EVERY_S, STEPS_S = 15.0, 10.0
 """Where there is no terminal, a stage says so often how far it is, and, where it has several steps, at which of them."""
 
 
+FITTING = "fitting"
+"""The stage that ends as soon as nothing gets better by it."""
+
+
+def left_of(what: str, left_s: float) -> str:
+    """How long a stage goes on, for people; of one that may end before, at most."""
+    return f"{'up to' if FITTING in what else 'about'} {left_s:.0f} s left of this stage"
+
+
 class SearchProgress:
     """A live line on a terminal; elsewhere a plain line whenever another stage begins, and while it goes on for long, the
     first as soon as it is known that it will. ``told``: who else is told."""
@@ -50,7 +59,7 @@ class SearchProgress:
         self.stage, self.share, self.heard = what, share, now
         left = (now - self.stage_began) * (1 - share) / share if share > 0 else 0.0
         so_far = "" if error is None else f", error {error:.3g}"
-        ahead = f"{what} {share:.0%}{so_far}, about {left:.0f} s left of this stage"
+        ahead = f"{what} {share:.0%}{so_far}, {left_of(what, left)}"
         if self.status:
             self.status.update(Text(f"{ahead}, {now - self.began:.0f} s so far"))
             return

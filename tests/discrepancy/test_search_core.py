@@ -28,6 +28,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import follow_slopes
 from ee_dist.discrepancy.search.trials import telling
 from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, term
+from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.trials.log import Array
 
 POOL = candidates(ROBOT, only=["motor_weak", "joint_jam", "command_gain", "load_friction"])
@@ -353,3 +354,14 @@ def test_one_trial_screens_alone_only_where_it_has_enough_to_tell():
     loud[100:] = 6.0
     assert telling(problem, faint, [0, 1]) is None  # type: ignore[arg-type]
     assert telling(problem, loud, [0, 1]) == 1  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "c", [c for c in candidates(quadruped_lab(), sharing=False) if c.inert][::7], ids=lambda c: c.name
+)
+def test_values_that_show_only_beside_others_are_looked_at_on_both_sides(c: Candidate) -> None:
+    """A spring that rests on the other side pulls the other way: the first look must not see one side alone."""
+    probes = c.probes((0.3, 0.9))
+    for k in c.inert:
+        signs = {float(np.sign(u[k])) for u in probes if u[k]}
+        assert signs == {s for s, room in ((1.0, c.upper[k]), (-1.0, c.lower[k])) if room}

@@ -107,11 +107,12 @@ class Candidate:
             for side in (self.upper[k], self.lower[k]):
                 if side and k not in self.inert:
                     points += [side * share * np.eye(self.size)[k] for share in shares]
-        # What an inert parameter does shows only beside another: the time at which a sensor sticks decides at which value.
+        # What an inert parameter does shows only beside another: the time at which a sensor sticks decides at which value, the
+        # side on which a spring rests which way it pulls.
         beside = [u for u in points if np.abs(u).max() == max(shares)]
         for k in self.inert:
-            side = self.upper[k] or self.lower[k]
-            points += [u + side * share * np.eye(self.size)[k] for u in beside for share in shares]
+            sides = [side for side in (self.upper[k], self.lower[k]) if side]
+            points += [u + side * share * np.eye(self.size)[k] for u in beside for side in sides for share in shares]
         return [*points, *self.hinted]
 
     @property

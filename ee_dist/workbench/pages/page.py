@@ -10,6 +10,7 @@ from nicegui.events import KeyEventArguments
 
 from ee_dist.basics.names import counted
 from ee_dist.discrepancy.words import plain
+from ee_dist.tasks.progress_line import left_of
 from ee_dist.trials.log import Array
 from ee_dist.workbench import verbs
 from ee_dist.workbench.pages.add import AddView
@@ -186,7 +187,7 @@ class Page:
         self.doing.set_text(
             f"{progress.request.verb}: {progress.what} {progress.share:.0%}"
             + ("" if progress.error is None else f", error {progress.error:.3g}")
-            + ("" if left is None else f", about {left:.0f} s left of this stage")
+            + ("" if left is None else f", {left_of(progress.what, left)}")
             + f", {progress.spent_s:.0f} s so far"
         )
 
