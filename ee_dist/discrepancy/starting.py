@@ -24,8 +24,8 @@ from ee_dist.discrepancy.measured_trial import (
 from ee_dist.discrepancy.slow_noise import slow_noise
 from ee_dist.engines.halfway import goes_halfway
 from ee_dist.robots.model import Robot
-from ee_dist.robots.standing import stood
 from ee_dist.trials.log import Array, SensorLog, State
+from ee_dist.trials.motion import base_poses
 
 AROUND, CUBIC = (9, 5), 3
 """Readings that the curve is laid through, and fewer, which part from the first where it is too stiff; its order."""
@@ -43,18 +43,8 @@ def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
     if log.joints is None or not np.abs(log.joints[0]).max() > 0 or (robot.free_base and not trial.commands_held):
         return None
     speeds, _ = _first_speeds(trial, speed_sensors(robot), goes_halfway(robot))
-    base = (
-        stood(robot, log.joints[0], _first(log, robot, "roll"), _first(log, robot, "pitch"))
-        if robot.free_base
-        else None
-    )
+    base = base_poses(robot, log, np.zeros(1, dtype=np.intp))[0] if robot.free_base else None
     return State(log.joints[0].copy(), speeds.copy(), base)
-
-
-def _first(log: SensorLog, robot: Robot, kind: str) -> float | None:
-    """What a sensor of this kind said first; None where there is none, or it said nothing."""
-    read = [float(log.sensors[0, c]) for c, s in enumerate(robot.sensors) if s.kind == kind]
-    return next((v for v in read if np.isfinite(v)), None)
 
 
 def starts_beside(trial: MeasuredTrial, robot: Robot) -> list[State]:

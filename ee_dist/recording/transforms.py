@@ -36,7 +36,7 @@ def transform_messages(record: TrialRecord, robot: Robot, start_ns: int) -> Iter
     rows = _thinned(offsets)
     # A sensor may say infinity; such a pose gets no frame below.
     with np.errstate(invalid="ignore", over="ignore"):
-        base, joints = base_poses(robot, log)[rows], joint_positions(robot, log)[rows]
+        base, joints = base_poses(robot, log, np.array(rows)), joint_positions(robot, log)[rows]
         poses = part_poses(model_of(record, robot), base, joints)
     frames = {part_frame(record.source, name): _single(pose) for name, pose in poses.items()}
     for k, row in enumerate(rows):

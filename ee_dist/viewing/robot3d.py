@@ -47,7 +47,7 @@ class Appearance:
         """Thinned times (K,) on the timeline, s, and poses (K, 7) of every part; rows that the log lacks left out."""
         seconds = seconds_of(self.log)
         rows = thinned(seconds, POSE_HZ)
-        base, joints = base_poses(self.model, self.log)[rows].copy(), joint_positions(self.model, self.log)[rows]
+        base, joints = base_poses(self.model, self.log, rows).copy(), joint_positions(self.model, self.log)[rows]
         base[:, 1] += self.aside_m
         known = np.isfinite(base).all(axis=1) & np.isfinite(joints).all(axis=1)
         return self.start_s + seconds[rows][known], part_poses(self.model, base[known], joints[known])

@@ -52,13 +52,13 @@ def test_the_lowest_point_of_a_shape(kind: str) -> None:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]
     )  # the floor's z in the shape's axes
     wanted = 0.4 - 0.1 + (surface(kind, SIZES[kind]) @ up).min()
-    found = lowest_m(alone, np.array([0, 0, 0.4, 0, 0, 0, 1.0]), np.zeros(0))
+    (found,) = lowest_m(alone, np.array([[0, 0, 0.4, 0, 0, 0, 1.0]]), np.zeros((1, 0)))
     assert found == pytest.approx(wanted, abs=1e-5)
 
 
 def test_a_robot_as_described_stands_where_it_is_described_to() -> None:
     robot = quadruped_lab()
-    pose = stood(robot, np.array([robot.joint(m).start for m in robot.motor_names]), None, None)
+    (pose,) = stood(robot, np.array([[robot.joint(m).start for m in robot.motor_names]]), None, None)
     assert pose[:3] == pytest.approx(robot.start_position_m, abs=2e-3)
     assert pose[3:] == pytest.approx(robot.start_rotation)
 
@@ -87,7 +87,7 @@ def test_it_begins_as_it_was_read_in_both_engines(name: str) -> None:
     assert (first["roll"], first["pitch"]) == pytest.approx((0.15, -0.1), abs=5e-3)
     assert log.joints is not None and log.base_pose is not None
     assert log.joints[0] == pytest.approx(joints, abs=5e-3)
-    assert lowest_m(robot, log.base_pose[0], log.joints[0]) == pytest.approx(0.0, abs=1e-3)
+    assert lowest_m(robot, log.base_pose[:1], log.joints[:1]) == pytest.approx(0.0, abs=1e-3)
 
 
 def test_a_simulated_one_begins_as_described() -> None:
@@ -106,6 +106,6 @@ def test_a_model_that_is_farther_off_in_plain_numbers_is_told_so() -> None:
 def test_a_base_without_a_floor_stays_as_high() -> None:
     robot = quadruped_lab()
     air = replace(robot, world=replace(robot.world, has_floor=False))
-    pose = stood(air, np.zeros(len(robot.motor_names)), math.pi / 3, None)
+    (pose,) = stood(air, np.zeros((1, len(robot.motor_names))), np.array([math.pi / 3]), None)
     assert pose[2] == robot.start_position_m[2]
     assert pose[3] == pytest.approx(math.sin(math.pi / 6))
