@@ -10,6 +10,7 @@ import pytest
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.starting import start_of
+from ee_dist.discrepancy.ways.open_loop.falls import fallen
 from ee_dist.discrepancy.ways.open_loop.in_units import farther_off
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -109,3 +110,20 @@ def test_a_base_without_a_floor_stays_as_high() -> None:
     (pose,) = stood(air, np.zeros((1, len(robot.motor_names))), np.array([math.pi / 3]), None)
     assert pose[2] == robot.start_position_m[2]
     assert pose[3] == pytest.approx(math.sin(math.pi / 6))
+
+
+def test_a_simulated_robot_that_falls_over_where_the_real_one_stands_is_told() -> None:
+    robot = quadruped_lab()
+    joints = np.full(len(robot.motor_names), 0.2)
+    upright, down = (np.array([[0, 0, 0.2, *turn_of_rpy((roll, 0.0, 0.0))]] * 2) for roll in (0.1, 1.5))
+    down[0] = upright[0]
+
+    def said(real: float, poses: Array) -> list[str]:
+        trial = trial_of(robot, joints, (real, 0.0), True)
+        return fallen(robot, [trial], [replace(trial.log, base_pose=poses)])
+
+    (line,) = said(0.1, down)
+    assert "t at 0.01 s" in line
+    assert not said(0.1, upright)
+    assert not said(1.5, down), "so did the real one"
+    assert not fallen(replace(robot, free_base=False), [], [])

@@ -15,6 +15,7 @@ import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
 from ee_dist.discrepancy.problem import Layout, Problem, Series, joints_of
+from ee_dist.discrepancy.ways.open_loop.falls import fallen
 from ee_dist.discrepancy.ways.open_loop.in_units import InUnits, farther_off, in_units, told_in_units
 from ee_dist.discrepancy.ways.open_loop.predictability import MEMBERS, ensemble
 from ee_dist.discrepancy.ways.open_loop.prediction import (
@@ -389,7 +390,8 @@ class OpenLoop(Problem):
         return out
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
-        return self.other_errors(hypothesis)
+        moved = self.simulated(hypothesis) if self.robot.free_base else []
+        return [*self.other_errors(hypothesis), *(fallen(self.robot, self.measured, moved) if moved else [])]
 
     def other_errors(self, *models: Hypothesis) -> list[str]:
         """In the units of the channels: root mean squares over all rows, by kind of sensor."""
