@@ -132,23 +132,41 @@ def test_full_logs_that_are_called_after_what_was_done_are_trials(tmp_path: Path
     assert put_together([tmp_path / "elbow.csv"] * 2, JOINTS) is None
 
 
-def test_rows_of_different_moments_do_not_stand_side_by_side(tmp_path: Path) -> None:
+def test_rows_of_different_moments_go_by_their_times(tmp_path: Path) -> None:
+    """Commands that were logged by another thread: seldom, later, and over a part of the time."""
     m = samples.motion()
     by_quantity(tmp_path, m)
-    robot, _ = load_robot(samples.robot_file(tmp_path))
     files = [tmp_path / "positions.csv", tmp_path / "commands.csv"]
-    late = pd.read_csv(files[1])
-    late.iloc[:-3].to_csv(files[1], index=False)
+    sent = np.c_[m["t"] + 0.004, m["g"]][20:-10:2]
+    table(files[1], sent, ["time", *JOINTS])
+    (log,) = taken_in(tmp_path, files)
+    # From the first row at which a command was known, to the last before the next would have come.
+    at = m["t"][21:-9]
+    assert len(log) == len(at)
+    assert log.sensors[:, :2] == pytest.approx(m["q"][21:-9])
+    known = sent[np.searchsorted(sent[:, 0], at, side="right") - 1, 1:]
+    assert log.commands == pytest.approx(known)
+    # As many rows, at other times.
+    table(files[1], np.c_[m["t"] + 0.02, m["g"]], ["time", *JOINTS])
+    (log,) = taken_in(tmp_path, files)
+    assert log.commands == pytest.approx(m["g"][:-2])
+
+
+def test_rows_of_different_moments_do_not_stand_side_by_side(tmp_path: Path) -> None:
+    m = samples.motion()
+    files = [tmp_path / "positions.csv", tmp_path / "commands.csv"]
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    table(files[0], np.c_[m["t"], m["q"]], ["time", *JOINTS])
+    table(files[1], m["g"][:-3], [*JOINTS])
     with pytest.raises(MeasurementError, match=r"positions.csv \(400 rows\), commands.csv \(397 rows\) cannot stand"):
         side_by_side({f.stem: read(f)[0].tables[0] for f in files})
-    late.assign(time=late.time + 0.02).to_csv(files[1], index=False)
-    with pytest.raises(MeasurementError, match=r"commands\.csv: row .* was at .* cannot stand side by side"):
-        side_by_side({f.stem: read(f)[0].tables[0] for f in files})
     # What cannot stand side by side, and is no trial each either, is said, not taken for trials.
-    third = tmp_path / "torques.csv"
-    late.iloc[:-3].to_csv(third, index=False)
+    table(tmp_path / "torques.csv", m["g"][:-6], [*JOINTS])
     with pytest.raises(MeasurementError, match="cannot stand side by side"):
-        proposal_for([*files, third], robot, Hints())
+        proposal_for([*files, tmp_path / "torques.csv"], robot, Hints())
+    table(files[1], np.c_[m["t"] + 1e6, m["g"]][:-3], ["time", *JOINTS])
+    with pytest.raises(MeasurementError, match="hardly a moment in common"):
+        side_by_side({f.stem: read(f)[0].tables[0] for f in files})
 
 
 def test_one_that_is_missing_is_named(tmp_path: Path) -> None:
