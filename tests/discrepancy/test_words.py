@@ -12,6 +12,7 @@ from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.assumed import LABEL
 from ee_dist.discrepancy.evidence.intervals import BOUND, NEUTRAL, ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
@@ -48,12 +49,13 @@ def made_up() -> SimpleNamespace:
 
 def account(
     tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = (),
-    what: Term = DRY, left: tuple[Leftover, ...] = (), parameters: tuple[ParameterReport, ...] = (),
+    what: Term = DRY, left: tuple[Leftover, ...] = (), parameters: tuple[ParameterReport, ...] = (), label: str = "",
+    problem: SimpleNamespace | None = None,
 ) -> Account:  # fmt: skip
     best = SimpleNamespace(
         terms=(what,), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
         explained=explained, held_out="windows", error_heldout=1.1, own=np.zeros(len(what.values)),
-        proposal=SimpleNamespace(label="", guess=False, parts=(candidate(servo_pendulum(), what.effect, what.target),)),
+        proposal=SimpleNamespace(label=label, guess=False, parts=(candidate(servo_pendulum(), what.effect, what.target),)),
     )  # fmt: skip
     found = SimpleNamespace(
         candidates=[],
@@ -70,7 +72,7 @@ def account(
         after=(what,),
         parameters=list(parameters),
     )
-    return explain_account(made_up(), found, ahead, planner)  # type: ignore[arg-type]
+    return explain_account(problem or made_up(), found, ahead, planner)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -360,3 +362,22 @@ def test_explain_says_how_sure_a_value_is_and_which_ended_at_its_bound() -> None
 ])  # fmt: skip
 def test_a_narrow_interval_does_not_end_where_it_begins(low: float, high: float, said: str) -> None:
     assert percents(low, high) == said
+
+
+@pytest.mark.parametrize(("flag", "said"), [(NEUTRAL, "tell none by itself"), ("", "(torque 0.3 N.m)")])
+def test_of_drives_that_were_assumed_only_what_the_data_tell_is_named(flag: str, said: str) -> None:
+    """Six numbers go together, and each of them may stand in for the others."""
+    robot = servo_pendulum()
+    guessed = replace(robot, assumed=tuple((j, "kp") for j in robot.motor_names))
+    still, moving = (np.full((4, 1), 0.3), np.linspace(0, 1, 4)[:, None])
+    told_of = (ParameterReport(0, "torque_nm", 0.3, 0.0, 1.0, flag),)
+
+    def of(commands: np.ndarray) -> Account:
+        problem = made_up()
+        problem.robot, problem.measured = guessed, (SimpleNamespace(log=SimpleNamespace(commands=commands)),)
+        return account([], parameters=told_of, label=LABEL, problem=problem)
+
+    head = of(moving).headline
+    assert head.startswith("Not what was assumed: coulomb friction") and said in head
+    assert not any("commanded to move" in line for line in of(moving).lines)
+    assert any("Only 0 joints of 1 are commanded to move here" in line for line in of(still).lines)

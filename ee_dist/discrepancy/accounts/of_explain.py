@@ -46,6 +46,7 @@ from ee_dist.discrepancy.search.candidates import known
 from ee_dist.discrepancy.words import amounts, is_less, named, percent, percents, phrase, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
 
 NAMED = 3
 """Terms whose intervals are told in a sentence, and values of a model that moved."""
@@ -188,7 +189,11 @@ def _still(problem: Problem) -> str:
     """A word where most joints of which drives were assumed do not move: what all share is what the others show."""
     robot = problem.robot
     assumed = robot.assumed_joints("kp")
-    moved = [j for j in assumed if any(np.nanstd(t.log.commands[:, _motor(robot, j)]) > 0 for t in problem.measured)]
+    moved = [
+        j
+        for j in assumed
+        if any(_told_to_move(t.log.commands[:, robot.motor_names.index(j)]) for t in problem.measured)
+    ]
     if 2 * len(moved) >= len(assumed):
         return ""
     one = len(moved) == 1
@@ -198,8 +203,10 @@ def _still(problem: Problem) -> str:
     )
 
 
-def _motor(robot: Robot, joint: str) -> int:
-    return robot.motor_names.index(joint)
+def _told_to_move(commands: Array) -> bool:
+    """Whether commands (T,), NaN where a drive is released, are ever others."""
+    known = commands[np.isfinite(commands)]
+    return len(known) > 0 and float(np.ptp(known)) > 0
 
 
 def _rivals(tried: int, tied: Sequence[str], more: str) -> str:
