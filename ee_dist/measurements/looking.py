@@ -24,6 +24,7 @@ from ee_dist.measurements.report import TORQUE
 from ee_dist.measurements.robot_channels import torque_units
 from ee_dist.measurements.suspicious import (
     exchanged_suspicions,
+    hardly_moves,
     pace_suspicion,
     repeat_suspicion,
     runs_against,
@@ -91,10 +92,24 @@ class Looked:
             self.channels[sensor.name],
             self.mapping.sensors[sensor.name],
         )
-        unit = column.unit if isinstance(column, Column) and column.scale == 1 else sensor.unit
+        unit = self._declared(sensor)
+        if any(
+            self._declared(s) == unit and not self._hardly_moves(s) for s in self.robot.sensors if s.kind == "position"
+        ):
+            # Columns of one log have one unit, and another shows it.
+            unit = sensor.unit
         yield from self._judged(unit_suspicion(sensor.name, at, *joint.ends, sensor.unit, unit), column)
         for words in told(joint, float(at.min()), float(at.max()), sensor.noise):
             yield f"{sensor.name}: {words}: is the description's zero another one, or its stop elsewhere?"
+
+    def _declared(self, sensor: Sensor) -> str:
+        """The unit that the mapping says a position is in."""
+        column = self.mapping.sensors[sensor.name]
+        return column.unit if isinstance(column, Column) and column.scale == 1 else sensor.unit
+
+    def _hardly_moves(self, sensor: Sensor) -> bool:
+        ends = self.robot.joint(sensor.target).ends
+        return not all(map(math.isfinite, ends)) or hardly_moves(self.channels[sensor.name], *ends, sensor.unit)
 
     def _tilt(self, sensor: Sensor) -> Iterator[str]:
         at = self.channels[sensor.name]

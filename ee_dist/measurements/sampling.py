@@ -26,7 +26,7 @@ FILLED = 1.5
 """Rows for each reading from which most rows are no readings, and only those that are count."""
 GAP = 5.0
 """Steps longer than this many medians are gaps."""
-AGAIN = 0.05
+AGAIN = 0.2
 """Share of the rows that may bear the time of the row before: loggers that stamp to the millisecond, or when they write, have
 some."""
 

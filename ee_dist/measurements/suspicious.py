@@ -122,9 +122,7 @@ def unit_suspicion(
             f"{name}: reaches {seen:.4g} {unit}, {whose} only {reach:.4g}; not in {declared or unit!r}?{cure}",
             True,
         )
-    # A joint without an end reaches far on paper, and yet moves by a turn or two.
-    room = min(reach, TURNS_ON) if kind == "angle" else reach
-    if declared and declared != unit and float(np.ptp(values)) < STILL * room:
+    if declared and declared != unit and hardly_moves(values, low, high, unit):
         likely = [u for u, s in fits.items() if LIVELY * reach <= s <= 1.2 * reach]
         if likely:
             return (
@@ -132,6 +130,13 @@ def unit_suspicion(
                 f"{reach:.3g}: say unit: {' or '.join(likely)}"
             ), True
     return None
+
+
+def hardly_moves(values: Array, low: float, high: float, unit: str) -> bool:
+    """Whether a joint that ends there moves by next to nothing of its way. One without an end reaches far on paper, and yet moves
+    by a turn or two."""
+    reach = max(abs(low), abs(high))
+    return float(np.ptp(values)) < STILL * (min(reach, TURNS_ON) if UNITS[unit][0] == "angle" else reach)
 
 
 def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> tuple[str, bool] | None:

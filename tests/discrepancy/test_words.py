@@ -12,6 +12,7 @@ from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.accounts.ranges import beyond_a_guess
 from ee_dist.discrepancy.assumed import LABEL
 from ee_dist.discrepancy.evidence.intervals import BOUND, NEUTRAL, ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
@@ -381,3 +382,16 @@ def test_of_drives_that_were_assumed_only_what_the_data_tell_is_named(flag: str,
     assert head.startswith("Not what was assumed: coulomb friction") and said in head
     assert not any("commanded to move" in line for line in of(moving).lines)
     assert any("Only 0 joints of 1 are commanded to move here" in line for line in of(still).lines)
+
+
+def test_a_factor_on_a_guess_that_ended_at_its_bound_says_how_to_go_on() -> None:
+    robot = quadruped()
+    guessed = replace(robot, assumed=tuple((j, "kp") for j in robot.motor_names))
+    stiffer = (term("position_gain", "all_joints", factor=5.0),)
+    at_end, within = (ParameterReport(0, "factor", 5.0, 4.0, 6.0, flag) for flag in (BOUND, ""))
+    (line,) = beyond_a_guess(guessed, stiffer, [at_end])
+    assert (
+        line.startswith("Position gain at all joints ended") and "multiply what the description assumes by 5," in line
+    )
+    assert not beyond_a_guess(guessed, stiffer, [within])
+    assert not beyond_a_guess(robot, stiffer, [at_end]), "nobody guessed"

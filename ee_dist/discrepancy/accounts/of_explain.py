@@ -32,7 +32,7 @@ from ee_dist.discrepancy.accounts.account import (
     unsure_of,
     was_or_were,
 )
-from ee_dist.discrepancy.accounts.ranges import ranges
+from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, ranges
 from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
 from ee_dist.discrepancy.confidence import COUNTED_WAY
 from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL, NOT_DETERMINED
@@ -129,6 +129,7 @@ def explain_account(
         turned = " Here the other way round: the model has too much of it." if less else ""
         lines += [] if guessed else [f"Its mark in a residual: {entry.signature}{turned}"]
         lines += [GUESS] if best.proposal.guess and not guessed else []
+        lines += beyond_a_guess(robot, found.after, found.parameters)
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:

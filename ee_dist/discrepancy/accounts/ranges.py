@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, EITHER, HARDLY, WIDER, ParameterReport, called
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, BOUND, EITHER, HARDLY, WIDER, ParameterReport, called
 from ee_dist.discrepancy.words import placed, plain, quantity, span
-from ee_dist.effects.catalogue import Hypothesis, Term
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
 from ee_dist.robots.model import Robot
 
 LISTED = 3
@@ -58,6 +58,21 @@ def flag_texts(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list
         "; ".join(_of_kind(effect, what, places) for (effect, what), places in kinds.items()) + f": {flag}."
         for flag, kinds in told.items()
     ]
+
+
+def beyond_a_guess(robot: Robot, terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
+    """A line for each factor on something that a description only guessed, which ended where it may not go farther: from a better
+    guess it may."""
+    return [
+        f"{placed(terms[p.term].name).capitalize()} ended where it may not go farther from a guess: multiply what the "
+        f"description assumes by {p.value:.3g}, and begin anew from there."
+        for p in parameters
+        if p.flag.startswith(BOUND) and p.name == "factor" and _guessed(robot, terms[p.term])
+    ]
+
+
+def _guessed(robot: Robot, term: Term) -> bool:
+    return CATALOGUE[term.effect].guesses_at(robot, term.target)
 
 
 def _of_kind(effect: str, what: str, places: Sequence[str]) -> str:

@@ -117,8 +117,8 @@ def half_widths(problem: Problem, fit: Fit, level: float = LEVEL) -> Array:
     are three or more (cluster-robust covariance, Liang and Zeger 1986), with Student's quantile for so few pieces. Infinite
     where the data say nothing.
     """
-    if not len(fit.u):
-        return np.zeros(0)
+    if not len(fit.u) or not fit.mask.any():
+        return np.full(len(fit.u), np.inf)
     inverse, weak = _inverse(fit)
     excess = max(1.0, fit.energy / max(1, int(fit.mask.sum()) - len(fit.u)))
     by_noise = np.sqrt(np.maximum(np.diag(inverse), 0.0) * excess) * scipy.special.ndtri(0.5 + level / 2)

@@ -40,6 +40,8 @@ def add_commands(v: View) -> None:
     # What neither is called a command nor goes with the motion is no rival.
     found = [s for b in v.blocks if not b.used and (s := score(v, b)) is not None and s.score >= 2]
     chosen = v.pick(sorted(found, key=lambda s: -s.score), 3.0)
+    if kind == "position":
+        _ask_of_the_late(v, chosen)
     names = list(v.robot.motor_names)
     if chosen is None:
         if any(c.group == "torques" for c in v.out.choices) and not found:
@@ -127,15 +129,30 @@ def _as_position_command(v: View, b: Block) -> Scored | None:
     step, fit = v.step(v.position.block), abs(ahead.correlation)
     score = (3.0 if r.command else 0.0) + (r.kind == POSITION and not r.weak) - r.second
     score += 2 if fit > 0.9 else 1 if fit > 0.7 else -3 if fit < 0.5 else 0
-    late = ahead.lead_s < -1.5 * step and fit > 0.7
     score += 1 if ahead.lead_s > 0 else 0
-    if ahead.lead_s >= 0:
-        why = _why(ahead, "the positions follow it by")
-    else:
-        why = f"it follows the positions by {-1e3 * ahead.lead_s:.0f} ms, as no command should"
-    if late and r.command:
-        v.out.ask(f"commands ({b.name}): {why}; are they swapped with {v.position.block.name}? write the right columns")
-    return Scored(b, score - 3 * late, ["called a command", why] if r.command else [why])
+    why = _why(ahead, "the positions follow it by") if ahead.lead_s >= 0 else _behind(ahead)
+    return Scored(b, score - 3 * _late(ahead, step), ["called a command", why] if r.command else [why])
+
+
+def _late(ahead: signals.Lead, step_s: float) -> bool:
+    return ahead.lead_s < -1.5 * step_s and abs(ahead.correlation) > 0.7
+
+
+def _behind(ahead: signals.Lead) -> str:
+    return f"it follows the positions by {-1e3 * ahead.lead_s:.0f} ms, as no command should"
+
+
+def _ask_of_the_late(v: View, chosen: Scored | None) -> None:
+    """A question on what is called a command and follows the positions, where nothing else is."""
+    step = v.step(v.position.block)
+    for b in v.blocks if chosen is None else [chosen.block]:
+        r = b.reading
+        if b.used or not r.command or not (r.kind in (POSITION, None) or r.weak) or not v.moves(b):
+            continue
+        if _late(ahead := _lead(v, b, "position"), step):
+            v.out.ask(
+                f"commands ({b.name}): {_behind(ahead)}; are they swapped with {v.position.block.name}? write the right columns"
+            )
 
 
 def _position_command_units(v: View, b: Block) -> UnitChoice:

@@ -160,16 +160,18 @@ def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
     sure, why = SURE, ""
     entries: list[dict[str, Any]] = []
     telling = signals.lively(v.position.block.values)
-    for k, r in enumerate(relations):
+    every = [_seen(v, k, r) for k, r in enumerate(relations)]
+    for k, (r, seen) in enumerate(zip(relations, every, strict=True)):
         kind = v.joints[k].kind
         base = SPEEDS[kind][0]
         if k in odd:
             entries.append({"unit": base})
             continue
-        seen = _seen(v, k, r)
         stated = block.units[k] if block.units and block.units[k] in SPEEDS[kind] else None
         if seen is None and (k not in telling or not signals.moves(block.values[:, k])):
-            seen = stated or (entries[-1]["unit"] if entries else base)
+            # Columns of one family have one unit, which those that move show.
+            others = [u for i, u in enumerate(every) if u and i not in odd and v.joints[i].kind == kind]
+            seen = stated or (others[0] if others else base)
         if stated and seen and stated != seen:
             return UnitChoice((), UNKNOWN, f"the name says {stated}, but beside the positions it is {seen}")
         if seen is None:

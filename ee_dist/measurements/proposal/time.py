@@ -20,8 +20,8 @@ TIMES = tuple(u for u, (kind, _) in UNITS.items() if kind == "time" and u in ("s
 
 WHOSE: dict[bool | None, int] = {False: 0, None: 1, True: 2}
 """The order in which times are taken: called measured, called neither, called desired."""
-MOSTLY = 0.95
-"""Share of its steps in which a time must rise to be one that has a flaw."""
+MOSTLY, SELDOM = 0.8, 0.1
+"""Share of its steps in which a time must rise to be one that has a flaw; and, where it never falls, to be a coarse one."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,9 @@ def time_flaw(table: Table) -> MeasurementError | None:
             continue
         try:
             values = table.numbers(address)
-            if len(values) > 2 and (np.diff(values) > 0).mean() > MOSTLY:
+            rises = np.diff(values) > 0
+            stands = (np.diff(values) >= 0).all() and rises.mean() > SELDOM
+            if len(values) > 2 and (stands or rises.mean() > MOSTLY):
                 check_times(values, table, address)
         except MeasurementError as error:
             return error

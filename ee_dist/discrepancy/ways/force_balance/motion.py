@@ -154,8 +154,11 @@ def motion_of(
                 f"describe it as kind {MOTOR_TORQUE}"
             )
         raise MeasurementError(f"the log of {robot.name} has no {what}: a balance of forces needs both{hint}")
-    if len(log) < processing.fewest(FEWEST):
-        raise MeasurementError(f"the log of {robot.name} has only {len(log)} rows: too few for the filters")
+    if len(log) < (fewest := processing.fewest(FEWEST)):
+        raise MeasurementError(
+            f"trial {trial.name!r} of {robot.name} has only {len(log)} rows: a balance of forces takes {fewest} for its filters; "
+            "leave it out (trials=[...] names the others)"
+        )
     if log.torques is None and trial.commands_held is False:
         torques = of_the_step_after(torques)
     dt = float(np.median(np.diff(log.times_s)))

@@ -30,7 +30,7 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
     rollout_of,
 )
 from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale
-from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, frozen, repeating
+from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, frozen, moving, repeating
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
 from ee_dist.effects.catalogue import Hypothesis, applied, apply
 from ee_dist.effects.groups import members_of
@@ -111,7 +111,13 @@ class OpenLoop(Problem):
         self.predictor = Predictor(self.measured, robot, evaluator, block, window)
         self._looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
         rows = self.predictor.rows
-        self._data = [digest(of_rows(t.log.sensors, r), block, window) for t, r in zip(trials, rows, strict=True)]
+        read = [of_rows(t.log.sensors, r) for t, r in zip(trials, rows, strict=True)]
+        self._data = [digest(values, block, window) for values in read]
+        # What is simulated has steps only where its sensors are described to.
+        self._moving = [
+            moving(values, window) if t.commands_held else np.ones_like(d.repeated, dtype=bool)
+            for t, values, d in zip(trials, read, self._data, strict=True)
+        ]
         self._weigh(before)
         self._lay_out()
         self.error_definition = (
@@ -151,7 +157,8 @@ class OpenLoop(Problem):
         models += ensemble(models[0], self._members)
         pairs = [(k, m) for k in range(len(self.measured)) for m in self._held(models, k)]
         found = self.predictor.digests(pairs)
-        self.repeating = repeating(self.robot, zip(self._data, found[:: len(models)], strict=True), self.window)
+        seen = zip(self._data, found[:: len(models)], self._moving, strict=True)
+        self.repeating = repeating(self.robot, seen, self.window)
         self._undeclared = self._rougher(found[:: len(models)])
         self._begun = [self.predictor.by_start(k, held) for k, held in pairs[:: len(models)]]
         self.deviation: list[Array] = []
@@ -331,7 +338,7 @@ class OpenLoop(Problem):
         shape = (measured.means.astype(float) - predicted.means) / self.deviation[trial]
         grain = np.log((measured.rough + self._tiny) / self._rough(predicted)) / self.grain_deviation[trial]
         compared = np.array([x.kind not in self.repeating for x in self.robot.sensors])
-        texture = np.stack([grain, frozen(measured, predicted, self.window) * compared], axis=1)
+        texture = np.stack([grain, frozen(measured, predicted, self.window) * compared * self._moving[trial]], axis=1)
         return np.concatenate([soften(shape).ravel(), soften(texture).ravel()])
 
     def _command_residuals(self, trial: MeasuredTrial, models: Sequence[Robot]) -> Array:

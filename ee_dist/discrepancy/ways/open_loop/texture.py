@@ -6,17 +6,30 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ee_dist.discrepancy.ways.open_loop.prediction import Digest
+from ee_dist.discrepancy.problem import Mask
+from ee_dist.discrepancy.ways.open_loop.prediction import Digest, block_sums
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 REPEATING = frozenset({"sensor_dropout", "sensor_quantisation"})
 """Effects that are told from others by how often a channel repeats a reading."""
+FINEST, FASTER = 0.05, 2.0
+"""The share of a channel's changes below which its finest step lies, and how many of these it must change by in a row, or it may
+as well repeat a reading."""
 ODD = 3.0
 """Standard deviations by which a channel repeats readings more often than the model's, to be odd."""
 MOST, ENOUGH = 2 / 3, 3
 """Share of the channels of a kind that are odd, and channels that there must be, for it to be how these sensors are (coarse
 steps, rows that were filled in) and not what is wrong with one."""
+
+
+def moving(values: Array, window: int) -> Mask:
+    """(R // window, S) whether readings (R, S) change by more than their finest step from one to the next: only there a reading
+    that comes again tells of a sensor. Of an encoder at rest each one does, and no simulation has its steps."""
+    change = np.abs(np.diff(values, axis=0, prepend=values[:1]))
+    steps = [c[c > 0] for c in change.T]
+    finest = np.array([np.quantile(s, FINEST) if len(s) else 0.0 for s in steps])
+    return np.asarray(block_sums(change, window) / window > FASTER * finest)
 
 
 def frozen(measured: Digest, predicted: Digest, window: int) -> Array:
@@ -26,10 +39,13 @@ def frozen(measured: Digest, predicted: Digest, window: int) -> Array:
     return np.asarray((measured.repeated - predicted.repeated) / spread)
 
 
-def repeating(robot: Robot, pairs: Iterable[tuple[Digest, Digest]], window: int) -> frozenset[str]:
-    """Kinds of sensors most of which repeat readings as the model's do not, from (measured, predicted) of each trial."""
+def repeating(robot: Robot, pairs: Iterable[tuple[Digest, Digest, Mask]], window: int) -> frozenset[str]:
+    """Kinds of sensors most of which repeat readings as the model's do not, from (measured, predicted, where that tells) of each
+    trial."""
     squares = [
-        np.mean(np.maximum(frozen(m, p, window), 0.0) ** 2, axis=0) for m, p in pairs if p.finite and len(p.repeated)
+        np.mean(np.maximum(frozen(m, p, window) * tells, 0.0) ** 2, axis=0)
+        for m, p, tells in pairs
+        if p.finite and len(p.repeated)
     ]
     if not squares:
         return frozenset()
