@@ -22,9 +22,10 @@ from ee_dist.measurements.held_readings import written_late
 from ee_dist.measurements.looking import Looked, repeats
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.reading import between_readings, paces_of, rows_read, told_of
-from ee_dist.measurements.report import TORQUE, Report, in_one_line
+from ee_dist.measurements.report import COMMAND, TORQUE, Report, in_one_line
 from ee_dist.measurements.robot_channels import check_names, command_kind, command_kinds, command_units, torque_units
 from ee_dist.measurements.sampling import LowPass, carried, grid, held, linear, smoothed
+from ee_dist.measurements.signals import lag
 from ee_dist.measurements.suspicious import suspicions, time_suspicion
 from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.measurements.trial_clocks import TrialClocks
@@ -34,6 +35,11 @@ from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
+HELD = ", commands held"
+"""How the report says that."""
+AT_ONCE = 0.3
+"""Of a row of commands: joints that are not even so much later than a line through them are not led by what is held from one row
+to the next, which is half a row later."""
 SAME_RATE = 1e-3
 """A record whose even step is within this share of the wanted one is taken sample by sample."""
 DENSER = 1.1
@@ -59,6 +65,14 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
         each.clocked()
         paces |= {k: v for k, v in paces_of(each.clocks, each.read_at).items() if k not in paces}
     found = [each.run(paces) for each in begun]
+    if any(each.goes_on for each in begun):
+        # One controller leads all trials: of a slow one only others tell how it goes from point to point.
+        for i, each in enumerate(begun):
+            if not each.goes_on:
+                again = _Import(each.recorded, mapping, robot, i)
+                again.clocked()
+                again.goes_on = True
+                found[i] = again.run(paces)
     names = [report.trial for _, report in found]
     for i, setting in enumerate(mapping.settings):
         for wanted in setting.trials:
@@ -72,7 +86,7 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
 class _Import:
     def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, index: int) -> None:
         self.recorded, self.mapping, self.robot, self.index = recorded, mapping, robot, index
-        self.where = str(mapping.source)
+        self.where, self.goes_on = str(mapping.source), False
         self.header = {k: v for t in reversed(recorded.tables) for k, v in t.header.items()}
         self.report = Report(str(recorded.tables[0].path), self._name())
         for table in recorded.tables:
@@ -91,7 +105,13 @@ class _Import:
         positions = self._sensors()
         self.report.suspicious += repeats(self.mapping, self.clocks, paces_of(self.clocks, self.read_at))
         torques = self._torques()
-        commands = self._commands(torques)
+        commands = self._commands_given(torques, positions)
+        if self.goes_on:
+            self.report.done = [line.replace(HELD, "") for line in self.report.done]
+            self.report.done.append(
+                "commands: joints are ahead of what would be held from one row to the next, as none can be: they are taken as "
+                "points between which the controller went on, by straight lines"
+            )
         self.report.suspicious = in_one_line(self.report.suspicious)
         self._on_one_turn(commands)
         supply = None
@@ -162,7 +182,7 @@ class _Import:
             )
             report.done.append(
                 f"{how} sampling every {1e3 * timing.median_s:.4g} ms brought to {1e3 * step:.4g} ms: "
-                "states by straight lines, commands held"
+                f"states by straight lines{HELD}"
                 + (_late(timing.median_s, step) if step > DENSER * timing.median_s else "")
             )
         note = time_suspicion(timing.median_s, length, unit)
@@ -224,7 +244,7 @@ class _Import:
         if not self._same_rows(own):
             # The grid begins where the main table does.
             at_s = self._rows_s() + (self.main.times_s[0] - own.times_s[0])
-            if step_like and own.table.planned:
+            if step_like and (own.table.planned or (self.goes_on and name.startswith(COMMAND))):
                 values = linear(at_s + column.lead_s, own.times_s, values)
             elif step_like:
                 values = held(at_s, own.times_s, values, column.lead_s)
@@ -287,6 +307,22 @@ class _Import:
             return torques.copy()
         self.report.done.append("no commands were recorded: only a balance of forces can compare this log")
         return np.full(torques.shape, math.nan)
+
+    def _commands_given(self, torques: Array | None, positions: AnyMapping[str, Array]) -> Array:
+        """Commands (T, M), held from one row to the next; or, where joints are ahead of them so, on lines between the rows: what
+        was logged are points on the way of a controller, as clients of industrial arms have them."""
+        asked = {
+            d.joint: self.mapping.commands.get(d.joint) for d in self.robot.drives if command_kind(d) == "position"
+        }
+        led = {j: c.table for j, c in asked.items() if isinstance(c, Column) and j in positions}
+        if not self.goes_on and not self.as_is and len({*led.values()}) == 1:
+            told, self.goes_on = (list(self.report.done), list(self.report.suspicious)), True
+            lines = self._commands(torques)[:, [self.robot.motor_names.index(j) for j in led]]
+            row_s = self.clocks[next(iter(led.values()))].timing.median_s
+            late = lag(lines, np.stack([positions[j] for j in led], axis=1), self.step_s)
+            self.goes_on = late is not None and -row_s < late < AT_ONCE * row_s
+            self.report.done, self.report.suspicious = told
+        return self._commands(torques)
 
     def _on_one_turn(self, commands: Array) -> None:
         """Brings unwrapped commands to the turn of their positions: at 178 and -178 degrees the two may begin next to one

@@ -43,6 +43,8 @@ class Lead:
     repeats: bool = False
 
 
+TOGETHER = 0.99
+"""Correlation from which a lag that is shorter than a step can be told."""
 SMOOTHER = 0.05
 """What was planned has less than this share of the noise of what was measured, in fourth differences of which a fifth may be
 larger: a plan has corners."""
@@ -132,6 +134,19 @@ def lead(a: Array, b: Array, step_s: float) -> Lead:
     at_end = abs(other.lead_s) >= AT_THE_END * far * step_s
     better = 1.0 - abs(other.correlation) <= BETTER * (1.0 - abs(found.correlation))
     return other if better and not at_end else found
+
+
+def lag(asked: Array, seen: Array, step_s: float) -> float | None:
+    """Seconds by which what was ``seen`` (T, J) is later than what was ``asked``, finer than a step: the share of the rate of the
+    one that the other lacks, in the middle of the joints; None where they do not go together that closely, or nothing moves."""
+    found = []
+    for k in lively(asked, seen):
+        x, y = asked[:, k] - asked[:, k].mean(), seen[:, k] - seen[:, k].mean()
+        rate = np.gradient(x, step_s)
+        if not np.isfinite(rate).all() or x @ y < TOGETHER * np.sqrt((x @ x) * (y @ y)):
+            continue
+        found.append(float((x - y) @ rate / (rate @ rate)))
+    return float(np.median(found)) if found else None
 
 
 def _lead(x: Array, y: Array, step_s: float, most: int) -> Lead:

@@ -10,6 +10,10 @@ import pytest
 import small_logs as logs
 from measurement_files import JOINTS, motion
 
+from ee_dist.measurements.importer import import_files
+from ee_dist.measurements.mapping_file import read_mapping
+from ee_dist.measurements.proposal.write import as_yaml
+
 
 def log_of(folder: Path, degrees: bool = False) -> Path:
     """The first joint hardly moves."""
@@ -46,3 +50,35 @@ def test_a_time_that_is_too_coarse_is_named(tmp_path: Path) -> None:
     table["timestamp"] = np.floor(table["timestamp"] / 0.03) * 0.03
     _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, table))
     assert "'timestamp': time stands still" in proposal.questions[0] and "rows more" in proposal.questions[0]
+
+
+def led(folder: Path, late_s: float, name: str = "log") -> Path:
+    """Rows of 20 ms of a controller that goes on between them; the joints are ``late_s`` behind."""
+    t = np.arange(0, 4, 0.02)
+    way = lambda s: np.stack([0.5 * np.sin(1.7 * s) + 0.2 * np.sin(4.1 * s), 0.4 * np.cos(2.3 * s)], axis=1)  # noqa: E731
+    file = folder / f"{name}.csv"
+    logs.frame_of(t, way(t - late_s), way(t)).to_csv(file, index=False)
+    return file
+
+
+@pytest.mark.parametrize(("late_s", "lines"), [(0.001, True), (0.03, False)])
+def test_points_between_which_a_controller_goes_on_are_not_held(tmp_path: Path, late_s: float, lines: bool) -> None:
+    """No joint is ahead of a command that is held until the next comes."""
+    log, report = logs.imported(tmp_path, led(tmp_path, late_s))
+    between = log.commands[1::2]  # rows of 10 ms
+    held = np.isclose(between, log.commands[:-1:2][: len(between)]).all()
+    assert held != lines
+    assert any("by straight lines" in d and "points between which" in d for d in report.done) == lines
+    assert any("commands held" in d for d in report.done) != lines
+
+
+def test_what_one_trial_shows_goes_for_all(tmp_path: Path) -> None:
+    """A trial so slow, or short, that it does not tell is led by the same controller."""
+    files = [led(tmp_path, 0.001, "quick"), led(tmp_path, 0.001, "slow")]
+    slow = pd.read_csv(files[1])
+    slow.iloc[:, 1:] = 0.3
+    slow.to_csv(files[1], index=False)
+    robot, proposal = logs.proposed(tmp_path, files[0])
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(tmp_path / "chain.yaml"), "log"))
+    found = import_files(files, read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert all(any("points between which" in d for d in report.done) for _, report in found)

@@ -30,7 +30,7 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
     rollout_of,
 )
 from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale
-from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, frozen, moving, repeating
+from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving, repeating
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
 from ee_dist.effects.catalogue import Hypothesis, applied, apply
 from ee_dist.effects.groups import members_of
@@ -112,8 +112,13 @@ class OpenLoop(Problem):
         self._looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
         rows = self.predictor.rows
         read = [of_rows(t.log.sensors, r) for t, r in zip(trials, rows, strict=True)]
-        self._data = [digest(values, block, window) for values in read]
         # What is simulated has steps only where its sensors are described to.
+        self._data = [
+            _without_steps(digest(values, block, window), values, window)
+            if t.commands_held
+            else digest(values, block, window)
+            for t, values in zip(trials, read, strict=True)
+        ]
         self._moving = [
             moving(values, window) if t.commands_held else np.ones_like(d.repeated, dtype=bool)
             for t, values, d in zip(trials, read, self._data, strict=True)
@@ -424,6 +429,13 @@ class OpenLoop(Problem):
         jobs = [Job(r, ToSensors(t.early(self.robot))) for t, r in zip(self.measured, rollouts, strict=True)]
         true = self.evaluator.evaluate(jobs)
         return [report(m, v) for m, v in zip(models, true, strict=True)]
+
+
+def _without_steps(found: Digest, values: Array, window: int) -> Digest:
+    """The digest of a real log (R, S) without repeats that its sensors' steps explain."""
+    return replace(
+        found, repeated=np.maximum(found.repeated - by_steps(values, window), 0.0).astype(found.repeated.dtype)
+    )
 
 
 def _spans(robot: Robot) -> Array:

@@ -13,9 +13,9 @@ from ee_dist.trials.log import Array
 
 REPEATING = frozenset({"sensor_dropout", "sensor_quantisation"})
 """Effects that are told from others by how often a channel repeats a reading."""
-FINEST, FASTER = 0.05, 2.0
-"""The share of a channel's changes below which its finest step lies, and how many of these it must change by in a row, or it may
-as well repeat a reading."""
+FINEST, FASTER, ROUNDING = 0.05, 2.0, 1e-9
+"""The share of the gaps between what a channel said below which its finest step lies, how many of these it must change by in a
+row, or it may as well repeat a reading, and the share of its range below which a gap is what rounding made."""
 ODD = 3.0
 """Standard deviations by which a channel repeats readings more often than the model's, to be odd."""
 MOST, ENOUGH = 2 / 3, 3
@@ -26,10 +26,29 @@ steps, rows that were filled in) and not what is wrong with one."""
 def moving(values: Array, window: int) -> Mask:
     """(R // window, S) whether readings (R, S) change by more than their finest step from one to the next: only there a reading
     that comes again tells of a sensor. Of an encoder at rest each one does, and no simulation has its steps."""
-    change = np.abs(np.diff(values, axis=0, prepend=values[:1]))
-    steps = [c[c > 0] for c in change.T]
-    finest = np.array([np.quantile(s, FINEST) if len(s) else 0.0 for s in steps])
+    change, finest = _changes(values)
     return np.asarray(block_sums(change, window) / window > FASTER * finest)
+
+
+def by_steps(values: Array, window: int) -> Array:
+    """(R // window, S) share of the readings that come again because they are counted in steps: about as many as are one step
+    higher, or one lower."""
+    change, finest = _changes(values)
+    one_step = (change > 0) & (change < 1.5 * finest)
+    return np.asarray(block_sums(one_step.astype(float), window) / (2 * window))
+
+
+def _changes(values: Array) -> tuple[Array, Array]:
+    """From one reading to the next (R, S), and the finest step of each channel (S,)."""
+    change = np.abs(np.diff(values, axis=0, prepend=values[:1]))
+    return change, np.array([_finest(c) for c in values.T])
+
+
+def _finest(values: Array) -> float:
+    """The step in which a channel (R,) counts: that between neighbours among all that it ever said."""
+    gaps = np.diff(np.unique(values[np.isfinite(values)]))
+    gaps = gaps[gaps > ROUNDING * gaps.sum()]
+    return float(np.quantile(gaps, FINEST)) if len(gaps) else 0.0
 
 
 def frozen(measured: Digest, predicted: Digest, window: int) -> Array:
