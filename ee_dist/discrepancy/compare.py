@@ -39,7 +39,7 @@ class ChannelReport:
 
 @dataclass(frozen=True)
 class RegimeReport:
-    """``error`` over the values of a regime; ``share`` of the excess over the noise floor that falls in it; ``values``
+    """``error`` over the values of a regime; ``share``, 0 to 1, of the excess over the noise floor that falls in it; ``values``
     is the share of all values that do."""
 
     name: str
@@ -235,7 +235,8 @@ def regimes(problem: Problem, residual: Array) -> list[RegimeReport]:
     out = []
     for name, parts in gathered.items():
         whole, noise, values = (float(sum(p[q] for p in parts)) for q in range(3))
-        share = (whole - noise) / excess if excess > 0 else 0.0
+        # Of next to no excess a part may be many times it, and another as much less.
+        share = min(max((whole - noise) / excess, 0.0), 1.0) if excess > 0 else 0.0
         out.append(RegimeReport(name, float(np.sqrt(whole / values)), share, values / max(count, 1)))
     return out
 

@@ -63,4 +63,4 @@ def worst_trials(problem: Problem, found: Comparison) -> dict[str, str]:
 
 def excess_share(found: Comparison, r: RegimeReport) -> str:
     """The share of what is above the noise that falls in a regime; a dash where next to nothing is above it."""
-    return percent(max(0.0, min(r.share, 1.0))) if found.error > CLOSE * found.noise_floor else "-"
+    return percent(r.share) if found.error > CLOSE * found.noise_floor else "-"
