@@ -35,6 +35,9 @@ from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
+WHY_LINES = (
+    "joints are ahead of what would be held from one row to the next, as none can be ('commands_between: held' if they were): "
+)
 HELD = ", commands held"
 """How the report says that."""
 AT_ONCE = 0.3
@@ -86,7 +89,7 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
 class _Import:
     def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, index: int) -> None:
         self.recorded, self.mapping, self.robot, self.index = recorded, mapping, robot, index
-        self.where, self.goes_on = str(mapping.source), False
+        self.where, self.goes_on = str(mapping.source), mapping.commands_between == "lines"
         self.header = {k: v for t in reversed(recorded.tables) for k, v in t.header.items()}
         self.report = Report(str(recorded.tables[0].path), self._name())
         for table in recorded.tables:
@@ -109,8 +112,9 @@ class _Import:
         if self.goes_on:
             self.report.done = [line.replace(HELD, "") for line in self.report.done]
             self.report.done.append(
-                "commands: joints are ahead of what would be held from one row to the next, as none can be: they are taken as "
-                "points between which the controller went on, by straight lines"
+                f"commands: {WHY_LINES}they are taken as points between which the controller went on, by straight lines"
+                if self.mapping.commands_between is None
+                else "commands: by straight lines from one row to the next, as the mapping says"
             )
         self.report.suspicious = in_one_line(self.report.suspicious)
         self._on_one_turn(commands)
@@ -315,7 +319,7 @@ class _Import:
             d.joint: self.mapping.commands.get(d.joint) for d in self.robot.drives if command_kind(d) == "position"
         }
         led = {j: c.table for j, c in asked.items() if isinstance(c, Column) and j in positions}
-        if not self.goes_on and not self.as_is and len({*led.values()}) == 1:
+        if self.mapping.commands_between is None and not self.goes_on and not self.as_is and len({*led.values()}) == 1:
             told, self.goes_on = (list(self.report.done), list(self.report.suspicious)), True
             lines = self._commands(torques)[:, [self.robot.motor_names.index(j) for j in led]]
             row_s = self.clocks[next(iter(led.values()))].timing.median_s

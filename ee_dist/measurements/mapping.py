@@ -115,6 +115,8 @@ class Mapping:
     """Names of the files that are one table, row by row, by what goes before the names of their columns, with {trial}."""
     split: Split | None = None
     rate_hz: float | None = None
+    commands_between: str | None = None
+    """What commands do from one row to the next (``held`` or ``lines``); None where the joints are to show it."""
     trial: str | None = None
     """Name of a trial, with {key} for entries of the file's header."""
 

@@ -26,9 +26,11 @@ UNKNOWN = "???"
 """Stands in a proposed mapping where only a person can know."""
 
 
+BETWEEN = ("held", "lines")
+"""What commands may do from one row to the next."""
 _KEYS = (
     "robot", "format", "records", "separator", "header", "decimal", "tables", "side_by_side", "split", "time", "rate_hz",
-    "sensors", "commands", "torques", "external", "supply", "enabled", "settings", "gains", "trial",
+    "sensors", "commands", "commands_between", "torques", "external", "supply", "enabled", "settings", "gains", "trial",
 )  # fmt: skip
 
 
@@ -89,11 +91,18 @@ def mapping_of(data: Any, file: Path) -> Mapping:
         side_by_side=_side_by_side(data.get("side_by_side"), f"{where}: side_by_side"),
         split=_split(data.get("split"), f"{where}: split"),
         rate_hz=_rate(data.get("rate_hz"), f"{where}: rate_hz"),
+        commands_between=_between(data.get("commands_between"), f"{where}: commands_between"),
         trial=data.get("trial"),
     )
     _check_once(mapping)
     _check_files(mapping)
     return mapping
+
+
+def _between(value: Any, where: str) -> str | None:
+    if value is None or value in BETWEEN:
+        return value
+    raise MeasurementError(f"{where}: expected {' or '.join(map(quoted, BETWEEN))}, not {quoted(value)}")
 
 
 def _check_once(mapping: Mapping) -> None:

@@ -10,6 +10,7 @@ import pytest
 import small_logs as logs
 from measurement_files import JOINTS, motion
 
+from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.write import as_yaml
@@ -82,3 +83,18 @@ def test_what_one_trial_shows_goes_for_all(tmp_path: Path) -> None:
     (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(tmp_path / "chain.yaml"), "log"))
     found = import_files(files, read_mapping(tmp_path / "mapping.yaml"), robot)
     assert all(any("points between which" in d for d in report.done) for _, report in found)
+
+
+@pytest.mark.parametrize(("said", "late_s"), [("held", 0.001), ("lines", 0.03)])
+def test_a_person_may_say_what_commands_do_between_rows(tmp_path: Path, said: str, late_s: float) -> None:
+    file = led(tmp_path, late_s)
+    robot, proposal = logs.proposed(tmp_path, file)
+    mapping = tmp_path / "mapping.yaml"
+    mapping.write_text(as_yaml(proposal, str(tmp_path / "chain.yaml"), "log") + f"commands_between: {said}\n")
+    ((record, report),) = import_files([file], read_mapping(mapping), robot)
+    held = np.isclose(record.log.commands[1::2], record.log.commands[:-1:2]).all()
+    assert held == (said == "held")
+    assert any("commands held" in d for d in report.done) == (said == "held")
+    mapping.write_text(mapping.read_text().replace(f"commands_between: {said}", "commands_between: leapt"))
+    with pytest.raises(MeasurementError, match="commands_between: expected 'held' or 'lines', not 'leapt'"):
+        read_mapping(mapping)
