@@ -35,9 +35,7 @@ from ee_dist.recording.records import HARDWARE, TrialRecord
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
-WHY_LINES = (
-    "joints are ahead of what would be held from one row to the next, as none can be ('commands_between: held' if they were): "
-)
+WHY_LINES = "joints are ahead of what is held from row to row, as none can be ('commands_between: held' if they were): "
 HELD = ", commands held"
 """How the report says that."""
 AT_ONCE = 0.3

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from way_samples import CASES, evaluator_for, measured, problem, problem_by, samples
 
-from ee_dist.discrepancy.compare import compare
+from ee_dist.discrepancy.compare import compare, regimes
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.pool import pool_of
@@ -243,3 +243,11 @@ def test_noise_of_the_sensors_is_in_the_measurements_and_not_in_what_a_free_run_
     assert isinstance(p, FreeRun)
     noisy, quiet = (FreeRun(p.measured, with_noise(p.robot, n), p.evaluator) for n in (0.02, 0.0))
     assert np.array_equal(noisy.residuals([()]), quiet.residuals([()]))
+
+
+@pytest.mark.parametrize("scale", [0.9, 1.0, 1.02, 2.0])
+def test_a_share_of_the_excess_is_between_none_and_all_of_it(scale: float) -> None:
+    """Where about as much as noise is left, one part of the data may lie far below it and another as far above."""
+    compared = problem("arm", "open_loop")
+    left = scale * compared.residuals([samples()["arm"].hidden])[0]
+    assert all(0.0 <= r.share <= 1.0 for r in regimes(compared, left))
