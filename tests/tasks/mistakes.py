@@ -467,7 +467,7 @@ IMPORTS: Rows = (
     ),
     ("task=import measured=t.csv task.mapping=column.map", "did you mean q?"),
     ("task=import measured=t.csv task.mapping=time.map", "name the column, or 'time: {rate_hz: 100}'"),
-    ("task=import measured=t.csv task.mapping=key.map", "did you mean commands or records or gains?"),
+    ("task=import measured=t.csv task.mapping=key.map", "did you mean commands or commands_between or records?"),
     ("task=import measured=t.csv task.mapping=joint.map", "did you mean servo?"),
     (
         "task=import measured=t.csv task.mapping=push.map",
