@@ -318,12 +318,15 @@ class _Import:
         }
         led = {j: c.table for j, c in asked.items() if isinstance(c, Column) and j in positions}
         if self.mapping.commands_between is None and not self.goes_on and not self.as_is and len({*led.values()}) == 1:
-            told, self.goes_on = (list(self.report.done), list(self.report.suspicious)), True
-            lines = self._commands(torques)[:, [self.robot.motor_names.index(j) for j in led]]
+            before = list(self.report.done), list(self.report.suspicious)
+            self.goes_on = True
+            lines = self._commands(torques)
+            asked_of = lines[:, [self.robot.motor_names.index(j) for j in led]]
             row_s = self.clocks[next(iter(led.values()))].timing.median_s
-            late = lag(lines, np.stack([positions[j] for j in led], axis=1), self.step_s)
-            self.goes_on = late is not None and -row_s < late < AT_ONCE * row_s
-            self.report.done, self.report.suspicious = told
+            late = lag(asked_of, np.stack([positions[j] for j in led], axis=1), self.step_s)
+            if late is not None and -row_s < late < AT_ONCE * row_s:
+                return lines
+            self.goes_on, (self.report.done, self.report.suspicious) = False, before
         return self._commands(torques)
 
     def _on_one_turn(self, commands: Array) -> None:

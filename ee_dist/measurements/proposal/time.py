@@ -81,9 +81,9 @@ def time_flaw(table: Table) -> MeasurementError | None:
             values = table.numbers(address)
             if len(values) < 3:
                 continue
-            rises = np.diff(values) > 0
-            stands = (np.diff(values) >= 0).all() and rises.mean() > SELDOM
-            if stands or rises.mean() > MOSTLY:
+            steps = np.diff(values)
+            rises = float((steps > 0).mean())
+            if rises > MOSTLY or ((steps >= 0).all() and rises > SELDOM):
                 check_times(values, table, address)
         except MeasurementError as error:
             return error
