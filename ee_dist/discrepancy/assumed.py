@@ -14,7 +14,9 @@ from itertools import product
 import numpy as np
 
 from ee_dist.basics.names import counted, listed
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
+from ee_dist.discrepancy.evidence.intervals import AT_BOUND
+from ee_dist.discrepancy.evidence.rule import NEAR
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, values_of
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import as_slow
 from ee_dist.discrepancy.search.search import Search
@@ -45,6 +47,8 @@ LESS = 0.9
 LEAST, MOST = -0.7, 1.0
 """Changes of mass, as shares, that parts may have all over a robot of which gains were assumed: torques have no scale then but
 the masses, and all may grow together. With gains that are known they may go farther: a load on a light part is many times it."""
+AGAIN = 2
+"""How often more room is made for a guess that ended as far as it might go."""
 LABEL = "assumed drives"
 GUESSED = (
     "The description only guessed at what these drives do: their gains, limit, rotor and friction were found together. Write "
@@ -83,8 +87,51 @@ def assumed_drives(
         noise = float(search.problem.floor[search.everything].sum())
         other = _fitted(search, joints, (*parts, *carried))
         if other[2] - noise < LESS * (energy - noise):
-            best, u, _ = other
+            best, u, energy = other
+    best, u = _farther(search, best, u, energy)
     return Proposal(best, LABEL), u
+
+
+def _farther(
+    search: Search, parts: tuple[Candidate, ...], u: Array, energy: float
+) -> tuple[tuple[Candidate, ...], Array]:
+    """The same with more room where a guess ended as far from it as it may go: from what was found one may go as far again, as
+    somebody would who wrote that into the description. Kept where it takes much off what is left."""
+    noise = float(search.problem.floor[search.everything].sum())
+    for _ in range(AGAIN):
+        if energy <= NEAR**2 * noise or not any(
+            _ends(c, u[at]) for c, at in zip(parts, Model(parts).places, strict=True)
+        ):
+            break
+        terms = Model(parts).hypothesis(u)
+        robot = apply(search.problem.robot, terms)
+        wider = tuple(_with_room(robot, c, term.values) for c, term in zip(parts, terms, strict=True))
+        (fit,) = follow_valley(search, [(Model(wider), values_of(wider, terms))], search.everything)
+        if fit.energy - noise >= LESS * (energy - noise):
+            break
+        parts, u, energy = wider, fit.u, fit.energy
+    return parts, u
+
+
+def _ends(c: Candidate, u: Array) -> bool:
+    """Whether a factor on a guess went up as far as it may."""
+    return c.effect.main.neutral == 1.0 and bool(u[0] >= AT_BOUND * c.upper[0] > 0)
+
+
+def _with_room(robot: Robot, c: Candidate, values: Sequence[tuple[str, float]]) -> Candidate:
+    """The candidate with what is worth trying beside its values too, on a robot that has them."""
+    found = []
+    beside = c.effect.bounds(robot, c.target)
+    for p, own, (name, value) in zip(c.effect.parameters, c.bounds, values, strict=True):
+        low, high = beside[name]
+        if p.neutral == 1.0:
+            low, high = low * value, high * value
+        elif p.on_top:
+            low, high = low + value, high + value
+        else:
+            low, high = own
+        found.append((max(p.lower, min(own[0], low)), min(p.upper, max(own[1], high))))
+    return replace(c, bounds=tuple(found))
 
 
 def _fitted(

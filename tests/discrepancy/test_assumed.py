@@ -89,6 +89,23 @@ def test_gains_that_were_assumed_are_found_together_with_friction() -> None:
     assert better < 0.2 * as_it_is
 
 
+def test_a_guess_that_is_farther_off_than_one_may_go_at_first_is_found_by_going_on_from_there() -> None:
+    sample, softer = samples()["arm"], 40.0
+    hidden = tuple(term("coulomb_friction", j, torque_nm=0.05) for j in sample.robot.motor_names)
+    drives = tuple(replace(d, kp=d.kp / softer, kd=d.kd / softer) for d in sample.robot.drives)
+    robot = replace(sample.robot, drives=drives, assumed=tuple((d.joint, f) for d in drives for f in ("kp", "kd")))
+    (at_first,) = candidate(robot, "position_gain", "all_joints").bounds
+    assert at_first[1] < 0.7 * softer
+    problem = problem_by("open_loop", measure(sample, hidden), robot)
+    pool = candidates(robot, only=["position_gain", "speed_gain", "coulomb_friction"])
+    proposal, u = assumed_drives(Search(problem), pool) or pytest.fail("nothing was proposed")
+    terms = Model(proposal.parts).hypothesis(u)
+    found = {t.effect: dict(t.values) for t in terms}
+    assert found["position_gain"]["factor"] == pytest.approx(softer, rel=0.15)
+    as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
+    assert better < 0.2 * as_it_is
+
+
 def test_weight_that_controllers_carry_is_found_with_them() -> None:
     """Soft gains would sag under it: without it being carried they seem stiff, and dry friction holds the arm."""
     sample: Sample = samples()["arm"]
