@@ -1,0 +1,159 @@
+"""What drives were told, and what they gave: commands, torques, and what pushed on joints from outside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping as AnyMapping
+from typing import Any
+
+import numpy as np
+
+from ee_dist.basics.names import listed
+from ee_dist.basics.quoted import quoted
+from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.mapping import Column, Mapping
+from ee_dist.measurements.on_grid import HELD, OnGrid
+from ee_dist.measurements.report import COMMAND, TORQUE
+from ee_dist.measurements.robot_channels import command_kind, command_kinds, command_units, torque_units
+from ee_dist.measurements.signals import lag
+from ee_dist.measurements.units import TURN
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+WHY_LINES = "joints are ahead of what is held from row to row, as none can be ('commands_between: held' if they were): "
+AT_ONCE = 0.3
+"""Of a row of commands: joints that are not even so much later than a line through them are not led by what is held from one row
+to the next, which is half a row later."""
+
+
+class Led:
+    """The drives of a robot, as the mapping tells of them. ``goes_on``: whether commands go on by lines from row to row."""
+
+    def __init__(self, on: OnGrid, mapping: Mapping, robot: Robot, goes_on: bool = False) -> None:
+        self.on, self.mapping, self.robot, self.report = on, mapping, robot, on.report
+        self.goes_on = goes_on or mapping.commands_between == "lines"
+
+    def _commands(self, torques: Array | None, lines: bool) -> Array:
+        """What the drives were told, (T, M). Without any: the torques where the drives obey torques, else NaN; of joints that
+        all swing freely, nothing."""
+        units = command_units(self.robot)
+        if self.mapping.commands:
+            nothing = np.zeros(len(self.on.at_s))  # what a passive joint is told
+            return self._by_motor(self.mapping.commands, units, COMMAND, nothing, lines)
+        if not units:
+            return np.zeros((len(self.on.at_s), len(self.robot.drives)))
+        assert torques is not None
+        if command_kinds(self.robot) == {"torque"} and np.isfinite(torques).all():
+            self.report.done.append(
+                "no commands: the drives obey torques, so the measured ones are taken as what was asked"
+            )
+            return torques.copy()
+        self.report.done.append("no commands were recorded: only a balance of forces can compare this log")
+        return np.full(torques.shape, math.nan)
+
+    def commands(self, torques: Array | None, positions: AnyMapping[str, Array]) -> Array:
+        """Commands (T, M), held from one row to the next; or, where joints are ahead of them so, on lines between the rows: what
+        was logged are points on the way of a controller, as clients of industrial arms have them. ``positions`` (T,) by joint."""
+        found = None if self.goes_on else self._on_lines(torques, positions)
+        self.goes_on = self.goes_on or found is not None
+        found = self._commands(torques, self.goes_on) if found is None else found
+        if self.goes_on:
+            self.report.done = [line.replace(HELD, "") for line in self.report.done]
+            self.report.done.append(
+                f"commands: {WHY_LINES}they are taken as points between which the controller went on, by straight lines"
+                if self.mapping.commands_between is None
+                else "commands: by straight lines from one row to the next, as the mapping says"
+            )
+        return found
+
+    def _on_lines(self, torques: Array | None, positions: AnyMapping[str, Array]) -> Array | None:
+        """The commands on lines, where the joints follow these so closely that they cannot have been held."""
+        asked = {
+            d.joint: self.mapping.commands.get(d.joint) for d in self.robot.drives if command_kind(d) == "position"
+        }
+        led = {j: c.table for j, c in asked.items() if isinstance(c, Column) and j in positions}
+        if self.mapping.commands_between is not None or self.on.as_is or len({*led.values()}) != 1:
+            return None
+        before = list(self.report.done), list(self.report.suspicious)
+        lines = self._commands(torques, True)
+        asked_of = lines[:, [self.robot.motor_names.index(j) for j in led]]
+        row_s = self.on.clocks[next(iter(led.values()))].timing.median_s
+        late = lag(asked_of, np.stack([positions[j] for j in led], axis=1), self.on.step_s)
+        if late is not None and -row_s < late < AT_ONCE * row_s:
+            return lines
+        self.report.done, self.report.suspicious = before
+        return None
+
+    def on_one_turn(self, commands: Array, channels: AnyMapping[str, Array]) -> None:
+        """Brings unwrapped commands to the turn of their positions: at 178 and -178 degrees the two may begin next to one
+        another, and go on a whole turn apart."""
+        position_of = {s.target: s.name for s in self.robot.sensors if s.kind == "position"}
+        for k, drive in enumerate(self.robot.drives):
+            asked, name = self.mapping.commands.get(drive.joint), position_of.get(drive.joint, "")
+            seen = self.mapping.sensors.get(name)
+            if command_kind(drive) != "position" or self.robot.joint(drive.joint).kind != "hinge":
+                continue
+            if asked is None or not isinstance(seen, Column) or not (asked.unwrap or seen.unwrap):
+                continue
+            turns = round(float(np.median(commands[:, k] - channels[name])) / TURN)
+            if turns:
+                commands[:, k] -= turns * TURN
+                low, high = float(commands[:, k].min()), float(commands[:, k].max())
+                self.report.ranges[f"command of {drive.joint}"] = (low, high, "rad")
+                self.report.done.append(f"command of {drive.joint}: brought {-turns:+d} turns nearer to the positions")
+
+    def torques(self) -> Array | None:
+        """Torques of the drives, (T, M), NaN at those without a column; none where the mapping names no column."""
+        columns, motors = self.mapping.torques, self.robot.motor_names
+        if not columns:
+            return None
+        without = [m for m in motors if m not in columns]
+        if without:
+            self.report.done.append(
+                f"torques at {len(motors) - len(without)} of {len(motors)} joints: a balance of forces compares them there; "
+                f"those of {listed(without)} are not known"
+            )
+        unknown = np.full(len(self.on.at_s), math.nan)
+        return self._by_motor(columns, torque_units(self.robot), TORQUE, unknown)
+
+    def _by_motor(
+        self,
+        columns: Any,
+        units: dict[str, str],
+        what: str,
+        without: Array,
+        lines: bool = False,
+        step_like: bool = True,
+    ) -> Array:
+        """(T, M): the columns of the drives that have one, ``without`` (T,) at the others."""
+        return np.stack(
+            [
+                self.on.column(columns[m], units[m], f"{what} {m}", step_like, lines=lines)
+                if m in columns and m in units
+                else without
+                for m in self.robot.motor_names
+            ],
+            axis=1,
+        )
+
+    def external(self) -> Array | None:
+        """Known torques on the joints that are not the drives', (T, M); none where the mapping names no column."""
+        columns = self.mapping.external
+        if not columns:
+            return None
+        rest = np.zeros(len(self.on.at_s))
+        return self._by_motor(columns, torque_units(self.robot), "external torque on", rest, step_like=False)
+
+    def released(self, commands: Array) -> None:
+        """A drive that is switched off obeys no command: its command is NaN."""
+        if self.mapping.enabled is None:
+            return
+        on = self.on.column(self.mapping.enabled, "1", "enabled", True, quiet=True) > 0.5
+        if not on.any():
+            raise MeasurementError(
+                f"{self.mapping.source}: enabled: {quoted(self.mapping.enabled.column)} is 0 in every row: the drives never "
+                "obeyed"
+            )
+        if not on.all():
+            commands[~on] = math.nan
+            self.report.done.append(f"drives released in {int((~on).sum())} rows ({self.mapping.enabled.column})")
