@@ -15,11 +15,12 @@ from measurement_files import motion, robot_file
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import read_mapping
+from ee_dist.measurements.proposal.by_sensor import said_of_base
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints, Proposal
 from ee_dist.measurements.proposal.write import as_yaml
 from ee_dist.robots.describe import load_robot
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import SensorLog
 
 
@@ -69,3 +70,11 @@ def test_a_base_that_turns_farther_than_it_can_is_in_degrees(tmp_path: Path) -> 
 def test_a_base_that_tilts_is_not_bolted_down(tmp_path: Path, roll: np.ndarray, said: bool) -> None:
     _, _, proposal = tilting(tmp_path, "imu_roll", roll, free=False)
     assert any("imu_roll says that the base tilts" in n for n in proposal.notes) == said
+
+
+def test_what_is_said_of_the_base_is_no_position_of_a_joint() -> None:
+    roll = Sensor("roll", "roll", "body", "rad")
+    assert said_of_base("roll_rad", [roll], ["shoulder"]) and said_of_base("imu.roll", [roll], ["shoulder"])
+    assert not said_of_base("roll_rad", [], ["shoulder"]), "the robot has no such sensor"
+    assert not said_of_base("roll_rad", [roll], ["roll"]), "a joint is called so"
+    assert not said_of_base("shoulder_roll_rad", [roll], ["shoulder_roll"])

@@ -54,6 +54,14 @@ def tilt_of(address: str) -> bool:
     return any(_of_base(words, kind) and len(words) > 1 for kind in ("roll", "pitch"))
 
 
+def said_of_base(address: str, sensors: Iterable[Sensor], joints: Iterable[str]) -> bool:
+    """Whether a column is called as a sensor that says something of the base is, and as no joint."""
+    bare = tokens(split_unit(address)[0])
+    return any(s.kind in OF_BASE and _called(address, s) is not None for s in sensors) and all(
+        bare != tokens(j) for j in joints
+    )
+
+
 def _called(address: str, sensor: Sensor) -> str | None:
     """The unit that a column states ("" for none) if it is called as a sensor is; else None."""
     name, unit = split_unit(address)

@@ -6,6 +6,7 @@ from collections import Counter
 
 from ee_dist.basics.names import listed
 from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, in_full, series_of
+from ee_dist.measurements.proposal.by_sensor import said_of_base
 from ee_dist.measurements.proposal.model import UNKNOWN, Choice
 from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.units import counts
@@ -19,6 +20,8 @@ def ranked_positions(v: View) -> list[Scored]:
     for b in v.blocks:
         r = b.reading
         if (r.kind not in (POSITION, None) and not r.weak) or not v.moves(b):
+            continue
+        if all(said_of_base(c, v.robot.sensors, v.robot.motor_names) for c in b.columns):
             continue
         score = 0.0
         why: list[str] = []
