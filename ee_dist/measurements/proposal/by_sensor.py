@@ -56,10 +56,10 @@ def tilt_of(address: str) -> bool:
 
 def said_of_base(address: str, sensors: Iterable[Sensor], joints: Iterable[str]) -> bool:
     """Whether a column is called as a sensor that says something of the base is, and as no joint."""
-    bare = tokens(split_unit(address)[0])
-    return any(s.kind in OF_BASE and _called(address, s) is not None for s in sensors) and all(
-        bare != tokens(j) for j in joints
-    )
+    words = tokens(split_unit(address)[0])
+    bare = words[:-1] if words and unit_word(words[-1]) is not None else words
+    of_joint = any(tokens(j) in (words, bare) for j in joints)
+    return not of_joint and any(s.kind in OF_BASE and _called(address, s) is not None for s in sensors)
 
 
 def _called(address: str, sensor: Sensor) -> str | None:
