@@ -37,6 +37,13 @@ class MeasuredTrial:
     driver: Driver | None = None
     setup: Hypothesis = ()
     commands_held: bool | None = False
+    hardware: bool = False
+    """Whether it is known to be no simulation of ours, whatever became of its commands."""
+
+    @property
+    def real(self) -> bool:
+        """Whether it is of somebody's hardware, or was simulated elsewhere."""
+        return self.hardware or self.commands_held is not False
 
     def obeyed(self, commands: Array, robot: Robot) -> Array:
         """Commands (T, M) as the steps of a simulation take them."""

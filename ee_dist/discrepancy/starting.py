@@ -40,7 +40,7 @@ def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
     its description says if it is simulated; a real one with its joints as they were read, tilted as its sensors say, and on the
     floor."""
     log = trial.log
-    if log.joints is None or not np.abs(log.joints[0]).max() > 0 or (robot.free_base and not trial.commands_held):
+    if log.joints is None or not np.abs(log.joints[0]).max() > 0 or (robot.free_base and not trial.real):
         return None
     speeds, _ = _first_speeds(trial, speed_sensors(robot), goes_halfway(robot))
     base = base_poses(robot, log, np.zeros(1, dtype=np.intp))[0] if robot.free_base else None

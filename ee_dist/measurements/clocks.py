@@ -17,8 +17,8 @@ from ee_dist.trials.log import Array
 MOST_ROWS = 5_000_000
 """On the grid: an hour at 1 kHz."""
 SLOW_S = 1.0
-FASTEST_S, SLOWEST_S = 2e-4, 0.2
-"""Steps of a robot's log. A factor of 1000 lies between them, so the size of a step tells the unit."""
+FASTEST_S, SLOWEST_S = 2e-4, 0.45
+"""Steps of a robot's log. Nearly a factor of 1000 lies between them, so the size of most steps tells the unit."""
 QUICKEST_S = 9e-5
 """The least of one that says its unit: servo drives log at 10 kHz."""
 KEPT = 0.05

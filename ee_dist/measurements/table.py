@@ -120,6 +120,11 @@ class Table:
             raise MeasurementError(f"{self}: row {self.line(row)}, column {quoted(column)} is {said}; drop the row")
         return out
 
+    def dated(self, column: str) -> bool:
+        """Whether the column holds dates, which are read as seconds. Raises MeasurementError for a column that is not there."""
+        cells = self._cells(column)
+        return not isinstance(cells, np.ndarray) and _dates(cells) is not None
+
     def texts(self, column: str) -> list[str]:
         """The column's cells as they stand. Raises MeasurementError for a column that is not there."""
         return [str(c) for c in self._cells(column)]

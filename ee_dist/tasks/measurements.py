@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.basics.files import real
-from ee_dist.basics.names import nearest
+from ee_dist.basics.names import listed, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.lags import with_lags
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
@@ -34,7 +34,8 @@ from ee_dist.tasks.trial_choice import TrialName, divided, entries
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import LogError, SensorLog
 
-FEWEST_ROWS = 60
+FEWEST_ROWS, FEWEST_OF_MANY = 60, 30
+"""Readings of a joint that a trial must hold, and of all at once where there are several."""
 SHOWN = 4
 """Differences between two robots that are told."""
 
@@ -63,7 +64,7 @@ class Measurements:
     @property
     def real(self) -> bool:
         """Whether no trial is of a simulation of ours: the robot is somebody's hardware, or was simulated elsewhere."""
-        return all(t.commands_held is not False for t in self.trials)
+        return all(t.real for t in self.trials)
 
 
 def load(config: Config) -> Measurements:
@@ -85,14 +86,14 @@ def load(config: Config) -> Measurements:
             raise LogError(f"{file}: no hardware trial in it; expected a log of task=trial or task=import")
         held = _held(file, run)
         for t in found:
-            if len(t.log.readings) < FEWEST_ROWS:
+            if not _enough(t.log):
                 short.append((f"{file}, {t.name}", t.log))
                 continue
             # What an import says about a trial (a gain, a payload) comes on top of how it was held.
             setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
-            trials.append(
-                MeasuredTrial(t.name, checked(t.log, robot, f"{file}, {t.name}"), t.driver, setup, _commands_held(run))
-            )
+            held_so = _commands_held(run)
+            log = checked(t.log, robot, f"{file}, {t.name}")
+            trials.append(MeasuredTrial(t.name, log, t.driver, setup, held_so, held_so is None))
             names.append(TrialName(len(trials), file.stem, t.name))
             of_file.append(file)
     if not trials:
@@ -101,14 +102,15 @@ def load(config: Config) -> Measurements:
     trials, files = [trials[k] for k in kept], list(dict.fromkeys(of_file[k] for k in kept))
     held_out = tuple(names[k].name for k in apart)
     remarks = [line for run in runs for line in changed_sources(run.metadata)]
-    real = [t for t in trials if t.commands_held is not False]
+    real = [t for t in trials if t.real]
     logs = [(t.name, t.log) for t in real]
     remarks += taking(robot, logs)
     remarks += held_beyond([apply(robot, t.setup) for t in real], logs)
     remarks += disobeying(robot, logs)
     remarks += jumping(robot, [(t.name, t.log) for t in trials])
     if short:
-        more = f", and {len(short) - 1} more as short" if len(short) > 1 else ""
+        others = listed(where.partition(", ")[2] for where, _ in short[1:])
+        more = f"; as short: {others}" if others else ""
         remarks.append(f"Left out: {_too_short(*short[0])}{more}.")
     if config.model is None:
         robot = _with_room(robot, trials, remarks)
@@ -154,7 +156,7 @@ def load_held_out(config: Config) -> Measurements | None:
 
 def _with_room(robot: Robot, trials: Sequence[MeasuredTrial], remarks: list[str]) -> Robot:
     """The robot without the stops that real trials pass, which goes into the ``remarks``."""
-    robot, passed = with_room(robot, [t.log.sensors for t in trials if t.commands_held is not False])
+    robot, passed = with_room(robot, [t.log.sensors for t in trials if t.real])
     remarks += [
         f"{line}; the model's stop is moved there. Is the description's zero another one, or its stop elsewhere?"
         for line in passed
@@ -222,7 +224,7 @@ def _of_others(path: Path) -> bool:
 
 def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
     """The log with its channels in the robot's order. Raises LogError in one line for what cannot be compared."""
-    if len(log.readings) < FEWEST_ROWS:
+    if not _enough(log):
         raise LogError(_too_short(where, log))
     _names(where, "joint", log.motor_names, robot.motor_names)
     _names(where, "channel", log.sensor_names, robot.sensor_names)
@@ -257,9 +259,18 @@ def checked(log: SensorLog, robot: Robot, where: str) -> SensorLog:
     )
 
 
+def _fewest(log: SensorLog) -> int:
+    """Readings that a log must hold: fewer where each is of many joints."""
+    return max(FEWEST_OF_MANY, -(-FEWEST_ROWS // max(1, len(log.motor_names))))
+
+
+def _enough(log: SensorLog) -> bool:
+    return len(log.readings) >= _fewest(log)
+
+
 def _too_short(where: str, log: SensorLog) -> str:
     what = "rows" if log.filled is None else "readings"
-    return f"{where}: {len(log.readings)} {what}; at least {FEWEST_ROWS} are needed"
+    return f"{where}: {len(log.readings)} {what}; at least {_fewest(log)} are needed"
 
 
 def _names(where: str, what: str, have: Sequence[str], want: Sequence[str]) -> None:

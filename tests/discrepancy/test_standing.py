@@ -97,6 +97,12 @@ def test_a_simulated_one_begins_as_described() -> None:
     assert start_of(trial_of(robot, joints, (0.0, 0.0), False), robot) is None
 
 
+def test_a_real_one_stands_whichever_way_its_commands_are_read() -> None:
+    robot = quadruped_lab()
+    trial = trial_of(robot, np.full(len(robot.motor_names), 0.2), (0.0, 0.0), False)
+    assert start_of(replace(trial, hardware=True), robot) is not None
+
+
 def test_a_model_that_is_farther_off_in_plain_numbers_is_told_so() -> None:
     was = {("position", "rad"): 0.0251, ("roll", "rad"): 0.1}
     said = farther_off(was, {("position", "rad"): 0.0451, ("roll", "rad"): 0.05})

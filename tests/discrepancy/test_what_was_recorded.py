@@ -121,7 +121,7 @@ def test_a_short_trial_stops_nobody(tmp_path: Path) -> None:
     found = load(Config(measured=str(written(tmp_path, (300, 20, 300, 30)))))
     assert [t.name for t in found.trials] == ["motion 0", "motion 2"]
     (said,) = [r for r in found.remarks if r.startswith("Left out")]
-    assert "motion 1: 20 rows; at least 60 are needed, and 1 more as short" in said
+    assert "motion 1: 20 rows; at least 60 are needed; as short: motion 3" in said
     short = tmp_path / "short"
     short.mkdir()
     with pytest.raises(LogError, match=r"motion 0: 20 rows; at least 60 are needed"):

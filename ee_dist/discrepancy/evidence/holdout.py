@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.discrepancy.evidence.repeats import near, near_later
 from ee_dist.discrepancy.problem import Index, Mask, Problem
 from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -28,10 +29,11 @@ WINDOWS, MOTIONS, SETTINGS = (
 )
 ONE_BY_ONE = 4
 """Up to so many motions or settings each is held out by itself; more take turns in two groups."""
-SAME_MOTION, SAME_LENGTH = 0.02, 0.9
+SAME_MOTION = 0.02
 """Two trials are one motion where their commands differ by less than this share of how much they vary, over nearly all of it;"""
 SAME_COURSE = 0.15
-"""or their positions do by less than this: torques that a controller works out differ each time."""
+"""or their positions do by less than this: torques that a controller works out differ each time. Commands too, where one of the
+two begins later in the same motion, and rows fall elsewhere in it."""
 MOVES, TAKES_PART = 0.01, 0.2
 """Share of its range by which a joint varies that moves at all, and share of what it varies by at most in a trial in which it
 takes part."""
@@ -179,13 +181,17 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
     one, other = problem.measured[a], problem.measured[b]
     if a in problem.looped or b in problem.looped:
         return one.name == other.name
-    if _near(one.log.commands, other.log.commands, SAME_MOTION):
+    if near(one.log.commands, other.log.commands, SAME_MOTION):
+        return True
+    if near_later(one.log.commands, other.log.commands, SAME_COURSE) and near_later(
+        _course(problem, one.log), _course(problem, other.log), 2 * SAME_COURSE
+    ):
         return True
     first, second = (_course(problem, t.log) for t in (one, other))
     if not np.ptp(first, axis=0).any():
         return False
     commanded = any(np.isfinite(t.log.commands).any() for t in (one, other))
-    return _near(first, second, SAME_COURSE if commanded else SAME_MOTION)
+    return near(first, second, SAME_COURSE if commanded else SAME_MOTION)
 
 
 def _course(problem: Problem, log: SensorLog) -> Array:
@@ -193,22 +199,6 @@ def _course(problem: Problem, log: SensorLog) -> Array:
     if log.joints is not None:
         return np.asarray(log.joints)
     return np.asarray(log.sensors[:, [s.kind == "position" for s in problem.robot.sensors]])
-
-
-def _near(one: Array, other: Array, share: float) -> bool:
-    """Whether two courses (T, M) differ by less than a share of how much they vary."""
-    motions = [np.asarray(one), np.asarray(other)]
-    rows = min(map(len, motions))
-    if rows < SAME_LENGTH * max(map(len, motions)):
-        return False
-    # Where the drives were released there is no command: nearly at the same time in repeats, and not to the row.
-    first, second = motions[0][:rows], motions[1][:rows]
-    both, either = (f(np.isfinite(first), np.isfinite(second)) for f in (np.logical_and, np.logical_or))
-    if not both.any() or both.sum() < SAME_LENGTH * either.sum():
-        return False
-    gap = np.sqrt(np.mean((first - second) ** 2, where=both))
-    varies = [np.nanvar(column) for column in first.T if np.isfinite(column).any()]
-    return bool(gap <= share * np.sqrt(np.mean(varies)))
 
 
 def cross_fit(

@@ -20,6 +20,8 @@ TIMES = tuple(u for u, (kind, _) in UNITS.items() if kind == "time" and u in ("s
 
 WHOSE: dict[bool | None, int] = {False: 0, None: 1, True: 2}
 """The order in which times are taken: called measured, called neither, called desired."""
+SHORT_S, LONG_S = 1.0, 1200.0
+"""What a record lasts: where the size of its steps tells two units, the one in which it does."""
 MOSTLY, SELDOM = 0.8, 0.1
 """Share of its steps in which a time must rise to be one that has a flaw; and, where it never falls, to be a coarse one."""
 
@@ -91,12 +93,12 @@ def time_flaw(table: Table) -> MeasurementError | None:
 
 
 def _chosen(table: Table, candidates: list[str], rising: dict[str, Array], named: bool) -> TimeChoice:
-    column = candidates[0]
-    seconds = rising[column]
-    step = float(np.median(np.diff(seconds)))
+    # Of clocks that tick alike the one that says its unit.
+    alike = [a for a in candidates if _same(rising[a], rising[candidates[0]])]
+    column = next((a for a in alike if _stated(table, a)), candidates[0])
+    seconds, stated = rising[column], _stated(table, column)
+    step, length = float(np.median(np.diff(seconds))), float(seconds[-1] - seconds[0])
     fits = [u for u in TIMES if FASTEST_S <= step * UNITS[u][1] <= SLOWEST_S]
-    stated = (unit_word(table.units[column]) if column in table.units else None) or _reading(column).unit
-    stated = stated if stated in TIMES else None
     what = "is called a time and rises" if named else "is the only one that always rises"
     if stated and not QUICKEST_S <= step * UNITS[stated][1] <= SLOWEST_S:
         better = f", in {fits[0]} {step * UNITS[fits[0]][1]:.4g} s" if fits else ""
@@ -106,15 +108,35 @@ def _chosen(table: Table, candidates: list[str], rising: dict[str, Array], named
         return TimeChoice(
             column, "s", seconds, UNKNOWN, f"{column!r} rises by {step:.4g} a row, which fits no unit of time"
         )
-    others = [a for a in candidates[1:] if not _same(rising[a], seconds)]
-    unit = stated or fits[0]
+    others = [a for a in candidates if not _same(rising[a], seconds)]
+    unit, either = stated or fits[0], ""
+    if not stated and len(fits) > 1:
+        lasting = [u for u in fits if SHORT_S <= length * UNITS[u][1] <= LONG_S]
+        rates = " or ".join(
+            f"{1 / (step * UNITS[u][1]):.4g} Hz ({length * UNITS[u][1]:.3g} s in all) in {u}" for u in fits
+        )
+        either = f"{what}; its steps are {rates}"
+        if len(lasting) != 1:
+            return TimeChoice(column, unit, seconds * UNITS[unit][1], UNKNOWN, either)
+        unit = lasting[0]
     if others and not named:
         return TimeChoice(column, unit, seconds * UNITS[unit][1], UNKNOWN,
                           f"several columns always rise: {', '.join(candidates[:4])}")  # fmt: skip
-    why = f"{what}; {'it says' if stated else 'steps are those of'} {unit}: {1 / (step * UNITS[unit][1]):.4g} Hz"
+    says = "dates" if table.dated(column) else f"it says {unit}" if stated else f"steps are those of {unit}"
+    why = f"{either}: taken as {unit}" if either else f"{what}; {says}: {1 / (step * UNITS[unit][1]):.4g} Hz"
     if others:
         why += f"; {others[0]!r} is another clock, not used"
-    return TimeChoice(column, unit, seconds * UNITS[unit][1], SURE if stated or (named and not others) else LIKELY, why)
+    return TimeChoice(
+        column, unit, seconds * UNITS[unit][1], SURE if stated or (named and not others and not either) else LIKELY, why
+    )
+
+
+def _stated(table: Table, column: str) -> str | None:
+    """The unit that a column of time says it is in; dates are read as seconds."""
+    if table.dated(column):
+        return "s"
+    stated = (unit_word(table.units[column]) if column in table.units else None) or _reading(column).unit
+    return stated if stated in TIMES else None
 
 
 def _reading(address: str) -> Reading:
