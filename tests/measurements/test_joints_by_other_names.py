@@ -13,6 +13,7 @@ from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints
+from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot
@@ -81,3 +82,29 @@ def test_the_time_of_a_plan_is_not_that_of_the_readings(tmp_path: Path, names: t
     proposal = proposal_for([tmp_path / "run.csv"], robot, Hints())
     assert not proposal.questions, proposal.questions
     assert {c: columns for c, columns, *_ in rows(proposal)}["time"] == names[1]
+
+
+def test_names_of_several_words_and_columns_beside_those_of_the_joints(tmp_path: Path) -> None:
+    path, m = samples.robot_file(tmp_path), samples.motion()
+    robot, _ = load_robot(path)
+    frame = pd.DataFrame({"meas_time": m["t"]})
+    for what, values in (("pos", m["q"]), ("cmd_pos", m["g"])):
+        tool = values.sum(axis=1)[:, None]
+        for name, column in zip(("fl_th", "fr_ca", "rl_tip"), np.hstack([values, tool]).T, strict=True):
+            frame = frame.assign(**{f"{what}_{name}": column})
+    frame.to_csv(tmp_path / "run.csv", index=False)
+    (question,) = proposal_for([tmp_path / "run.csv"], robot, Hints()).questions
+    assert question.startswith(
+        "positions: the columns call the joints fl_th, fr_ca, rl_tip; which are these of shoulder, elbow?"
+    )
+    assert "'-' for what is none of them" in question
+    found = proposal_for([tmp_path / "run.csv"], robot, Hints(["shoulder", "elbow", "-"]))
+    assert not found.questions
+    columns = {(c.group, c.name): c.column for c in found.choices}
+    assert columns["sensors", "position_elbow"] == "pos_fr_ca" and columns["commands", "shoulder"] == "cmd_pos_fl_th"
+
+
+def test_of_names_that_say_what_an_angle_is_called_the_quantity_stands_beside() -> None:
+    names, columns = other_names(["tail_meas_pos", "phi_meas_pos", "tail_meas_vel", "phi_meas_vel", "k1", "k2"], 2)
+    assert names == ("tail", "phi") and columns[0] == ["tail_meas_pos", "phi_meas_pos"]
+    assert other_names(["theta", "phi"], 2) == ((), []), "two angles that are called nothing else"

@@ -304,5 +304,6 @@ def _by_other_names(
     for columns in quantities:
         placed = dict(zip(order, columns, strict=True))
         chosen = tuple(placed[j] for j in joints)
-        found.append(_made(table, chosen, [read_name(chosen[0], frozenset(names))], BY_PLACE, series))
+        own = frozenset(w for name in names for w in tokens(name))
+        found.append(_made(table, chosen, [read_name(chosen[0], own)], BY_PLACE, series))
     return [b for b in found if b.reading.kind != TIME]

@@ -23,6 +23,14 @@ from ee_dist.trials.log import Array
 
 CLOSE = 0.9
 """Correlation below which commands are likely at best, whatever they are called."""
+AGAINST = (
+    "the positions of {joints} run against these, and yet lie where they ask and not where their negatives would: they are late "
+    "or early (half a period of a motion that repeats), or other joints' columns"
+)
+UNLESS = "put that right, or write unit and sign into the mapping if they are what was asked for"
+MEND = "write the unit into the mapping, or take these commands out of it"
+LAST = frozenset(["clipped", "saturated", "limited", "clamped"])
+"""What became of a command on its way: of several that is what the drive obeyed."""
 
 
 def add_commands(v: View) -> None:
@@ -64,7 +72,7 @@ def add_commands(v: View) -> None:
         units = _position_command_units(v, chosen.block) if kind == "position" else speed_units(v, chosen.block)
     if units.sure == UNKNOWN:
         v.out.ask(
-            f"commands ({chosen.block.name}): {units.why}; write the unit into the mapping, or take these commands out of it"
+            f"commands ({chosen.block.name}): {units.why}; {UNLESS if units.why.startswith('the positions of') else MEND}"
         )
     certain = chosen.block.reading.command and (kind == "torque" or _goes_with_the_motion(v, chosen.block, kind))
     level = SURE if certain else LIKELY
@@ -163,6 +171,8 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
     ahead = v.lead(b, v.position.block)
     entries, why, sure = [], "in the unit of the positions", v.units.sure
     turned: list[str] = []
+    against: list[str] = []
+    unshown: list[int] = []
     short: dict[str, float] = {}
     still = [] if values is None else _standing_still(v, values)
     shift = round(ahead.lead_s / v.step(v.position.block))
@@ -189,16 +199,26 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
                     entry, why = {"unit": seen}, f"{seen} by its ratio to the positions"
                 if r.correlation < 0:
                     entry["sign"] = -1
-                    turned.append(v.joints[k].name)
+                    size = UNITS[str(entry["unit"])][1] / UNITS[unit][1]
+                    same = "scale" not in base and _lie_where_asked(size * x[:, 0], y[:, 0])
+                    (against if same else turned).append(v.joints[k].name)
+            elif stated:
+                entry = {"unit": stated}
+            else:
+                unshown.append(k)
         elif stated:
             entry = {"unit": stated}
+        elif k not in still:
+            unshown.append(k)
         entries.append(entry)
+    if against:
+        return UnitChoice((), UNKNOWN, AGAINST.format(joints=listed(against)))
+    _as_the_others(v, entries, [*(k for k in still if not (b.units and b.units[k])), *unshown])
     if short:
         where = "" if len(short) == len(v.units.entries) else f" at {listed(short)}"
         share = " to ".join(dict.fromkeys(f"{s:.2g}" for s in (min(short.values()), max(short.values()))))
         why += f", which go {share} of the way{where}"
     if still:
-        _as_the_others(v, entries, [k for k in still if not (b.units and b.units[k])])
         why += f"; {', '.join(v.joints[k].name for k in still)} does not follow, and shows no unit"
     if turned:
         why += f"; sign of {', '.join(turned)} turned: the positions run against the commands"
@@ -206,6 +226,13 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
         # One encoder may be mounted the other way round, or one command be wrong: a person should look.
         sure = LIKELY
     return UnitChoice(tuple(entries), sure, why)
+
+
+def _lie_where_asked(asked: Array, seen: Array) -> bool:
+    """Whether positions (T,) that run against commands lie where these ask, and nowhere near where their negatives would: then no
+    sign is wrong."""
+    here, there = (abs(float(np.mean(sign * asked) - np.mean(seen))) for sign in (1.0, -1.0))
+    return there > max(2.0 * here, float(np.ptp(seen)))
 
 
 def _as_the_others(v: View, entries: list[dict[str, Any]], still: list[int]) -> None:
@@ -248,8 +275,10 @@ def _as_torque_command(v: View, b: Block) -> Scored | None:
     r = b.reading
     if r.kind not in (TORQUE, CURRENT) or r.command is False or r.weak:
         return None
-    if r.command is None:
+    if r.command is None and not any(LAST & {*tokens(c)} for c in b.columns):
         # Of a force that is called neither, and is the only one, nobody says that it was measured; see the torques.
         only = r.kind == TORQUE and not r.second and v.moves(b) and not v.has("torques")
         return Scored(b, 3.0, ["the only force (torque) there is: taken as what was asked for"]) if only else None
-    return Scored(b, 4.0 - 2 * r.second + (r.kind == TORQUE), ["called a commanded torque"])
+    last = any(LAST & {*tokens(c)} for c in b.columns)
+    why = ["called a commanded torque", *["called what came of it in the end"] * last]
+    return Scored(b, 4.0 - 2 * r.second + (r.kind == TORQUE) + 1.5 * last, why)

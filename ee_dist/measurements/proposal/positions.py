@@ -13,6 +13,9 @@ from ee_dist.measurements.proposal.units import counts
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
 from ee_dist.measurements.proposal.words import POSITION, SPEED, TIME, read_name, tokens
 
+MORE = 2
+"""Columns of a quantity beside those of the joints that may be called as these are."""
+
 
 def ranked_positions(v: View) -> list[Scored]:
     """Blocks that could be the positions, the best first."""
@@ -97,9 +100,10 @@ def ask_for_positions(v: View) -> None:
                 f"{{{', '.join(f'{m}: 0.0' for m in rest)}}}'; one that moved unrecorded leaves the motion of the others unknown"
             )
     elif v.hints.joints is None and n > 1 and (called := _other_joints(v)):
+        none = ", and '-' for what is none of them" if len(called) > n else ""
         v.out.ask(
             f"positions: the columns call the joints {', '.join(called)}; which are these of {names}? say task.joints=[...] with "
-            "the robot's names in that order"
+            f"the robot's names in that order{none}"
         )
     elif v.hints.joints is None and n > 1:
         fewer = _fewer(v)
@@ -145,13 +149,15 @@ def _recorded(v: View, kind: str = POSITION) -> list[str]:
 
 
 def _other_joints(v: View) -> tuple[str, ...]:
-    """What the columns of a table call the joints, where the robot calls them otherwise and there are as many of one quantity."""
-    for table in v.timed.tables:
-        names, columns = other_names(
-            [a for a in series_of(table, filled=True) if a != v.times[table.name].column], len(v.joints)
-        )
-        if names and any(read_name(c[0], frozenset(names)).kind == POSITION for c in columns):
-            return names
+    """What the columns of a table call the joints, where the robot calls them otherwise and there are as many of one quantity, or
+    some more: a tool's place beside those of the joints."""
+    for more in range(MORE + 1):
+        for table in v.timed.tables:
+            there = [a for a in series_of(table, filled=True) if a != v.times[table.name].column]
+            names, columns = other_names(there, len(v.joints) + more)
+            own = frozenset(w for name in names for w in tokens(name))
+            if names and any(read_name(c[0], own).kind == POSITION for c in columns):
+                return names
     return ()
 
 
