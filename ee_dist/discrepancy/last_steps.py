@@ -46,14 +46,7 @@ def last_steps(
             plainer.added = terms[len(terms) - len(plain.came) :]
             climb(plainer)
         if spread or len(current.parts) - own > 1:
-            # Of two that leave the same mark the values may be anything, and one of them says it all.
-            told = told_only(search.doing(NOT_TOLD), current, own, strictest(problem), len(pool), not spread)
-            current, none = without_neutral(told.then, own)
-            asked = told.instead
-            if told.gone or none:
-                climb(
-                    refitted(search, current, "without what these data do not tell from neutral", (*told.gone, *none))
-                )
+            current, asked = _told(search, current, own, len(pool), climb, spread)
         if len(current.parts) <= own + 1:
             return current, []
         before = {c.name for c in current.parts}
@@ -71,10 +64,27 @@ def last_steps(
                     some = looked_for_at_once(problem, pool)
                     found = everywhere(search.doing(AT_ONCE), current, own, some, held_out_by(problem), True, (), seen)
         if found is None:
+            if step is not None and (spread or len(current.parts) - own > 1):
+                # Beside what came in the place of another, others may tell nothing any more.
+                current, _ = _told(search, current, own, len(pool), climb, spread)
+                stayed = {c.name for c in current.parts}
+                twins = [t for t in twins if t.name in stayed]
             return current, twins
         often, current = often - 1, found.current
         for rung in found.rungs:
             climb(rung)
+
+
+def _told(
+    search: Search, current: Current, own: int, tried: int, climb: Callable[[Rung], None], spread: bool
+) -> tuple[Current, frozenset[str]]:
+    """The model without what is not told, and what of it another said. Of two that leave the same mark the values may be
+    anything, and one of them says it all."""
+    told = told_only(search.doing(NOT_TOLD), current, own, strictest(search.problem), tried, not spread)
+    current, none = without_neutral(told.then, own)
+    if told.gone or none:
+        climb(refitted(search, current, "without what these data do not tell from neutral", (*told.gone, *none)))
+    return current, told.instead
 
 
 def _beside_a_twin(

@@ -263,9 +263,9 @@ def deadband(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, wider)
 
 
-LIGHTER, LIGHTER_AT_LEAST = 0.9, 0.25
+LIGHTER, LIGHTER_AT_LEAST, LIGHTER_GUESS = 0.9, 0.25, 0.98
 """Shares of the described rotor's inertia that may not be there: files often carry what keeps a simulation steady. More than
-the smaller share only where the joint stays slow enough for its controller."""
+the smaller share only where the joint stays slow enough for its controller; most of all of one that was guessed at."""
 
 
 GEARED = 10.0
@@ -279,7 +279,8 @@ is 6 to 40 times what else the joint feels."""
 def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     drive, felt, dt = scales.drive_of(robot, target), scales.inertia(robot, target), robot.time_step_s
     rotor = drive.rotor_inertia
-    less = max(LIGHTER_AT_LEAST * rotor, min(LIGHTER * rotor, scales.spare_inertia(robot, target)))
+    most = LIGHTER_GUESS if (target, "rotor_inertia") in robot.assumed else LIGHTER
+    less = max(LIGHTER_AT_LEAST * rotor, min(most * rotor, scales.spare_inertia(robot, target)))
     times = WEIGHED if dt < INSTANT_S else GEARED if drive.command == "torque" else 1.0
     more = times * felt
     return {"added_kg_m2": (0.0 - less, max(4.0 * rotor, more))}

@@ -24,6 +24,8 @@ class Body:
     drives: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
     driven: tuple[str, ...] = ()
     unlimited: tuple[str, ...] = ()
+    transmissions: tuple[str, ...] = ()
+    """Joints that the file names in what stands between a motor and a joint."""
     sensors: tuple[Sensor, ...] = ()
     root_without_mass: bool = False
     """Its root was given a mass that it does not state, which counts where the base is free."""

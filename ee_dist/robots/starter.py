@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,7 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
     assumed += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if names[3:] else ''}: {mark}"
                 for mark, names in by_mark.items()]  # fmt: skip
     assumed += told(blank, body, swinging)
+    assumed += _without_transmission(body, [n for n, (entry, _) in drives.items() if entry.get("command") != "none"])
     if body.sensors:
         lines.append(f"# sensors: the file's own {len(body.sensors)}; a list here takes their place")
     else:
@@ -109,6 +110,18 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         tuple(assumed),
         _missing(robot) + _trusted(robot),
     )
+
+
+def _without_transmission(body: Body, driven: Sequence[str]) -> list[str]:
+    """A line on the joints that no transmission drives, in a file in which others have one: motors are listed so."""
+    known = [name for name in driven if name in body.transmissions]
+    others = [name for name in driven if name not in known]
+    if not known or not others:
+        return []
+    return [
+        f"{listed(others)}: driven as the others, though the file has transmissions of {listed(known)} alone; 'command: none' "
+        "where nothing drives a joint"
+    ]
 
 
 def _inertia(body: Body) -> Mapping[str, float]:

@@ -141,6 +141,7 @@ class _Reader:
             joints=tuple(kept_joints),
             drives={name: self.known(elements[name], f"joint {quoted(name)}") for name in moving},
             unlimited=tuple(name for name in moving if self.unlimited(elements[name], f"joint {quoted(name)}")),
+            transmissions=tuple(j.get("name", "") for t in self.root.iter("transmission") for j in t.iter("joint")),
             root_without_mass=root_given,
             bolted_only=tuple(self.moments.idle),
             free_base=True if floats is not None else None,

@@ -92,7 +92,14 @@ def test_small_values_are_fitted_anew_beside_what_came_in_the_place_of_one(monke
     def nearest(_: Search, now: Current, *more: object) -> tuple[Current, list[object], Rung | None]:
         return (now, [], None) if came in now.parts else (then, [], rung("supply sag"))
 
-    monkeypatch.setattr(ending, "told_only", lambda *given: Told(given[1]))
+    looked: list[Current] = []
+
+    def told_only(_: Search, now: Current, *more: object) -> Told:
+        looked.append(now)
+        return Told(now)
+
+    monkeypatch.setattr(ending, "told_only", told_only)
+    monkeypatch.setattr(ending, "without_neutral", lambda now, own: (now, ()))
     monkeypatch.setattr(ending, "nearest", nearest)
     monkeypatch.setattr(ending, "everywhere", everywhere)
     climbed: list[Rung] = []
@@ -104,7 +111,9 @@ def test_small_values_are_fitted_anew_beside_what_came_in_the_place_of_one(monke
 
     assert settled(True, 1).parts == (came,) and [r.name for r in climbed][-2:] == ["supply sag", "all anew"]
     assert asked == [tuple(c.name for c in then.parts)]
+    looked.clear()
     assert settled(True, 0).parts == then.parts, "as often as is allowed"
+    assert [now.parts for now in looked] == [current.parts, then.parts], "beside what came others may tell nothing"
     assert settled(False, 1).parts == then.parts, (
         "where nothing is a little wrong everywhere there is nothing to fit anew"
     )

@@ -72,7 +72,7 @@ WRONG = [
     (replace(log(), sensor_names=_renamed(ROBOT.sensor_names, "roll", "rol")), "no channel 'roll'; is it rol?"),
     (replace(log(), motor_names=_renamed(ROBOT.motor_names, "hip_front_left", "hip_fl")), "no joint 'hip_front_left'"),
     (replace(log(), sensor_units=UNITS), "roll is in 'deg', the model has it in 'rad'"),
-    (log(10), "10 rows; at least 60"),
+    (log(10), "10 rows; at least 30"),
     (replace(log(), times_s=np.arange(100) * 0.02), "resample"),
 ]
 

@@ -12,9 +12,9 @@ from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
-from ee_dist.discrepancy.accounts.ranges import beyond_a_guess
+from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, weight_text
 from ee_dist.discrepancy.assumed import LABEL
-from ee_dist.discrepancy.evidence.intervals import BOUND, NEUTRAL, ParameterReport
+from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
 from ee_dist.discrepancy.improve import BETTER, EXPLAINED
@@ -382,6 +382,22 @@ def test_of_drives_that_were_assumed_only_what_the_data_tell_is_named(flag: str,
     assert head.startswith("Not what was assumed: coulomb friction") and said in head
     assert not any("commanded to move" in line for line in of(moving).lines)
     assert any("Only 0 joints of 1 are commanded to move here" in line for line in of(still).lines)
+
+
+def test_all_that_moves_being_much_heavier_than_described_is_told() -> None:
+    robot = servo_pendulum()
+    part = robot.parts[1]
+    (line,) = weight_text(robot, (term("part_mass", part.name, change=1.0),))
+    moving = sum(p.mass_kg for p in robot.parts[1:])
+    assert f"weighs {moving + part.mass_kg:.3g} kg in this model, and {moving:.3g} kg" in line
+    assert not weight_text(robot, (term("part_mass", part.name, change=0.1),))
+
+
+@pytest.mark.parametrize(("flag", "said"), [(NEUTRAL, True), (HARDLY, True), ("", False)])
+def test_an_effect_of_which_no_value_is_told_is_named_with_that(flag: str, said: bool) -> None:
+    told_of = (ParameterReport(0, "torque_nm", 0.3, 0.0, 1.0, flag),)
+    head = account([], parameters=told_of).headline
+    assert ("(of which these data tell no value)" in head) == said and "coulomb friction" in head
 
 
 def test_a_factor_on_a_guess_that_ended_at_its_bound_says_how_to_go_on() -> None:

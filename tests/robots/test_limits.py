@@ -15,7 +15,7 @@ JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child li
 <axis xyz="0 1 0"/><limit lower="-2" upper="2" {effort} velocity="3"/></joint>"""
 
 
-def begun(folder: Path, first: str, second: str, mass: float = 0.3, kind: str = "revolute") -> Starter:
+def begun(folder: Path, first: str, second: str, mass: float = 0.3, kind: str = "revolute", more: str = "") -> Starter:
     """The description to begin with of two links on a base, whose joints have these limits."""
     parts = [
         '<link name="base"/>',
@@ -25,7 +25,7 @@ def begun(folder: Path, first: str, second: str, mass: float = 0.3, kind: str = 
         LINK.format(name="lower", com=0.1, mass=mass),
     ]
     file = folder / "arm.urdf"
-    file.write_text(f'<robot name="arm">{"".join(parts)}</robot>')
+    file.write_text(f'<robot name="arm">{"".join(parts)}{more}</robot>')
     return starter(read_urdf(file), "urdf", "arm.urdf", "arm.urdf")
 
 
@@ -117,3 +117,11 @@ def test_a_joint_that_turns_without_end_and_states_no_effort_is_taken_to_swing_f
     # Where no joint states one, or this one does, there is nothing to tell it by.
     for first, second in (("", ""), ('effort="3"', 'effort="3"')):
         assert [d.command for d in pendulum(first, second).robot.drives] == ["position", "position"]
+
+
+@pytest.mark.parametrize(("named", "said"), [(("b",), ["a"]), (("a", "b"), []), ((), []), (("other",), [])])
+def test_joints_that_no_transmission_drives_are_told(tmp_path: Path, named: tuple[str, ...], said: list[str]) -> None:
+    more = "".join(f'<transmission name="t"><joint name="{n}"/><actuator name="m"/></transmission>' for n in named)
+    found = begun(tmp_path, 'effort="3"', 'effort="3"', more=more)
+    assert [line.split(":")[0] for line in found.assumed if "transmissions of" in line] == said
+    assert {d.command for d in found.robot.drives} == {"position"}

@@ -173,9 +173,11 @@ def explain_account(
 
 def _what(found: Explanation, best: Judged, robot: Robot) -> str:
     """The terms of the best explanation; of drives that were only assumed, those of whose values these data tell something."""
-    if best.proposal.label != LABEL:
-        return told_all(best.terms, robot)
     flags = {found.after[p.term]: p.flag for p in found.parameters}
+    if best.proposal.label != LABEL:
+        own = [p.flag for p in found.parameters if found.after[p.term] in best.terms]
+        none = own and all(any(f in flag for f in (NEUTRAL, HARDLY, NOT_DETERMINED)) for flag in own)
+        return told_all(best.terms, robot) + " (of which these data tell no value)" * bool(none)
     vague = [t for t in best.terms if any(f in flags.get(t, "") for f in (NEUTRAL, HARDLY, NOT_DETERMINED))]
     told = tuple(t for t in best.terms if t not in vague)
     if not vague:

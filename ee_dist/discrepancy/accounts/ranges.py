@@ -9,9 +9,11 @@ import numpy as np
 
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, BOUND, EITHER, HARDLY, WIDER, ParameterReport, called
 from ee_dist.discrepancy.words import placed, plain, quantity, span
-from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term, apply
 from ee_dist.robots.model import Robot
 
+WEIGHS = 1.3
+"""Times heavier (lighter) than described from which all that moves is told to be so."""
 LISTED = 3
 """Places that a line lists; of more the table of values tells."""
 
@@ -68,6 +70,18 @@ def beyond_a_guess(robot: Robot, terms: Hypothesis, parameters: Sequence[Paramet
         f"description assumes by {p.value:.3g}, and begin anew from there."
         for p in parameters
         if p.flag.startswith(BOUND) and p.name == "factor" and _guessed(robot, terms[p.term])
+    ]
+
+
+def weight_text(robot: Robot, terms: Hypothesis) -> list[str]:
+    """A line where a model has all that moves much lighter or heavier than it is described: a scale would tell."""
+    first = 0 if robot.free_base else 1
+    was, now = (sum(p.mass_kg for p in r.parts[first:]) for r in (robot, apply(robot, terms)))
+    if not was > 0 or 1 / WEIGHS < now / was < WEIGHS:
+        return []
+    return [
+        f"All that moves weighs {now:.3g} kg in this model, and {was:.3g} kg as it is described: a scale would tell, and of what "
+        "only moves together the data may tell no more than sums and ratios."
     ]
 
 

@@ -13,6 +13,9 @@ OVERLAP, INSIDE = 0.5, 0.7
 """Share of the shorter of two that must lie within the other, wherever it begins, and how much of its variation there: that two
 robots rest alike says nothing."""
 
+CROSSINGS = 4
+"""How often what most of them does must pass its middle: of two ramps some part is always alike."""
+
 
 def near(one: Array, other: Array, share: float) -> bool:
     """Whether two courses (T, M) differ by less than a share of how much they vary, row by row."""
@@ -49,5 +52,12 @@ def near_later(one: Array, other: Array, share: float) -> bool:
         inside = short[first[k] : last[k]].var(axis=0).sum()
         whole = min(short.var(axis=0).sum(), long.var(axis=0).sum())
         if inside >= INSIDE * whole > 0 and gap[k] <= share**2 * inside:
-            return True
+            return _crossings(short[first[k] : last[k]]) >= CROSSINGS
     return False
+
+
+def _crossings(course: Array) -> int:
+    """How often the liveliest of a course (T, M) passes its middle, but for what trembles about it."""
+    most = course[:, np.argmax(course.var(axis=0))]
+    away = np.sign(most - most.mean())[np.abs(most - most.mean()) > 0.3 * most.std()]
+    return int(np.count_nonzero(np.diff(away)))

@@ -50,6 +50,10 @@ def _check_order(v: View, block: Block) -> None:
         )
 
 
+MANY = 6
+"""Joints that do not all push one way only."""
+
+
 def add_torques(v: View) -> None:
     """The torque sensors and the torques of the drives, where a block is the one or the other."""
     sensed = [net or motor for net, motor in zip(v.sensor_names("torque"), v.sensor_names(MOTOR_TORQUE), strict=True)]
@@ -125,8 +129,11 @@ def _beside_text(v: View, block: Block) -> str:
 def _unsigned(v: View, block: Block) -> bool:
     """Whether no column of a block ever changes its sign, while what the motion needs of some of these joints does."""
     values = v.on(v.position.block, block)
-    if values is None or v.needed is None or ((values < 0).any() and (values > 0).any()):
+    if values is None or ((values < 0).any() and (values > 0).any()):
         return False
+    if v.needed is None:
+        # What stands on a floor needs nobody knows what, but not one sign at all of many joints that move to and fro.
+        return int(sum(signals.moves(c) for c in values.T)) >= MANY and float(np.abs(values).min()) == 0.0
     needed = v.needed[0]
     strong = np.abs(needed) > BOTH_WAYS * np.abs(needed).max(axis=0)
     moved = [k for k in range(len(v.joints)) if signals.moves(values[:, k])]
