@@ -190,9 +190,13 @@ class Problem(ABC):
         return []
 
     def farther_off(self, before: Hypothesis, after: Hypothesis) -> str:
-        """Where the model ``after`` is farther off than the one ``before`` in plain numbers, though the error fell, for
-        people; empty: nowhere, or the error itself is such a number."""
+        """Where the model ``after`` is farther off than the one ``before`` in plain numbers, or hardly nearer in any, though the
+        error fell, for people; empty: nowhere, or the error itself is such a number."""
         return ""
+
+    def spoiled(self, model: Hypothesis) -> list[str]:
+        """What makes a comparison with this model worth little, in lines for people that every verb says."""
+        return []
 
     @property
     def notes(self) -> list[str]:

@@ -15,6 +15,7 @@ from ee_dist.discrepancy.measured_trial import reading_s
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.search import Progress, quiet
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load, with_known_noise
@@ -80,9 +81,11 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             ahead = next(iter(next_trials(robot, tied, evaluator_of(config), every_s=every_s)), None)
     share = confidence(problem.way, found)
     also = problem.other_errors(found.before, found.after) if found.best else ()
-    also = (*also, *way.instead(bool(found.left)))
+    also = (*also, *problem.spoiled(found.after), *way.instead(bool(found.left)))
+    named = found.best if found.verdict == EFFECT else None
+    farther = "" if named is None or _of_readings(named.terms) else problem.farther_off(found.before, found.after)
     account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also)
-    account = account.warned(measured.remarks)
+    account = account.warned((*measured.remarks, *([f"{farther}."] if farther else [])))
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))
@@ -101,3 +104,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)
     show_account(console, account, out, following)
     return problem, found, account
+
+
+def _of_readings(terms: Hypothesis) -> bool:
+    """Whether all of them are in the sensors alone, which move nothing: noise that a channel has makes no prediction nearer."""
+    return all(CATALOGUE[t.effect].family == "sensing" for t in terms)

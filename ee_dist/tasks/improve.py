@@ -100,7 +100,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
                 problem, pool, measured.model, wanted, most=options.most, progress=progress, climbed=climbed
             )
     also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
-    also = (*also, *way.instead(bool(found.left)))
+    also = (*also, *problem.spoiled(found.terms), *way.instead(bool(found.left)))
     word = None if apart is None else told_of(apart, way, config, found.terms, problem.channels)
     farther = problem.farther_off(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ""
     warnings = (*measured.remarks, *([f"{farther}."] if farther else []))

@@ -99,7 +99,7 @@ def test_small_values_are_fitted_anew_beside_what_came_in_the_place_of_one(monke
         return Told(now)
 
     monkeypatch.setattr(ending, "told_only", told_only)
-    monkeypatch.setattr(ending, "without_neutral", lambda now, own: (now, ()))
+    monkeypatch.setattr(ending, "without_neutral", lambda now, *_: (now, ()))
     monkeypatch.setattr(ending, "nearest", nearest)
     monkeypatch.setattr(ending, "everywhere", everywhere)
     climbed: list[Rung] = []

@@ -108,6 +108,8 @@ def test_a_model_that_is_farther_off_in_plain_numbers_is_told_so() -> None:
     said = farther_off(was, {("position", "rad"): 0.0451, ("roll", "rad"): 0.05})
     assert "position 25.1 mrad -> 45.1 mrad" in said and "roll" not in said
     assert not farther_off(was, {("position", "rad"): 0.0255, ("roll", "rad"): 0.05})
+    said = farther_off(was, {("position", "rad"): 0.0250, ("roll", "rad"): 0.0999})
+    assert said.startswith("Hardly nearer than before") and "position 25.1 mrad -> 25 mrad; roll" in said
 
 
 def test_a_base_without_a_floor_stays_as_high() -> None:

@@ -10,8 +10,8 @@ from ee_dist.discrepancy.problem import Series
 from ee_dist.robots.model import Sensor
 from ee_dist.trials.log import Array
 
-FARTHER = 1.05
-"""Times a root mean square from which a model is called farther off."""
+FARTHER, NEARER = 1.05, 0.98
+"""Times a root mean square from which a model is called farther off, and below which it is nearer by what counts."""
 
 InUnits = Mapping[tuple[str, str], float]
 """Root mean squares by kind of sensor and unit."""
@@ -33,14 +33,16 @@ def told_in_units(each: Sequence[InUnits]) -> list[str]:
 
 
 def farther_off(was: InUnits, now: InUnits) -> str:
-    """A warning for people where a second model, better by its error, is farther off in any of these; empty: nowhere."""
-    worse = [_told(of, [was[of], now[of]]) for of in was if now[of] > FARTHER * was[of]]
-    if not worse:
+    """A warning for people where a second model, better by its error, is farther off in any of these, or hardly nearer in all;
+    empty: neither."""
+    worse = [of for of in was if now[of] > FARTHER * was[of]]
+    if not worse and any(now[of] < NEARER * was[of] for of in was):
         return ""
+    told = "; ".join(_told(of, [was[of], now[of]]) for of in worse or was)
     return (
-        f"Farther off than before in plain numbers, though the error fell: {'; '.join(worse)}. The error counts in standard "
-        "deviations of what equally good models do, and next to nothing where these part: look at the curves before you "
-        "believe the model"
+        f"{'Farther off' if worse else 'Hardly nearer'} than before in plain numbers, though the error fell: {told}. The error "
+        "counts in standard deviations of what equally good models do, and next to nothing where these part: look at the curves "
+        "before you believe the model"
     )
 
 

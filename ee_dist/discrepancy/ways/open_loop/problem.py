@@ -402,8 +402,10 @@ class OpenLoop(Problem):
         return out
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
-        moved = self.simulated(hypothesis) if self.robot.free_base else []
-        return [*self.other_errors(hypothesis), *(fallen(self.robot, self.measured, moved) if moved else [])]
+        return [*self.other_errors(hypothesis), *self.spoiled(hypothesis)]
+
+    def spoiled(self, model: Hypothesis) -> list[str]:
+        return fallen(self.robot, self.measured, self.simulated(model)) if self.robot.free_base else []
 
     def other_errors(self, *models: Hypothesis) -> list[str]:
         """In the units of the channels: root mean squares over all rows, by kind of sensor."""
