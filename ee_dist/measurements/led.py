@@ -21,6 +21,8 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 WHY_LINES = "joints are ahead of what is held from row to row, as none can be ('commands_between: held' if they were): "
+SELDOM_S = 0.05
+"""Rows so far apart, of commands that change from each to the next, may have others in between."""
 AT_ONCE = 0.3
 """Of a row of commands: joints that are not even so much later than a line through them are not led by what is held from one row
 to the next, which is half a row later."""
@@ -64,7 +66,25 @@ class Led:
                 if self.mapping.commands_between is None
                 else "commands: by straight lines from one row to the next, as the mapping says"
             )
+        elif self.mapping.commands_between is None:
+            self._tell_of_slow_rows()
         return found
+
+    def _tell_of_slow_rows(self) -> None:
+        """Of commands that a logger kept only now and then, what looks like a delay may be that they are held here."""
+        columns = [c for d in self.robot.drives if isinstance(c := self.mapping.commands.get(d.joint), Column)]
+        seldom = []
+        for c in columns:
+            own = self.on.clocks[c.table]
+            changes = np.diff(own.table.numbers(c.column, gaps=True)) != 0
+            if not own.table.planned and own.timing.median_s >= SELDOM_S and len(changes) and changes.mean() > 0.5:
+                seldom.append(own.timing.median_s)
+        if seldom:
+            self.report.done.append(
+                f"commands: held over rows that are {1e3 * max(seldom):.3g} ms apart, and others in most of them: where the "
+                f"controller went on in between, half a row ({500 * max(seldom):.3g} ms) of what looks like delay is none "
+                "('commands_between: lines' takes them so)"
+            )
 
     def _on_lines(self, torques: Array | None, positions: AnyMapping[str, Array]) -> Array | None:
         """The commands on lines, where the joints follow these so closely that they cannot have been held."""

@@ -73,3 +73,14 @@ def test_a_joint_that_hardly_moves_has_the_unit_of_the_others(tmp_path: Path) ->
     )
     _, found = logs.proposed(tmp_path, logs.written(tmp_path, table), joints)
     assert [c.entry["unit"] for c in found.choices if c.group == "commands"] == ["deg", "deg", "deg"]
+
+
+@pytest.mark.parametrize(("every", "said"), [(1, True), (4, False)])
+def test_commands_that_were_kept_seldom_are_said_to_look_like_a_delay(tmp_path: Path, every: int, said: bool) -> None:
+    table = frame()
+    for c in COMMANDS:
+        table[c] = np.repeat(table[c].to_numpy()[::every], every)
+    table["timestamp_ms"] = 1000 * table.pop("time")
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, table))
+    line = [d for d in report.done if "half a row (100 ms) of what looks like delay is none" in d]
+    assert bool(line) == said
