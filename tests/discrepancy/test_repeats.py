@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.evidence.repeats import near, near_later
+from ee_dist.discrepancy.evidence.repeats import between_rows, near, near_later
 
 T = np.arange(0, 12, 0.05)
 
@@ -39,3 +39,11 @@ def test_that_two_rest_alike_says_nothing() -> None:
     assert not near_later(one, other, 0.15)
     assert not near_later(np.zeros((300, 1)), np.zeros((300, 1)), 0.15), "nothing moves"
     assert not near_later(np.full((300, 1), np.nan), one, 0.15), "released"
+
+
+def test_what_lies_between_rows_is_no_difference() -> None:
+    fine, seldom = gait(0.0), gait(0.0)[::8]
+    assert between_rows(fine) < 0.05 < 0.2 < between_rows(seldom) < 0.4
+    held = np.repeat(gait(0.23)[::8], 8, axis=0)
+    assert near_later(np.repeat(seldom, 8, axis=0), held, float(np.hypot(0.15, between_rows(seldom))))
+    assert between_rows(np.ones((5, 2))) == 0.0

@@ -6,12 +6,13 @@ model gets wrong. Where more is left, only another motion, or another setting, t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.repeats import near, near_later
+from ee_dist.discrepancy.evidence.repeats import between_rows, near, near_later
 from ee_dist.discrepancy.problem import Index, Mask, Problem
 from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -183,7 +184,8 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
         return one.name == other.name
     if near(one.log.commands, other.log.commands, SAME_MOTION):
         return True
-    if near_later(one.log.commands, other.log.commands, SAME_COURSE) and near_later(
+    coarse = max(between_rows(log.commands[log.readings]) for log in (one.log, other.log))
+    if near_later(one.log.commands, other.log.commands, math.hypot(SAME_COURSE, coarse)) and near_later(
         _course(problem, one.log), _course(problem, other.log), 2 * SAME_COURSE
     ):
         return True

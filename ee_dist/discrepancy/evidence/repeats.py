@@ -56,6 +56,13 @@ def near_later(one: Array, other: Array, share: float) -> bool:
     return False
 
 
+def between_rows(course: Array) -> float:
+    """By which share of how much a course (T, M) varies another record of it may differ only because its rows lie elsewhere,
+    up to half a row beside these: a step from row to row, evenly spread."""
+    steps, varies = np.diff(course, axis=0), course.var(axis=0).sum()
+    return float(np.sqrt((steps**2).sum(axis=1).mean() / 12.0 / varies)) if varies > 0 and len(steps) else 0.0
+
+
 def _crossings(course: Array) -> int:
     """How often the liveliest of a course (T, M) passes its middle, but for what trembles about it."""
     most = course[:, np.argmax(course.var(axis=0))]
