@@ -101,9 +101,11 @@ def supply_sag(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 
 
 def _gains(robot: Robot, target: str) -> dict[str, Range]:
-    """Of torques, that of a motor whose constant nobody knew: several times off. A position that is so is another unit."""
-    torque = scales.drive_of(robot, target).command == "torque"
-    return {"change": (-0.8, 4.0) if torque else (-0.5, 0.5)}
+    """Of torques, that of a motor whose constant nobody knew: several times off; of speeds, what a bus was told of another
+    motor's. A position that is so is another unit."""
+    return {
+        "change": {"torque": (-0.8, 4.0), "speed": (-0.7, 2.0)}.get(scales.drive_of(robot, target).command, (-0.5, 0.5))
+    }
 
 
 @effect(

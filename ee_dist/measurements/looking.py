@@ -28,6 +28,7 @@ from ee_dist.measurements.suspicious import (
     pace_suspicion,
     repeat_suspicion,
     runs_against,
+    scales_suspicion,
     speed_suspicion,
     stall_suspicion,
     torque_suspicion,
@@ -40,6 +41,8 @@ from ee_dist.robots.model import Robot, Sensor
 from ee_dist.robots.reached import told
 from ee_dist.trials.log import Array
 
+BEYOND_THE_DRIVE = 10.0
+"""Times the limit of its drive that no measured torque is."""
 TURNED = 1.05
 """Times half a turn beyond which the tilt of a base is in another unit."""
 
@@ -139,14 +142,23 @@ class Looked:
         # Lines between readings are slower than what moved: the change of what was read is that from one reading to the next.
         stride = max(1, round(self.every_s / self.step_s))
         pace = stride * self.step_s, self.rate_read_hz
-        if note := note or pace_suspicion(speed[::stride], position[::stride], *pace):
+        joints = [s.target for s in read]
+        note = note or pace_suspicion(speed[::stride], position[::stride], *pace)
+        if note := note or scales_suspicion(joints, speed[::stride], position[::stride], pace[0]):
             yield note
         if len(read) > 1:
-            names, joints = [s.name for s in read], [s.target for s in read]
+            names = [s.name for s in read]
             yield from exchanged_suspicions(names, joints, speed, position, self.step_s)
 
     def _torques(self, torques: Array, joints: Array) -> Iterator[str]:
-        """Torques beside what the motion needs, and beside the work that they may take out of it."""
+        """Torques beside what drives can give, what the motion needs, and the work that they may take out of it."""
+        for drive, most in zip(self.robot.drives, np.abs(torques).max(axis=0), strict=True):
+            stated = (drive.joint, "torque_limit") not in self.robot.assumed
+            if stated and most > BEYOND_THE_DRIVE * drive.torque_limit:
+                yield (
+                    f"{TORQUE} {drive.joint}: reaches {most:.4g}, where its drive gives {drive.torque_limit:.4g} at most: "
+                    "another unit?"
+                )
         known = [m in self.mapping.torques for m in self.robot.motor_names]
         judged = torques_beside_need(self.robot, torques, joints, self.step_s, known)
         if judged is None:

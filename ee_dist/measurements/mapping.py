@@ -18,7 +18,8 @@ class Column:
     """A column as a channel: value = sign * scale * number + offset, which is in ``unit``.
 
     ``table`` is the table it stands in, where a trial has several. ``signed_bits``: an unsigned counter of that width that
-    holds a signed number. ``unwrap``: an angle that jumps by whole turns. ``gaps: interpolate`` fills empty cells from
+    holds a signed number. ``unwrap``: an angle that jumps by whole turns; ``rolls_over``: the numbers after which
+    a reading begins anew, where these are no turn. ``gaps: interpolate`` fills empty cells from
     their neighbours, or with the last command. ``lead_s``: how long before its time stamp a command took effect.
     ``smooth_s``: centred mean over that time. ``sure``: the unit is right although the numbers look as if it were not.
     """
@@ -30,6 +31,7 @@ class Column:
     offset: float = 0.0
     signed_bits: int = 0
     unwrap: bool = False
+    rolls_over: float = 0.0
     gaps: str = "error"
     lead_s: float = 0.0
     smooth_s: float = 0.0

@@ -282,6 +282,8 @@ def _column(value: Any, where: str, unit: str = "1") -> Column:
             raise MeasurementError(
                 f"{where}: {key}: {getattr(column, key):g} s; expected seconds, at most {LONGEST_S:g}"
             )
+    if column.rolls_over < 0:
+        raise MeasurementError(f"{where}: rolls_over: expected the numbers of one round, not {column.rolls_over:g}")
     if column.smooth_s < 0:
         raise MeasurementError(f"{where}: smooth_s: expected 0 or more, not {column.smooth_s:g}")
     return column

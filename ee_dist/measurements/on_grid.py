@@ -15,7 +15,7 @@ from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.reading import between_readings, paces_of, rows_read
 from ee_dist.measurements.report import TORQUE, Report
 from ee_dist.measurements.sampling import carried, grid, held, linear, smoothed
-from ee_dist.measurements.suspicious import suspicions, time_suspicion
+from ee_dist.measurements.suspicious import rolled_over, suspicions, time_suspicion
 from ee_dist.measurements.table import Recorded
 from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.units import TURN, UNITS, factor
@@ -114,7 +114,12 @@ class OnGrid:
             spared = f": leave out the {name}, which may stay unknown" if name.startswith(TORQUE) else ""
             raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty{spared}")
         if not quiet and not column.signed_bits:
-            self.report.suspicious += suspicions(f"{name} ({column.column})", raw[good], _turn(column))
+            title = f"{name} ({column.column})"
+            said = suspicions(title, raw[good], _turn(column))
+            over = (
+                rolled_over(title, raw[good]) if reading and not (said or column.unwrap or column.rolls_over) else None
+            )
+            self.report.suspicious += [*said, over] if over else said
         if len(good) < len(raw):
             how = "in which the last value holds" if step_like else "filled by straight lines"
             self.report.done.append(f"{name}: {len(raw) - len(good)} empty cells {how}")
@@ -131,6 +136,8 @@ class OnGrid:
             raise MeasurementError(f"{own.table}: column {quoted(column.column)}: too large a number to be {name}")
         if column.unwrap:
             values = np.unwrap(values)
+        if column.rolls_over:
+            values = np.unwrap(values, period=abs(column.rolls_over * column.scale) * size)
         rows = self.read_at.get(column.table)
         if (reading or name.startswith(TORQUE)) and rows is not None and len(rows) < len(values):
             late = written_late(raw, rows)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.names import listed
 from ee_dist.measurements import signals
 from ee_dist.measurements.report import STUCK_AT
 from ee_dist.measurements.units import TURN, TURNS_ON, UNITS
@@ -38,6 +39,8 @@ positions of the same time from which it is within."""
 
 STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
+ROLLS = 0.85
+"""Share of where a position is by which it jumps as it begins anew."""
 QUICK, STALLED, FEW_STALLS, MOST_STALLS = 0.3, 4.0, 3, 0.1
 """Share of a joint's higher speeds from which a row tells how long it took, times its own that a row takes before which a logger
 stood still, and of how few and of what share of all rows that is told."""
@@ -183,11 +186,16 @@ def stall_suspicion(speed: Array, position: Array, step_s: float) -> str | None:
     moving = signals.lively(speed, position)
     if len(speed) < 3 or not moving:
         return None
-    mean = 0.5 * np.abs(speed[1:, moving] + speed[:-1, moving])
+    way = 0.5 * (speed[1:, moving] + speed[:-1, moving])
+    mean = np.abs(way)
     quick = mean > QUICK * np.quantile(mean, 0.95, axis=0)
+    gone = np.diff(position[:, moving], axis=0) * np.sign(way)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(quick, np.abs(np.diff(position[:, moving], axis=0)) / (mean * step_s), np.nan)
-    rows = quick.any(axis=1)
+        # A position that rolls over jumps against the motion: that is no time that went by.
+        ratio = np.where(quick & (gone > 0), gone / (mean * step_s), np.nan)
+    rows = np.isfinite(ratio).any(axis=1)
+    if not rows.any():
+        return None
     times = np.nanmedian(ratio[rows], axis=1)
     late = times > STALLED
     if late.sum() < FEW_STALLS or late.mean() > MOST_STALLS or not 1 / ALIKE < np.median(times) < ALIKE:
@@ -199,6 +207,27 @@ def stall_suspicion(speed: Array, position: Array, step_s: float) -> str | None:
         f"time: at {int(late.sum())} rows positions go {np.median(times[late]):.0f} times as far as the speeds say (median), at "
         f"the others as far: the logger stood still before them, {missing:.3g} s in all, and the times do not say so. Speeds by "
         "these times and forces there are wrong: log the time of each reading, or add what is missing to the times"
+    )
+
+
+def rolled_over(name: str, numbers: Array) -> str | None:
+    """Whether readings (T,) jump now and then by one and the same amount, from one end of where they are to the other and against
+    the motion: an encoder that begins anew."""
+    steps, spread = np.diff(numbers), float(np.ptp(numbers))
+    jumps = np.flatnonzero(np.abs(steps) > ROLLS * spread)
+    usual = float(np.quantile(np.abs(steps), 0.9)) if len(steps) else 0.0
+    if not 0 < len(jumps) <= MOST_STALLS * len(steps) or usual > 0.2 * spread:
+        return None
+    beside = np.setdiff1d(np.r_[jumps - 1, jumps + 1], jumps)
+    beside = beside[(beside >= 0) & (beside < len(steps))]
+    sizes = np.abs(steps[jumps])
+    going = float(np.median(np.abs(steps[beside]))) if len(beside) else 0.0
+    against = [np.sign(steps[k]) == -np.sign(steps[n]) for k in jumps for n in (k - 1, k + 1) if n in beside]
+    if not against or np.mean(against) < 0.9 or float(np.ptp(sizes)) > 4 * usual:
+        return None
+    return (
+        f"{name}: jumps by {float(np.median(sizes)):.4g} at {len(jumps)} rows, from one end to the other against the motion: an "
+        f"encoder that begins anew; set 'rolls_over: {float(np.median(sizes)) + going:.4g}', the numbers of one round"
     )
 
 
@@ -224,24 +253,60 @@ def pace_suspicion(speed: Array, position: Array, step_s: float, rate_hz: float)
     )
 
 
+def scales_suspicion(joints: Sequence[str], speed: Array, position: Array, step_s: float) -> str | None:
+    """Whether measured speeds (T, J) are at some of the ``joints`` surely another number of times the change of their positions
+    than one, and at others not, or by another number: a scale of these columns."""
+    both = [_fits(speed, position, step_s, over_s) for over_s in (SHORT_S, LONGER_S)]
+    known = {k: both[0][k][0] for k in both[0] if k in both[1]}
+    off = [k for k in known if all(_off(*of[k]) for of in both)]
+    if not off:
+        return None
+    groups: list[list[int]] = []
+    for k in sorted(off, key=lambda k: known[k]):
+        if groups and known[k] < ALIKE * known[groups[-1][0]]:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    told = [f"{float(np.median([known[k] for k in g])):.3g} times at {listed([joints[k] for k in g])}" for g in groups]
+    right = [joints[k] for k in known if k not in off]
+    told += [f"as much at {listed(right)}"] if right else []
+    return (
+        f"speeds are, of the change of the positions, {'; '.join(told)}: the speeds of these columns, or their positions, are "
+        "scaled by that, and commands of the same unit with them"
+    )
+
+
+def _off(ratio: float, correlation: float) -> bool:
+    return ratio * correlation > 1 + PACE or ratio / correlation < 1 / (1 + PACE)
+
+
 def _pace(speed: Array, position: Array, step_s: float, over_s: float) -> dict[int, float] | None:
     """The times that speeds are the change of positions, by joint, both smoothed over ``over_s`` twice, where these are alike and
     surely not one; empty where they are not, None where that cannot be told."""
-    width = max(3, round(over_s / step_s))
-    if len(speed) < max(3, 2 * width):
+    moving, fits = signals.lively(speed, position), _fits(speed, position, step_s, over_s)
+    if not fits or 2 * len(fits) <= len(moving):
         return None
-    # Differences over two rows are means by Simpson's rule of what lies between; both are smoothed alike then.
-    both = (speed[:-2] + 4 * speed[1:-1] + speed[2:]) / 6, (position[2:] - position[:-2]) / (2 * step_s)
-    measured, change = (signals.smooth(signals.smooth(x, width), width) for x in both)
-    moving = signals.lively(speed, position)
-    fits = {k: r for k in moving if (r := signals.relation(change[:, [k]], measured[:, [k]]).correlation) > CLEAR}
-    if 2 * len(fits) <= len(moving):
-        return None
-    ratios = {k: float(np.std(measured[:, k]) / np.std(change[:, k])) for k in fits}
-    least, most = min(ratios[k] * r for k, r in fits.items()), max(ratios[k] / r for k, r in fits.items())
+    ratios = {k: ratio for k, (ratio, _) in fits.items()}
+    least, most = min(x * r for x, r in fits.values()), max(x / r for x, r in fits.values())
     low, high, ratio = min(ratios.values()), max(ratios.values()), float(np.median([*ratios.values()]))
     surely = least > 1 + PACE or most < 1 / (1 + PACE)
     return ratios if surely and high / low <= ALIKE and 0.5 < ratio < 2 else {}
+
+
+def _fits(speed: Array, position: Array, step_s: float, over_s: float) -> dict[int, tuple[float, float]]:
+    """The times that a speed is the change of its position, and the correlation of the two, both smoothed over ``over_s`` twice,
+    by the joints that tell it."""
+    width = max(3, round(over_s / step_s))
+    if len(speed) < max(3, 2 * width):
+        return {}
+    # Differences over two rows are means by Simpson's rule of what lies between; both are smoothed alike then.
+    both = (speed[:-2] + 4 * speed[1:-1] + speed[2:]) / 6, (position[2:] - position[:-2]) / (2 * step_s)
+    measured, change = (signals.smooth(signals.smooth(x, width), width) for x in both)
+    found = {}
+    for k in signals.lively(speed, position):
+        if (r := signals.relation(change[:, [k]], measured[:, [k]]).correlation) > CLEAR:
+            found[k] = (float(np.std(measured[:, k]) / np.std(change[:, k])), r)
+    return found
 
 
 def exchanged_suspicions(

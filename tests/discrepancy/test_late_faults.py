@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.evidence.intervals import BOUND, NONE_LEFT, at_bound
+from ee_dist.discrepancy.evidence.intervals import BOUND, NO_LIGHTER, NONE_LEFT, at_bound
 from ee_dist.discrepancy.explain import EFFECT, explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of
 from ee_dist.discrepancy.search.candidates import candidate
@@ -62,3 +62,9 @@ def test_times_of_a_trial_reach_to_its_end(seconds: float, end: float) -> None:
 )
 def test_all_of_a_share_is_an_answer_and_the_end_of_a_range_a_doubt(effect, target, u, said) -> None:
     assert at_bound(candidate(ROBOT, effect, target), 0, u) == said
+
+
+@pytest.mark.parametrize(("left", "said"), [(0.4, NO_LIGHTER), (0.02, NONE_LEFT)])
+def test_a_rotor_that_the_time_step_keeps_heavy_is_not_said_to_be_gone(left: float, said: str) -> None:
+    rotor = candidate(ROBOT, "rotor_inertia", "servo")
+    assert at_bound(rotor, 0, -1.0, (left - 1.0) * 0.03, 0.03) == said

@@ -39,13 +39,16 @@ def written(folder: Path, frame: pd.DataFrame) -> Path:
 
 
 def proposed(
-    folder: Path, file: Path, joints: tuple[str, ...] = samples.JOINTS, change: Any = None
+    folder: Path, file: Path, joints: tuple[str, ...] = samples.JOINTS, change: Any = None, described: Any = None
 ) -> tuple[Robot, Proposal]:
-    """A chain of joints (its description is put through ``change``), and what is proposed for a file beside it."""
-    described = samples.robot_file(folder, joints)
+    """A chain of joints (its URDF is put through ``change``, its description through ``described``), and what is proposed for a
+    file beside it."""
+    path = samples.robot_file(folder, joints)
+    if described is not None:
+        path.write_text(described(path.read_text()))
     if change is not None:
         (folder / "chain.urdf").write_text(change((folder / "chain.urdf").read_text()))
-    robot, _ = load_robot(described)
+    robot, _ = load_robot(path)
     return robot, proposal_for([file], robot, Hints())
 
 

@@ -16,6 +16,7 @@ from ee_dist.discrepancy.problem import Mask, Problem
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.fitted import Fit
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 AT_BOUND = 0.985
@@ -30,6 +31,12 @@ FEW = 3
 NOT_DETERMINED = "not determined by these data"
 BOUND = "at its bound: the range is too small, or the effect is another"
 NONE_LEFT = "at its bound: next to none is left of what was described"
+NO_LIGHTER = (
+    "at its bound: with less its controller would shake in this time step; write what is left into the description (or a smaller "
+    "time_step_s), and begin anew"
+)
+LEFT_AT_MOST = 0.15
+"""Share of what was described up to which next to none is left."""
 NEUTRAL = "not told from neutral"
 HARDLY = "hardly told from neutral: of as many effects as were tried, luck may tell one as far"
 EITHER = "the other sign does as well"
@@ -75,7 +82,7 @@ def parameters(
             half = float(w[k]) * room if np.isfinite(w[k]) else math.inf
             # By the data alone: what earned its place is told, though something else may have gone into its value. At a bound the
             # slope is of one side, and may say next to nothing of a value that the other side would tell.
-            flag = at_bound(c, k, float(u[k]))
+            flag = at_bound(c, k, float(u[k]), value, _described(problem.robot, c, k))
             if not np.isfinite(s[k]) or float(s[k]) * room > max(room, 1e-12):
                 flag = f"{flag}; {NOT_DETERMINED}" if flag else NOT_DETERMINED
             elif not flag and abs(u[k]) < s[k]:
@@ -96,12 +103,20 @@ def parameters(
     return out
 
 
-def at_bound(c: Candidate, k: int, u: float) -> str:
-    """What to think of the value of a candidate's parameter number ``k`` if it ended where the search may not go farther.
-    That all of something is lost, as of a frozen sensor or a dead motor, is an answer."""
+def _described(robot: Robot, c: Candidate, k: int) -> float:
+    """How much is described of what a parameter comes on top of, the least of several joints; 0 where it is on top of nothing."""
+    field, at = c.effect.parameters[k].on_top, {*(c.members(robot) or (c.target,))}
+    return min((float(getattr(d, field)) for d in robot.drives if d.joint in at), default=0.0) if field else 0.0
+
+
+def at_bound(c: Candidate, k: int, u: float, value: float = 0.0, described: float = 0.0) -> str:
+    """What to think of the ``value`` of a candidate's parameter number ``k``, on top of what is ``described``, if it ended where
+    the search may not go farther. That all of something is lost, as of a frozen sensor or a dead motor, is an answer."""
     known, (_, end) = c.effect.parameters[k], c.bounds[k]
     if abs(u) <= AT_BOUND or (u > 0 and known.whole and end == known.upper):
         return ""
+    if u < 0 and known.on_top == "rotor_inertia" and value > (LEFT_AT_MOST - 1.0) * described:
+        return NO_LIGHTER
     return NONE_LEFT if u < 0 and known.on_top else BOUND
 
 

@@ -27,6 +27,8 @@ AGAINST = (
     "the positions of {joints} run against these, and yet lie where they ask and not where their negatives would: they are late "
     "or early (half a period of a motion that repeats), or other joints' columns"
 )
+WHAT = {"position": POSITION, "speed": SPEED}
+"""What is asked of a drive by what it obeys."""
 UNLESS = "put that right, or write unit and sign into the mapping if they are what was asked for"
 MEND = "write the unit into the mapping, or take these commands out of it"
 LAST = frozenset(["clipped", "saturated", "limited", "clamped"])
@@ -48,8 +50,8 @@ def add_commands(v: View) -> None:
     # What neither is called a command nor goes with the motion is no rival.
     found = [s for b in v.blocks if not b.used and (s := score(v, b)) is not None and s.score >= 2]
     chosen = v.pick(sorted(found, key=lambda s: -s.score), 3.0)
-    if kind == "position":
-        _ask_of_the_late(v, chosen)
+    if kind != "torque":
+        _ask_of_the_late(v, chosen, kind)
     names = list(v.robot.motor_names)
     if chosen is None:
         if any(c.group == "torques" for c in v.out.choices) and not found:
@@ -146,20 +148,22 @@ def _late(ahead: signals.Lead, step_s: float) -> bool:
     return ahead.lead_s < -1.5 * step_s and abs(ahead.correlation) > 0.7
 
 
-def _behind(ahead: signals.Lead) -> str:
-    return f"it follows the positions by {-1e3 * ahead.lead_s:.0f} ms, as no command should"
+def _behind(ahead: signals.Lead, what: str = "positions") -> str:
+    return f"it follows the {what} by {-1e3 * ahead.lead_s:.0f} ms, as no command should"
 
 
-def _ask_of_the_late(v: View, chosen: Scored | None) -> None:
+def _ask_of_the_late(v: View, chosen: Scored | None, kind: str) -> None:
     """A question on what is called a command and follows the positions, where nothing else is."""
     step = v.step(v.position.block)
     for b in v.blocks if chosen is None else [chosen.block]:
         r = b.reading
-        if b.used or not r.command or not (r.kind in (POSITION, None) or r.weak) or not v.moves(b):
+        if b.used or not r.command or not (r.kind in (WHAT[kind], None) or r.weak) or not v.moves(b):
             continue
-        if _late(ahead := _lead(v, b, "position"), step):
+        if _late(ahead := _lead(v, b, kind), step):
+            swapped = v.position.block.name if kind == "position" else "the measured speeds"
             v.out.ask(
-                f"commands ({b.name}): {_behind(ahead)}; are they swapped with {v.position.block.name}? write the right columns"
+                f"commands ({b.name}): {_behind(ahead, f'{kind}s')}; are they swapped with {swapped}, or of another clock? write "
+                "the right columns"
             )
 
 
@@ -268,7 +272,8 @@ def _as_speed_command(v: View, b: Block) -> Scored | None:
     score = (
         (3.0 if r.command else 0.0) + (r.kind == SPEED and not r.weak) + (2 if fit > 0.9 else 1 if fit > 0.7 else -2)
     )
-    return Scored(b, score, [_why(ahead, "the speeds follow it by")])
+    why = _why(ahead, "the speeds follow it by") if ahead.lead_s >= 0 else _behind(ahead, "speeds")
+    return Scored(b, score - 3 * _late(ahead, v.step(v.position.block)), [why])
 
 
 def _as_torque_command(v: View, b: Block) -> Scored | None:
