@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from ee_dist.robots.inertia import felt_inertia
 from ee_dist.robots.model import Drive, Robot
@@ -13,6 +14,8 @@ STEPS_S = (0.01, 0.005, 0.004)
 """Coarser ones, for robots that stand fast and whose controllers are slower than they."""
 TURNED, TAKEN = 0.3, 0.5
 """Of a drive's own oscillation the angle (rad), and of a speed the share that damping takes off it, in a step that is fine."""
+LIGHTER = 0.1
+"""Times what was guessed that a rotor may weigh."""
 TOO_COARSE = 2.0
 """Times that step from which on a simulation is another robot's."""
 
@@ -24,8 +27,21 @@ def default_step_s(robot: Robot) -> float:
     swings = any(moving.get(j.name) == "none" for j in robot.joints if j.kind == "hinge")
     if robot.free_base or robot.world.has_floor or swings or "torque" in moving.values():
         return FINE_S
-    coarsest = coarsest_step_s(robot)
+    coarsest = coarsest_step_s(_with_light_rotors(robot))
     return next((s for s in STEPS_S if s <= coarsest), FINE_S)
+
+
+def _with_light_rotors(robot: Robot) -> Robot:
+    """The robot as it may turn out to be: rotors that were guessed are looked for from a tenth on, and a controller that somebody
+    knows moves those, too. Where it was guessed as well, the two are off together."""
+    guessed, of_gains = (
+        {j for j, field in robot.assumed if field in fields} for fields in (("rotor_inertia",), ("kp", "kd"))
+    )
+    drives = tuple(
+        replace(d, rotor_inertia=LIGHTER * d.rotor_inertia) if d.joint in guessed - of_gains else d
+        for d in robot.drives
+    )
+    return replace(robot, drives=drives)
 
 
 def coarsest_step_s(robot: Robot) -> float:

@@ -39,6 +39,18 @@ def test_stiffer_drives_are_stepped_more_finely(tmp_path: Path, kp: float, rotor
     assert robot.time_step_s == step and not any("coarse" in n for n in notes)
 
 
+@pytest.mark.parametrize(
+    ("assumed", "step"), [([], 0.01), (["rotor_inertia"], FINE_S), (["rotor_inertia", "kp", "kd"], 0.01), (["kp"], 0.01)]
+)
+def test_a_rotor_that_was_guessed_may_be_a_tenth_beside_gains_that_are_known(
+    tmp_path: Path, assumed: list[str], step: float
+) -> None:
+    arm(tmp_path)
+    drive = {"kp": 18.0, "kd": 0.4, "torque_limit": 9.0, "speed_limit": 30.0, "rotor_inertia": 0.02, "assumed": assumed}
+    robot, _ = load_robot({"urdf": str(tmp_path / "arm.urdf"), "drives": {"a": drive, "b": drive}})
+    assert robot.time_step_s == step
+
+
 def test_contacts_and_free_swings_keep_the_fine_one(tmp_path: Path) -> None:
     assert arm(tmp_path, has_floor=True)[0].time_step_s == FINE_S
     drive = {"command": "torque", "torque_limit": 5.0, "speed_limit": 20.0}
