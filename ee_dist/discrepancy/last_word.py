@@ -54,7 +54,7 @@ class LastWord:
         )
         if worse:
             return f"{text} There the improved model is the worse one: do not use it for such motions."
-        return f"{text} {self.farther}." if self.farther else text
+        return f"{text} {self.farther}." if self.farther and self.after < self.before else text
 
 
 def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis], fitted: Sequence[str]) -> LastWord:

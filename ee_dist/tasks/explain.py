@@ -15,7 +15,6 @@ from ee_dist.discrepancy.measured_trial import reading_s
 from ee_dist.discrepancy.plan import PlannedTrial, next_trials
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.search import Progress, quiet
-from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load, with_known_noise
@@ -83,7 +82,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     also = problem.other_errors(found.before, found.after) if found.best else ()
     also = (*also, *problem.spoiled(found.after), *way.instead(bool(found.left)))
     named = found.best if found.verdict == EFFECT else None
-    farther = "" if named is None or _of_readings(named.terms) else problem.farther_off(found.before, found.after)
+    farther = "" if named is None else problem.farther_off(found.before, found.after)
     account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also)
     account = account.warned((*measured.remarks, *([f"{farther}."] if farther else [])))
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
@@ -104,8 +103,3 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)
     show_account(console, account, out, following)
     return problem, found, account
-
-
-def _of_readings(terms: Hypothesis) -> bool:
-    """Whether all of them are in the sensors alone, which move nothing: noise that a channel has makes no prediction nearer."""
-    return all(CATALOGUE[t.effect].family == "sensing" for t in terms)

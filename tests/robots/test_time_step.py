@@ -40,7 +40,8 @@ def test_stiffer_drives_are_stepped_more_finely(tmp_path: Path, kp: float, rotor
 
 
 @pytest.mark.parametrize(
-    ("assumed", "step"), [([], 0.01), (["rotor_inertia"], FINE_S), (["rotor_inertia", "kp", "kd"], 0.01), (["kp"], 0.01)]
+    ("assumed", "step"),
+    [([], 0.01), (["rotor_inertia"], FINE_S), (["rotor_inertia", "kp", "kd"], 0.01), (["kp"], 0.01)],
 )
 def test_a_rotor_that_was_guessed_may_be_a_tenth_beside_gains_that_are_known(
     tmp_path: Path, assumed: list[str], step: float

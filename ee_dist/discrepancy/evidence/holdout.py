@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -35,6 +36,8 @@ SAME_MOTION = 0.02
 SAME_COURSE = 0.15
 """or their positions do by less than this: torques that a controller works out differ each time. Commands too, where one of the
 two begins later in the same motion, and rows fall elsewhere in it."""
+ROWS = 4000
+"""Rows at most by which it is looked whether one begins later."""
 MOVES, TAKES_PART = 0.01, 0.2
 """Share of its range by which a joint varies that moves at all, and share of what it varies by at most in a trial in which it
 takes part."""
@@ -184,10 +187,8 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
         return one.name == other.name
     if near(one.log.commands, other.log.commands, SAME_MOTION):
         return True
-    coarse = max(between_rows(log.commands[log.readings]) for log in (one.log, other.log))
-    if near_later(one.log.commands, other.log.commands, math.hypot(SAME_COURSE, coarse)) and near_later(
-        _course(problem, one.log), _course(problem, other.log), 2 * SAME_COURSE
-    ):
+    positions = tuple(i for i, s in enumerate(problem.robot.sensors) if s.kind == "position")
+    if _later(one.log, other.log, positions):
         return True
     first, second = (_course(problem, t.log) for t in (one, other))
     if not np.ptp(first, axis=0).any():
@@ -196,11 +197,25 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
     return near(first, second, SAME_COURSE if commanded else SAME_MOTION)
 
 
+@lru_cache(maxsize=1024)
+def _later(one: SensorLog, other: SensorLog, positions: tuple[int, ...]) -> bool:
+    """Whether one is the other's motion begun later, by commands and by positions (columns of the sensors)."""
+    coarse = max(between_rows(log.commands[log.readings]) for log in (one, other))
+    stride = max(1, max(len(one), len(other)) // ROWS)
+    asked = [log.commands[::stride] for log in (one, other)]
+    if not near_later(asked[0], asked[1], math.hypot(SAME_COURSE, coarse)):
+        return False
+    first, second = (_positions(log, positions)[::stride] for log in (one, other))
+    return near_later(first, second, 2 * SAME_COURSE)
+
+
 def _course(problem: Problem, log: SensorLog) -> Array:
     """(T, K) positions of the joints, as they are known or read."""
-    if log.joints is not None:
-        return np.asarray(log.joints)
-    return np.asarray(log.sensors[:, [s.kind == "position" for s in problem.robot.sensors]])
+    return _positions(log, [i for i, s in enumerate(problem.robot.sensors) if s.kind == "position"])
+
+
+def _positions(log: SensorLog, columns: Sequence[int]) -> Array:
+    return np.asarray(log.sensors[:, list(columns)] if log.joints is None else log.joints)
 
 
 def cross_fit(

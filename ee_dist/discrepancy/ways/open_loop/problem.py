@@ -32,7 +32,7 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
 from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale
 from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving, repeating
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
-from ee_dist.effects.catalogue import Hypothesis, applied, apply
+from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
 from ee_dist.effects.groups import members_of
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
@@ -413,6 +413,10 @@ class OpenLoop(Problem):
         return [f"Root mean squares over all rows of these trials: {'; '.join(parts)}."] if parts else []
 
     def farther_off(self, before: Hypothesis, after: Hypothesis) -> str:
+        came = set(after).symmetric_difference(before)
+        if all(find(t.effect).family == "sensing" for t in came):
+            # Noise that a channel has makes no prediction nearer.
+            return ""
         return farther_off(self._in_units(before), self._in_units(after))
 
     def _in_units(self, model: Hypothesis) -> InUnits:
