@@ -37,6 +37,8 @@ QUICK_S, TOGETHER = 0.25, 0.8
 """How late a joint may come, s, that is beyond its drive's bandwidth and not the other way round; correlation of commands and
 positions of the same time from which it is within."""
 
+ROUNDED = 0.15
+"""Of a step that is large, by how much a round may be off the plain number that it is taken for."""
 STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
 ROLLS = 0.85
@@ -211,24 +213,35 @@ def stall_suspicion(speed: Array, position: Array, step_s: float) -> str | None:
 
 
 def rolled_over(name: str, numbers: Array) -> str | None:
-    """Whether readings (T,) jump now and then by one and the same amount, from one end of where they are to the other and against
-    the motion: an encoder that begins anew."""
+    """Whether an encoder begins anew now and then: a sentence."""
+    found = round_of(numbers)
+    if found is None:
+        return None
+    rows, jump, size = found
+    return (
+        f"{name}: jumps by {jump:.4g} at {rows} rows, from one end to the other against the motion: an encoder that begins anew; "
+        f"set 'rolls_over: {size:g}', the numbers of one round"
+    )
+
+
+def round_of(numbers: Array) -> tuple[int, float, float] | None:
+    """Of readings (T,) that jump now and then by one and the same amount, from one end of where they are to the other and against
+    the motion: at how many rows, by how much, and the numbers of one round."""
     steps, spread = np.diff(numbers), float(np.ptp(numbers))
     jumps = np.flatnonzero(np.abs(steps) > ROLLS * spread)
     usual = float(np.quantile(np.abs(steps), 0.9)) if len(steps) else 0.0
     if not 0 < len(jumps) <= MOST_STALLS * len(steps) or usual > 0.2 * spread:
         return None
-    beside = np.setdiff1d(np.r_[jumps - 1, jumps + 1], jumps)
-    beside = beside[(beside >= 0) & (beside < len(steps))]
-    sizes = np.abs(steps[jumps])
-    going = float(np.median(np.abs(steps[beside]))) if len(beside) else 0.0
-    against = [np.sign(steps[k]) == -np.sign(steps[n]) for k in jumps for n in (k - 1, k + 1) if n in beside]
+    sizes, rounds, against = np.abs(steps[jumps]), [], []
+    for k in jumps:
+        beside = [steps[n] for n in (k - 1, k + 1) if 0 <= n < len(steps) and n not in jumps]
+        against += [np.sign(steps[k]) == -np.sign(step) for step in beside]
+        rounds += [abs(steps[k]) + float(np.mean(np.abs(beside)))] if beside else []
     if not against or np.mean(against) < 0.9 or float(np.ptp(sizes)) > 4 * usual:
         return None
-    return (
-        f"{name}: jumps by {float(np.median(sizes)):.4g} at {len(jumps)} rows, from one end to the other against the motion: an "
-        f"encoder that begins anew; set 'rolls_over: {float(np.median(sizes)) + going:.4g}', the numbers of one round"
-    )
+    size = float(np.median(rounds))
+    plain = (float(f"{size:.{digits}g}") for digits in range(1, 6))
+    return len(jumps), float(np.median(sizes)), next((p for p in plain if abs(p - size) < ROUNDED * usual), size)
 
 
 def pace_suspicion(speed: Array, position: Array, step_s: float, rate_hz: float) -> str | None:

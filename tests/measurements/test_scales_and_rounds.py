@@ -96,3 +96,24 @@ def test_speeds_that_were_asked_for_after_they_were_driven_are_asked_about(tmp_p
     said = [q for q in found.questions if "as no command should" in q]
     assert bool(said) == bool(late), found.questions
     assert all("it follows the speeds by" in q and "of another clock" in q for q in said)
+
+
+def test_without_a_mapping_a_round_is_found_and_speeds_beside_it(tmp_path: Path) -> None:
+    went = 11.0 * np.cumsum(np.where(T < 12, 1.0, -1.0) + 0.3 * np.sin(2 * T)) * 0.02
+    speed = np.gradient(went, T)
+    table = {
+        "time_s": T,
+        "servo_position": (went + 12.5) % 25.0 - 12.5,
+        "servo_velocity": speed,
+        "servo_goal_rad": went,
+    }
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    _, found = logs.proposed(
+        tmp_path, tmp_path / "log.csv", ("servo",), change=lambda text: text.replace("revolute", "continuous")
+    )
+    entries = {c.name: c for c in found.choices if c.group == "sensors"}
+    assert (
+        entries["position_servo"].entry["rolls_over"] == 25.0
+        and "begins anew after 25" in entries["position_servo"].why
+    )
+    assert entries["velocity_servo"].entry["column"] == "servo_velocity"

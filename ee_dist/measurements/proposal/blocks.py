@@ -53,6 +53,8 @@ class Block:
     values: Array
     units: tuple[str | None, ...] = ()
     used: bool = field(default=False)
+    rounds: tuple[float, ...] = ()
+    """The numbers after which each column begins anew, 0 where it does not; ``values`` go on."""
 
     @property
     def name(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,11 +25,14 @@ from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, H
 from ee_dist.measurements.proposal.time import TimeChoice
 from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.words import POSITION, SPEED
+from ee_dist.measurements.suspicious import round_of
 from ee_dist.measurements.table import Recorded
 from ee_dist.measurements.units import UNITS
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
+A_TURN, TURNS = 0.02, (2 * math.pi, 360.0)
+"""Share by which a round may be off a whole turn and be one, and what these are."""
 TIED = 1.0
 """Scores closer than this are no decision."""
 ROUNDED = 0.6
@@ -74,7 +78,7 @@ class View:
         known = {n: t.column for n, t in self.times.items() if t.column is not None}
         known |= {t.name: t.clock for t in self.recorded.tables if t.clock is not None}
         found = blocks_of(self.timed, self.robot.motor_names, self.hints.joints, known, self.robot.sensors)
-        return [self.even(b) for b in found if len(b.values) > 20]
+        return [self.even(_going_on(b)) for b in found if len(b.values) > 20]
 
     def driven(self) -> View:
         """The same without passive joints, which take no commands; its blocks are those not used yet."""
@@ -191,7 +195,8 @@ class View:
     def entry(self, block: Block, k: int, more: dict[str, Any]) -> dict[str, Any]:
         place = {"table": block.table.name} if len(self.recorded.tables) > 1 else {}
         gaps = {"gaps": "interpolate"} if empty_cells(block.table, block.columns[k]) else {}
-        return place | {"column": block.columns[k]} | more | gaps
+        anew = {"rolls_over": block.rounds[k]} if block.rounds and block.rounds[k] else {}
+        return place | {"column": block.columns[k]} | more | anew | gaps
 
     def add(
         self, group: str, names: list[str], block: Block, units: UnitChoice, why: list[str], sure: str = SURE
@@ -211,8 +216,9 @@ class View:
             empty = empty_cells(block.table, block.columns[k])
             how = "the last value holds" if group == "commands" else "filled by straight lines"
             filled = f"; {empty} of {len(block.table)} cells are empty, {how}" if empty else ""
+            anew = f"; begins anew after {block.rounds[k]:g}" if block.rounds and block.rounds[k] else ""
             self.out.choices.append(
-                Choice(group, name, self.entry(block, k, more) | which, level, text + still + filled)
+                Choice(group, name, self.entry(block, k, more) | which, level, text + still + anew + filled)
             )
 
     def sensor_names(self, kind: str) -> list[str]:
@@ -266,3 +272,15 @@ def _rounded(fine: Array, coarse: Array) -> bool:
 
 def can_be(b: Block, kind: str) -> bool:
     return b.reading.kind in (kind, None) or b.reading.weak
+
+
+def _going_on(block: Block) -> Block:
+    """Positions of encoders that begin anew after a round that is no turn, as they went on."""
+    if block.reading.kind not in (POSITION, None) or block.reading.command:
+        return block
+    found = [round_of(c) for c in block.values.T]
+    rounds = tuple(0.0 if f is None or any(abs(f[2] / turn - 1) < A_TURN for turn in TURNS) else f[2] for f in found)
+    if not any(rounds):
+        return block
+    went = [np.unwrap(c, period=size) if size else c for c, size in zip(block.values.T, rounds, strict=True)]
+    return replace(block, values=np.stack(went, axis=1), rounds=rounds)
