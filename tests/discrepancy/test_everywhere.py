@@ -23,6 +23,7 @@ from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.discrepancy.told import told_only
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.describe import load_robot
+from ee_dist.trials.log import SensorLog
 
 ROWS, TRIALS, NOISE = 240, 3, 0.1
 PLAIN = ("coulomb_friction", "viscous_friction", "zero_offset", "command_gain", "part_mass")
@@ -83,7 +84,8 @@ class _Trial:
     def __init__(self, name: str, commands: np.ndarray) -> None:
         self.name = name
         times = np.arange(len(commands)) * 0.01
-        self.log = type("Log", (), {"commands": commands, "joints": commands, "times_s": times})()
+        names = tuple(f"joint_{k}" for k in range(commands.shape[1]))
+        self.log = SensorLog(times, np.zeros((len(times), 0)), commands, (), (), names, joints=commands)
 
 
 @pytest.fixture(scope="module")

@@ -398,4 +398,4 @@ def _listed(each: Sequence[str]) -> str:
 
 
 def _told(value: float, unit: str) -> str:
-    return f"{1e3 * value:.3g} {'mrad' if unit == 'rad' else 'mm'}"
+    return f"{value:.3g} {unit}" if value >= 1 else f"{1e3 * value:.3g} {'mrad' if unit == 'rad' else 'mm'}"
