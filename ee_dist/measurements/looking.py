@@ -22,15 +22,17 @@ from ee_dist.measurements.mapping import Column, Estimated, Mapping
 from ee_dist.measurements.need import torques_beside_need
 from ee_dist.measurements.report import TORQUE
 from ee_dist.measurements.robot_channels import torque_units
-from ee_dist.measurements.suspicious import (
+from ee_dist.measurements.speeds_beside import (
     exchanged_suspicions,
-    hardly_moves,
     pace_suspicion,
-    repeat_suspicion,
-    runs_against,
     scales_suspicion,
     speed_suspicion,
     stall_suspicion,
+)
+from ee_dist.measurements.suspicious import (
+    hardly_moves,
+    repeat_suspicion,
+    runs_against,
     torque_suspicion,
     torques_suspicion,
     unit_suspicion,

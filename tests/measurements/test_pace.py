@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import small_logs as logs
 
-from ee_dist.measurements.suspicious import pace_suspicion, stall_suspicion
+from ee_dist.measurements.speeds_beside import pace_suspicion, stall_suspicion
 
 STEP_S = 0.01
 T = np.arange(3000) * STEP_S

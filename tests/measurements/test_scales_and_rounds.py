@@ -12,7 +12,8 @@ import small_logs as logs
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
 from ee_dist.measurements.mapping_file import mapping_of
-from ee_dist.measurements.suspicious import rolled_over, scales_suspicion
+from ee_dist.measurements.speeds_beside import scales_suspicion
+from ee_dist.measurements.suspicious import rolled_over
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
 T = np.arange(0, 20, 0.02)

@@ -13,11 +13,10 @@ from ee_dist.measurements.commanded import beyond_the_drive, disobeying, far_fro
 from ee_dist.measurements.need import held_beyond
 from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
+from ee_dist.measurements.speeds_beside import exchanged_suspicions, speed_suspicion
 from ee_dist.measurements.suspicious import (
     command_suspicion,
-    exchanged_suspicions,
     repeat_suspicion,
-    speed_suspicion,
     suspicions,
     time_suspicion,
     torque_suspicion,
