@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from ee_dist.basics.names import counted, listed
-from ee_dist.discrepancy.evidence.intervals import AT_BOUND
+from ee_dist.discrepancy.evidence.intervals import BOUND, at_bound
 from ee_dist.discrepancy.evidence.rule import NEAR
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, values_of
 from ee_dist.discrepancy.search.fitted import Model
@@ -115,7 +115,7 @@ def _farther(
 
 def _ends(c: Candidate, u: Array) -> bool:
     """Whether a factor on a guess went up as far as it may."""
-    return c.effect.main.neutral == 1.0 and bool(u[0] >= AT_BOUND * c.upper[0] > 0)
+    return c.effect.main.neutral == 1.0 and u[0] > 0 and at_bound(c, 0, float(u[0])) == BOUND
 
 
 def _with_room(robot: Robot, c: Candidate, values: Sequence[tuple[str, float]]) -> Candidate:

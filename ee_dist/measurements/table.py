@@ -121,9 +121,10 @@ class Table:
         return out
 
     def dated(self, column: str) -> bool:
-        """Whether the column holds dates, which are read as seconds. Raises MeasurementError for a column that is not there."""
+        """Whether a column of numbers holds them as dates, which are read as seconds, by its first cell. Raises MeasurementError
+        for a column that is not there."""
         cells = self._cells(column)
-        return not isinstance(cells, np.ndarray) and _dates(cells) is not None
+        return _begins_as_date(cells)
 
     def texts(self, column: str) -> list[str]:
         """The column's cells as they stand. Raises MeasurementError for a column that is not there."""
@@ -209,10 +210,14 @@ class Table:
         return out
 
 
+def _begins_as_date(cells: Any) -> bool:
+    return len(cells) > 0 and bool(_DATE.match(str(cells[0])))
+
+
 def _dates(cells: Any) -> Array | None:
     """Dates with a time of day, as ISO 8601 writes them, as seconds since 1970; without a zone they are taken as UTC. None where
     a cell is none."""
-    if not len(cells) or not _DATE.match(str(cells[0])):
+    if not _begins_as_date(cells):
         return None
     try:
         found = [datetime.fromisoformat(str(c).strip()) for c in cells]

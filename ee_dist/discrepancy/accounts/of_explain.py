@@ -173,19 +173,21 @@ def explain_account(
 
 def _what(found: Explanation, best: Judged, robot: Robot) -> str:
     """The terms of the best explanation; of drives that were only assumed, those of whose values these data tell something."""
-    flags = {found.after[p.term]: p.flag for p in found.parameters}
-    if best.proposal.label != LABEL:
-        own = [p.flag for p in found.parameters if found.after[p.term] in best.terms]
-        none = own and all(any(f in flag for f in (NEUTRAL, HARDLY, NOT_DETERMINED)) for flag in own)
-        return told_all(best.terms, robot) + " (of which these data tell no value)" * bool(none)
-    vague = [t for t in best.terms if any(f in flags.get(t, "") for f in (NEUTRAL, HARDLY, NOT_DETERMINED))]
+    flags = {t: [p.flag for p in found.parameters if found.after[p.term] == t] for t in best.terms}
+    vague = [t for t, own in flags.items() if own and all(map(_untold, own))]
     told = tuple(t for t in best.terms if t not in vague)
+    if best.proposal.label != LABEL:
+        return told_all(best.terms, robot) + " (of which these data tell no value)" * (not told)
     if not vague:
         return told_all(told, robot)
     several = listed(dict.fromkeys(plain(t.effect) for t in vague))
     if not told:
         return f"{several} together, of which these data tell none by itself"
     return f"{told_all(told, robot)} (with {several}, of which these data tell none by itself)"
+
+
+def _untold(flag: str) -> bool:
+    return any(f in flag for f in (NEUTRAL, HARDLY, NOT_DETERMINED))
 
 
 def _still(problem: Problem) -> str:

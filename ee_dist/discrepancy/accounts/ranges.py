@@ -11,6 +11,7 @@ from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, BOUND, EITHER, HAR
 from ee_dist.discrepancy.words import placed, plain, quantity, span
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term, apply
 from ee_dist.robots.model import Robot
+from ee_dist.robots.starter import moving_mass
 
 WEIGHS = 1.3
 """Times heavier (lighter) than described from which all that moves is told to be so."""
@@ -75,8 +76,7 @@ def beyond_a_guess(robot: Robot, terms: Hypothesis, parameters: Sequence[Paramet
 
 def weight_text(robot: Robot, terms: Hypothesis) -> list[str]:
     """A line where a model has all that moves much lighter or heavier than it is described: a scale would tell."""
-    first = 0 if robot.free_base else 1
-    was, now = (sum(p.mass_kg for p in r.parts[first:]) for r in (robot, apply(robot, terms)))
+    was, now = moving_mass(robot), moving_mass(apply(robot, terms))
     if not was > 0 or 1 / WEIGHS < now / was < WEIGHS:
         return []
     return [

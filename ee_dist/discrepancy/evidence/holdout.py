@@ -187,8 +187,7 @@ def _alike(problem: Problem, a: int, b: int) -> bool:
         return one.name == other.name
     if near(one.log.commands, other.log.commands, SAME_MOTION):
         return True
-    positions = tuple(i for i, s in enumerate(problem.robot.sensors) if s.kind == "position")
-    if _later(one.log, other.log, positions):
+    if _later(one.log, other.log, _read(problem)):
         return True
     first, second = (_course(problem, t.log) for t in (one, other))
     if not np.ptp(first, axis=0).any():
@@ -211,7 +210,12 @@ def _later(one: SensorLog, other: SensorLog, positions: tuple[int, ...]) -> bool
 
 def _course(problem: Problem, log: SensorLog) -> Array:
     """(T, K) positions of the joints, as they are known or read."""
-    return _positions(log, [i for i, s in enumerate(problem.robot.sensors) if s.kind == "position"])
+    return _positions(log, _read(problem))
+
+
+def _read(problem: Problem) -> tuple[int, ...]:
+    """The columns of sensors of position."""
+    return tuple(i for i, s in enumerate(problem.robot.sensors) if s.kind == "position")
 
 
 def _positions(log: SensorLog, columns: Sequence[int]) -> Array:
