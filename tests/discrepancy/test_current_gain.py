@@ -67,3 +67,22 @@ def test_an_import_estimates_gains_from_what_the_motion_needs_and_says_so(tmp_pa
     size = np.std(record.log.torques, axis=0) / np.std(log.torques, axis=0)
     assert size == pytest.approx([1, 1], rel=0.1)
     assert np.corrcoef(record.log.torques[:, 1], log.torques[:, 1])[0, 1] > 0.99, "the sign is turned back"
+
+
+def test_where_one_gain_cannot_be_estimated_those_of_the_others_are_told(tmp_path: Path) -> None:
+    sample = samples()["arm"]
+    log = measure(sample, ())[0].log
+    assert log.torques is not None
+    table = pd.DataFrame({"time_s": log.times_s})
+    currents = {"shoulder": log.torques[:, 0] / 2.5, "elbow": np.random.default_rng(0).normal(size=len(log.times_s))}
+    for k, motor in enumerate(currents):
+        table[f"{motor}_position_rad"] = log.channel(f"position_{motor}")
+        table[f"{motor}_velocity_rad_s"] = log.channel(f"velocity_{motor}")
+        table[f"{motor}_current_A"] = currents[motor]
+        table[f"{motor}_goal_rad"] = log.commands[:, k]
+    table.to_csv(tmp_path / "a.csv", index=False)
+    found = proposal_for([tmp_path / "a.csv"], sample.robot, Hints(gains=FIT))
+    said = next(q for q in found.questions if "cannot be estimated" in q)
+    assert "the gains of elbow cannot" in said
+    told = said.split("estimated of the others: ")[1]
+    assert told.endswith(" at shoulder") and float(told.split()[0]) == pytest.approx(2.5, rel=0.1)

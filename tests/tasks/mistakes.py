@@ -249,6 +249,7 @@ TRIALS: Rows = (
 """Trials."""
 
 ROBOTS: Rows = (
+    ("task=robot robot=urdf robot.urdf=arm.urdf", "task=robot reads urdf=FILE or mjcf=FILE"),
     ("task=robot urdf=nowhere.urdf", "expected a URDF"),
     ("task=robot urdf=no_mass.urdf", "expected a positive number"),
     ("task=robot urdf=word_mass.urdf", "word_mass.urdf: link 'rod': <mass value='heavy'> is not a number"),

@@ -48,9 +48,16 @@ def _gains(v: View, relations: list[signals.Relation] | None) -> list[float]:
         return v.gains()
     weak = [j.name for j, r in zip(v.joints, relations or (), strict=False) if abs(r.correlation) < LEAST_SEEN]
     if not relations or weak:
+        seen = [j.name in weak for j in v.joints]
+        others = [
+            f"{1 / abs(r.slope):.4g} at {j.name}"
+            for j, r, no in zip(v.joints, relations or (), seen, strict=False)
+            if not no
+        ]
         v.out.ask(
             f"torques: the gains of {', '.join(weak) or 'the motors'} cannot be estimated: their currents do not go with what "
             "the motion needs by the model; say task.gains=[N.m per A, one for each joint]"
+            + (f"; estimated of the others: {', '.join(others)}" if others else "")
         )
         return []
     # Noise in a current flattens none of this: the need is regressed on nothing that was measured but the motion.
