@@ -14,7 +14,7 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.evaluation.jobs import Evaluator, Job, Reduction
 from ee_dist.evolution.ga import Budget, GeneticAlgorithm, Genomes
 from ee_dist.recording.records import DIAGNOSIS, EVOLVED, POLISHED, PRUNED, GenerationRecord, HypothesisRecord
-from ee_dist.recovery.genome import LENGTH, decode, first_hypotheses, neighbours
+from ee_dist.recovery.genome import LENGTH, alone, at_all_amounts, decode, first_hypotheses, neighbours
 from ee_dist.recovery.metrics import Metric
 from ee_dist.recovery.observer import Observer
 from ee_dist.robots.system import System
@@ -22,6 +22,8 @@ from ee_dist.trials.log import SensorLog
 
 LAST_RANKS = 10
 """How many of the last population's different hypotheses are recorded."""
+WIDER = 3
+"""Of how many effects that stand alone, the best by a few amounts, all are tried."""
 
 
 class Judge:
@@ -86,7 +88,7 @@ def believe(
     hypothesis = judge.hypothesis(genome)
     told = [HypothesisRecord(pass_index, budget.generations, 0, hypothesis, error, stage=EVOLVED)]
     if polishing:
-        genome, error = polish(judge, genome, error, polishing)
+        genome, error = reconsider(judge, *polish(judge, genome, error, polishing), polishing)
         hypothesis = judge.hypothesis(genome)
         told.append(replace(told[-1], terms=hypothesis, error=error, stage=POLISHED))
     if parsimony:
@@ -147,6 +149,29 @@ def polish(judge: Judge, genome: Genomes, error: float, rounds: int) -> tuple[Ge
         if not errors[k] < error:
             break
         genome, error = around[k], float(errors[k])
+    return genome, error
+
+
+def reconsider(judge: Judge, genome: Genomes, error: float, rounds: int) -> tuple[Genomes, float]:
+    """Hold a polished hypothesis against what no walk from it comes to, and polish what is better, until nothing is: each effect
+    alone, wherever it may be, and the same terms, all of them or all but one, each by every amount.
+
+    Where a fault is large its valley is narrow: of three times a mass, the error at 2.9 times is half of that at none. Several
+    terms that make up for a wrong amount then leave less than every neighbour of theirs.
+    """
+    robot = judge.robot
+    for _ in range(rounds):
+        if error == 0.0:
+            break
+        single = np.array(alone(robot), dtype=np.int16)
+        found = judge.errors([judge.hypothesis(g) for g in single])
+        near = [g for k in np.argsort(found, kind="stable")[:WIDER] for g in at_all_amounts(single[k], robot)]
+        tried = np.array([*near, *at_all_amounts(genome, robot)], dtype=np.int16)
+        errors = judge.errors([judge.hypothesis(g) for g in tried])
+        k = int(np.argmin(errors))
+        if not errors[k] < error:
+            break
+        genome, error = polish(judge, tried[k], float(errors[k]), rounds)
     return genome, error
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -65,6 +66,8 @@ STEPS = (40, 20, 10, 5, 2, 1)
 """How far, in hundredths, the fourth value of a gene is moved to both sides."""
 AMOUNTS = (-60, 0, 60)
 """Fourth values with which another term is tried."""
+EVENLY = tuple(range(-SCALE, SCALE + 1, 10))
+"""Fourth values with which a term is tried alone, wherever it may be."""
 
 
 def neighbours(genome: NDArray[np.int16], system: System) -> list[NDArray[np.int16]]:
@@ -82,6 +85,38 @@ def neighbours(genome: NDArray[np.int16], system: System) -> list[NDArray[np.int
             other = genome.copy()
             other[k : k + GENE_LENGTH] = gene
             found.setdefault(decode(other, system), other)
+    return list(found.values())
+
+
+def alone(system: System, amounts: Sequence[int] = EVENLY) -> list[NDArray[np.int16]]:
+    """Genomes of each effect alone, at each place, by each of the ``amounts``."""
+    subject = subject_of(system)
+    situations, places = _middles(len(subject.situations)), _middles(subject.tried_places(system))
+    found: dict[Hypothesis, NDArray[np.int16]] = {}
+    for gene in product((1,), situations, places, amounts):
+        genome = np.zeros(LENGTH, dtype=np.int16)
+        genome[::GENE_LENGTH] = -1
+        genome[:GENE_LENGTH] = gene
+        found.setdefault(decode(genome, system), genome)
+    return list(found.values())
+
+
+def at_all_amounts(genome: NDArray[np.int16], system: System) -> list[NDArray[np.int16]]:
+    """Genomes that say the same of each term by every amount that it has, and so of the terms that are left without one of them."""
+    starts = range(0, LENGTH, GENE_LENGTH)
+    active = [k for k in starts if choice(int(genome[k]), 2) == 1]
+    bases = [genome]
+    if len(active) > 1:
+        bases += [genome.copy() for _ in active]
+        for k, base in zip(active, bases[1:], strict=True):
+            base[k] = -1
+    found: dict[Hypothesis, NDArray[np.int16]] = {}
+    for base in bases:
+        for k in active:
+            for much in range(-SCALE, SCALE + 1) if choice(int(base[k]), 2) == 1 else ():
+                other = base.copy()
+                other[k + GENE_LENGTH - 1] = much
+                found.setdefault(decode(other, system), other)
     return list(found.values())
 
 
