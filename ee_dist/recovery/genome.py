@@ -102,18 +102,17 @@ def alone(system: System, amounts: Sequence[int] = EVENLY) -> list[NDArray[np.in
 
 
 def at_all_amounts(genome: NDArray[np.int16], system: System) -> list[NDArray[np.int16]]:
-    """Genomes that say the same of each term by every amount that it has, and so of the terms that are left without one of them."""
-    starts = range(0, LENGTH, GENE_LENGTH)
-    active = [k for k in starts if choice(int(genome[k]), 2) == 1]
-    bases = [genome]
-    if len(active) > 1:
-        bases += [genome.copy() for _ in active]
-        for k, base in zip(active, bases[1:], strict=True):
-            base[k] = -1
+    """Genomes of the same terms, all of them or all but one, with each in turn by every amount that it has."""
+    active = [k for k in range(0, LENGTH, GENE_LENGTH) if choice(int(genome[k]), 2) == 1]
+    bases = [(genome, active)]
+    for dropped in active if len(active) > 1 else ():
+        base = genome.copy()
+        base[dropped] = -1
+        bases.append((base, [k for k in active if k != dropped]))
     found: dict[Hypothesis, NDArray[np.int16]] = {}
-    for base in bases:
-        for k in active:
-            for much in range(-SCALE, SCALE + 1) if choice(int(base[k]), 2) == 1 else ():
+    for base, left in bases:
+        for k in left:
+            for much in range(-SCALE, SCALE + 1):
                 other = base.copy()
                 other[k + GENE_LENGTH - 1] = much
                 found.setdefault(decode(other, system), other)
