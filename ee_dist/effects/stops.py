@@ -23,9 +23,11 @@ SIDES = {"upper": 1.0, "lower": -1.0}
 
 
 def _room(robot: Robot, target: str, side: str) -> float:
-    """From where a joint begins to its end on one side: a stop before that would throw it."""
+    """From where a joint begins to its end on one side: a stop before that would throw it. One that begins beyond an end, as a
+    knee whose range leaves out zero, begins at that end."""
     joint = robot.joint(target)
-    return max(joint.upper - joint.start, 0.0) if side == "upper" else max(joint.start - joint.lower, 0.0)
+    begin = min(max(joint.start, joint.lower), joint.upper)
+    return joint.upper - begin if side == "upper" else begin - joint.lower
 
 
 def _with_room(robot: Robot, side: str) -> tuple[str, ...]:
@@ -101,8 +103,8 @@ SIGNATURE = (
     seen_at=_upper_seen,
 )
 def upper_stop(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    nearer = min(values["nearer_rad"], _room(robot, target, "upper"))
-    return robot.with_joint(target, upper=robot.joint(target).upper - nearer)
+    nearer, joint = min(values["nearer_rad"], _room(robot, target, "upper")), robot.joint(target)
+    return robot.with_joint(target, upper=max(joint.upper - nearer, joint.lower))
 
 
 @effect(
@@ -116,5 +118,5 @@ def upper_stop(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     seen_at=_lower_seen,
 )
 def lower_stop(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
-    nearer = min(values["nearer_rad"], _room(robot, target, "lower"))
-    return robot.with_joint(target, lower=robot.joint(target).lower + nearer)
+    nearer, joint = min(values["nearer_rad"], _room(robot, target, "lower")), robot.joint(target)
+    return robot.with_joint(target, lower=min(joint.lower + nearer, joint.upper))

@@ -6,6 +6,7 @@ import inspect
 import math
 import pickle
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from ee_dist.effects.catalogue import FAMILIES, from_dict
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Network, weight_count
 from ee_dist.engines.pybullet.engine import PyBulletEngine
+from ee_dist.robots.inertia import felt_inertia, steady_inertia
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.model import CONTINUOUS_RAD, Robot
 from ee_dist.robots.quadruped import quadruped
@@ -189,3 +191,21 @@ def test_no_spring_pulls_back_what_turns_without_end_and_without_a_motor() -> No
     free = endless.with_drive(first, command="none")
     assert first not in spring.targets(free)
     assert first in spring.targets(robot.with_drive(first, command="none"))
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(-2.818, -0.888), (0.4, 2.0), (3.465, 5.395), (-5.395, -3.465), (-1.0, 0.0)])
+def test_every_effect_can_be_tried_on_joints_whose_range_leaves_out_zero(lower: float, upper: float) -> None:
+    """As the knees of most quadrupeds do, and angles that are counted from another turn."""
+    robot = quadruped()
+    knees = {j.name for j in robot.joints if "knee" in j.name}
+    robot = replace(
+        robot, joints=tuple(replace(j, lower=lower, upper=upper) if j.name in knees else j for j in robot.joints)
+    )
+    for e in CATALOGUE.values():
+        for target in e.targets(robot):
+            for t in corners(e, robot, target):
+                changed = apply(robot, (t,))
+                assert all(j.lower <= j.upper for j in changed.joints), t
+                assert (steady_inertia(changed) > 0).all() and np.isfinite(felt_inertia(changed)).all(), t
+    stops = {s: set(CATALOGUE[s].targets(robot)) & knees for s in ("lower_stop", "upper_stop")}
+    assert stops["lower_stop" if upper <= 0 else "upper_stop"] == knees, "away from the end at which it begins"
