@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +24,7 @@ FASTEST_S, SLOWEST_S = 2e-4, 0.45
 QUICKEST_S = 9e-5
 """The least of one that says its unit: servo drives log at 10 kHz."""
 KEPT = 0.05
+_A_TIME = re.compile(r"time|clock|stamp", re.IGNORECASE)
 TORN = 0.5
 """A single gap of more than this share of the record, or a record stretched by it, is a wrong time stamp."""
 
@@ -33,6 +36,8 @@ class Clocked:
     table: Table
     times_s: Array
     timing: Timing
+    name: str = "row"
+    """What says when its rows were: a column, or "row" where nothing does."""
 
 
 def times_of(table: Table, time: Column | Even | None, where: str) -> tuple[Array, str]:
@@ -66,7 +71,20 @@ def clocked(table: Table, time: Column | Even | None, where: str) -> Clocked:
             f"{table}: row {table.line(worst + 1)}, column {quoted(name)}: time jumps by {steps[worst]:.4g} s, the other rows "
             f"are {timing.median_s:.4g} s apart; a wrong time stamp? drop the rows on one side of it"
         )
-    return Clocked(table, times_s, timing)
+    return Clocked(table, times_s, timing, name)
+
+
+def other_clocks(main: Clocked) -> dict[str, float]:
+    """How far the other columns of a table go that are called a time and rise from row to row."""
+    found: dict[str, float] = {}
+    for address in main.table.addresses():
+        if address == main.name or not _A_TIME.search(address):
+            continue
+        with contextlib.suppress(MeasurementError):
+            values = main.table.numbers(address)
+            if (np.diff(values) >= 0).all() and values[-1] > values[0]:
+                found[address] = float(values[-1] - values[0])
+    return found
 
 
 def loosely_clocked(table: Table, time: Column | Even | None, where: str) -> Clocked:
@@ -79,8 +97,8 @@ def loosely_clocked(table: Table, time: Column | Even | None, where: str) -> Clo
     if not last.all():
         table, times_s = table.part(np.flatnonzero(last)), times_s[last]
     if len(times_s) == 1:
-        return Clocked(table, times_s, Timing(0.0, 0.0, 0.0, ()))
-    return Clocked(table, times_s, check_times(times_s, table, name))
+        return Clocked(table, times_s, Timing(0.0, 0.0, 0.0, ()), name)
+    return Clocked(table, times_s, check_times(times_s, table, name), name)
 
 
 def check_grid(found: Clocked, step_s: float, rate_stated: bool, unit: str) -> None:

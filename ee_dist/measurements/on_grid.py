@@ -8,14 +8,14 @@ from collections.abc import Mapping as AnyMapping
 import numpy as np
 
 from ee_dist.basics.quoted import quoted
-from ee_dist.measurements.clocks import Clocked, check_grid
+from ee_dist.measurements.clocks import Clocked, check_grid, other_clocks
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.held_readings import written_late
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.reading import between_readings, paces_of, rows_read
 from ee_dist.measurements.report import TORQUE, Report
 from ee_dist.measurements.sampling import carried, grid, held, linear, smoothed
-from ee_dist.measurements.suspicious import rolled_over, suspicions, time_suspicion
+from ee_dist.measurements.suspicious import clock_suspicion, rolled_over, suspicions, time_suspicion
 from ee_dist.measurements.table import Recorded
 from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.units import TURN, UNITS, factor
@@ -71,6 +71,9 @@ class OnGrid:
         note = time_suspicion(timing.median_s, length, self.unit)
         if note:
             report.suspicious.append(note)
+        other = clock_suspicion(self.main.name, length, other_clocks(self.main))
+        if other:
+            report.suspicious.append(other)
         for row, seconds in timing.gaps[:5]:
             report.suspicious.append(f"time: a gap of {seconds:.4g} s before row {row}")
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements import signals
 from ee_dist.measurements.report import STUCK_AT
 from ee_dist.measurements.units import TURN, TURNS_ON, UNITS
@@ -39,6 +40,8 @@ STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
 ROLLS, MOST_ROLLS = 0.85, 0.1
 """Share of where a position is by which it jumps as it begins anew, and at what share of all rows at most."""
+CLOCKS, MOST_APART = 1.03, 15.0
+"""Times as long as another that a clock lasts from which one of the two is wrong, and up to which they tell of the same thing."""
 
 
 def suspicions(name: str, values: Array, turn: float = TURN) -> list[str]:
@@ -79,6 +82,19 @@ def time_suspicion(median_s: float, length_s: float, declared: str) -> str | Non
         return (
             f"time: a row every {median_s:g} s and {length_s:g} s in all: is the column in s rather than {declared!r}?"
         )
+    return None
+
+
+def clock_suspicion(name: str, length_s: float, others: Mapping[str, float]) -> str | None:
+    """Whether another column that is called a time and rises with these rows lasts longer or less long, in whatever unit it is:
+    ``others`` has by column how far it goes."""
+    for other, goes in others.items():
+        ratio = min((length_s / (goes * unit) for unit in (1.0, 1e-3, 1e-6, 1e-9)), key=lambda r: abs(np.log(r)))
+        if CLOCKS < max(ratio, 1 / ratio) < MOST_APART:
+            return (
+                f"time: {quoted(name)} lasts {length_s:.4g} s, {quoted(other)} of the same rows {length_s / ratio:.4g} s "
+                f"({1 / ratio:.3g} times as long): which of them is right? speeds and delays go by it"
+            )
     return None
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ee_dist.basics.names import counted
 from ee_dist.measurements.alignment import Match, match, one_clock
-from ee_dist.measurements.clocks import Clocked, clocked, loosely_clocked
+from ee_dist.measurements.clocks import clocked, loosely_clocked
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Even, Mapping
 from ee_dist.measurements.robot_channels import command_kind
@@ -167,5 +169,5 @@ class TrialClocks:
 
     def _keep(self, rows: slice) -> None:
         """Keeps some rows of the main table."""
-        self.main = Clocked(self.main.table.part(rows), self.main.times_s[rows], self.main.timing)
+        self.main = replace(self.main, table=self.main.table.part(rows), times_s=self.main.times_s[rows])
         self.clocks[self.first] = self.main

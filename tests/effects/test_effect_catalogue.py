@@ -193,7 +193,9 @@ def test_no_spring_pulls_back_what_turns_without_end_and_without_a_motor() -> No
     assert first in spring.targets(robot.with_drive(first, command="none"))
 
 
-@pytest.mark.parametrize(("lower", "upper"), [(-2.818, -0.888), (0.4, 2.0), (3.465, 5.395), (-5.395, -3.465), (-1.0, 0.0)])
+@pytest.mark.parametrize(
+    ("lower", "upper"), [(-2.818, -0.888), (0.4, 2.0), (3.465, 5.395), (-5.395, -3.465), (-1.0, 0.0)]
+)
 def test_every_effect_can_be_tried_on_joints_whose_range_leaves_out_zero(lower: float, upper: float) -> None:
     """As the knees of most quadrupeds do, and angles that are counted from another turn."""
     robot = quadruped()

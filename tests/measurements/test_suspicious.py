@@ -15,6 +15,7 @@ from ee_dist.measurements.report import Report, describe
 from ee_dist.measurements.signals import Relation
 from ee_dist.measurements.speeds_beside import exchanged_suspicions, speed_suspicion
 from ee_dist.measurements.suspicious import (
+    clock_suspicion,
     command_suspicion,
     repeat_suspicion,
     suspicions,
@@ -296,3 +297,12 @@ def test_a_drive_that_held_more_than_its_limit_is_told() -> None:
     led = weak.map_drive("servo", lambda d: replace(d, command="torque"))
     assert held_beyond([led], [("a", log)]) == [], "who swings a pendulum up holds it nowhere"
     assert held_beyond([weak], [("a", replace(log, joints=None))]) == []
+
+
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [(1.97, "1.97 times as long"), (1970.0, "1.97 times"), (0.5e9, "0.5 times"), (1.0, None), (1e3, None), (60, None)],
+)
+def test_a_clock_that_lasts_otherwise_than_another_in_any_unit_is_told(other: float, told: str | None) -> None:
+    said = clock_suspicion("timestamp", 3.154, {"real_time": 3.154 * other})
+    assert (said is None) if told is None else (told in said and "'real_time' of the same rows" in said)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.proposal.by_limb import called_by_limbs
 from ee_dist.measurements.proposal.by_sensor import called_as_sensors
 from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.pairs import spelled_out
@@ -32,6 +33,7 @@ from ee_dist.trials.log import Array
 
 Mask = NDArray[np.bool_]
 BY_NAME, BY_SENSOR, BY_NUMBER, BY_PLACE, ONLY = "by name", "by sensor", "by number", "by place", "only one"
+BY_LIMB = "by limb"
 EMPTY, IN_TURN = 0.2, 10
 """Share of a column's cells that may be empty and yet be filled by straight lines: what a logger skips now and then; and how
 many in a row, of columns that are written in turn with others, as topics are that go into one table."""
@@ -121,7 +123,8 @@ def blocks_of(
         words = joint_words(joints)
         named = {} if order is not None and _own_numbers(joints) else _named_in_full(list(series), joints)
         sensed = called_as_sensors(list(series), sensors, joints, table.name)
-        named |= sensed
+        limbs = {} if order is not None else called_by_limbs([a for a in series if a not in named], joints)
+        named |= limbs | sensed
         pairs = spelled_out({_stem(a) for a in series})
         families: dict[tuple[str, bool], list[tuple[str, Reading, str | None]]] = {}
         for address in series:
@@ -138,7 +141,9 @@ def blocks_of(
         for members in families.values():
             block = _block(table, members, series, joints, order)
             if block is not None:
-                found.append(replace(block, how=BY_SENSOR) if members[0][0] in sensed else block)
+                first = members[0][0]
+                how = BY_SENSOR if first in sensed else BY_LIMB if first in limbs else block.how
+                found.append(replace(block, how=how))
             elif all(m[1].kind is None for m in members):
                 mute += [m[0] for m in members]
         found += _by_place(table, [a for a in series if a in mute], series, joints, order)
@@ -290,9 +295,24 @@ def _by_place(
         return [_made(table, (a,), [SILENT], ONLY, series) for a in mute]
     if not mute or len(mute) % size:
         return []
-    chosen = hanging_together(mute, size, series)
     places = [list(order or joints).index(j) for j in joints] if order is None or set(joints) <= set(order) else []
-    return [_made(table, tuple(part[p] for p in places), [SILENT], BY_PLACE, series) for part in chosen if places]
+    if not places:
+        return []
+    found = []
+    for role, own in _by_role(mute, size).items():
+        reading = SILENT if role is None else replace(SILENT, command=role)
+        for part in hanging_together(own, size, series):
+            found.append(_made(table, tuple(part[p] for p in places), [reading], BY_PLACE, series))
+    return found
+
+
+def _by_role(mute: list[str], size: int) -> dict[bool | None, list[str]]:
+    """Columns that say nothing else by whether they are called asked for, measured or neither, where each of these is so much of
+    every joint; else all of them as called neither."""
+    found: dict[bool | None, list[str]] = {}
+    for address in mute:
+        found.setdefault(read_name(_stem(address)).command, []).append(address)
+    return found if all(len(own) % size == 0 for own in found.values()) else {None: mute}
 
 
 def _by_other_names(

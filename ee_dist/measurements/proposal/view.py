@@ -13,6 +13,7 @@ from ee_dist.measurements import signals
 from ee_dist.measurements.alignment import match, one_clock
 from ee_dist.measurements.held_readings import held_readings
 from ee_dist.measurements.proposal.blocks import (
+    BY_LIMB,
     BY_NAME,
     BY_SENSOR,
     Block,
@@ -182,6 +183,8 @@ class View:
 
     def order(self, block: Block) -> tuple[str, str]:
         """How sure the joints of a block are, and why."""
+        if block.how == BY_LIMB:
+            return LIKELY, "limb by its name, its joints counted from the base on"
         if not block.numbered:
             return SURE, {BY_NAME: "joint by its name", BY_SENSOR: "called as the robot's sensors are"}.get(
                 block.how, ""
