@@ -23,6 +23,7 @@ from ee_dist.discrepancy.evidence.rule import least_energy, no_more_than_noise
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.pool import held_still
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.scan import Scanned, scan
 from ee_dist.discrepancy.search.screen import Screened, screen
@@ -43,6 +44,7 @@ WORTH_JUDGING = 0.4
 AT_LEAST."""
 AT_LEAST = 4
 Looked = TypeVar("Looked", Screened, Scanned)
+GAIN = "position_gain"
 MANY_JOINTS = 3
 """Joints from which an effect at each of them is judged joint by joint too."""
 FAMILIES_TRIED, ADDS = 4, 0.3
@@ -137,7 +139,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     has = {t.effect for t in (*search.fixed, *current.hypothesis) if t.target in WHOLE}
     looked_at = np.isin(problem.trial_of, busy)
     above = float((base[looked_at] ** 2 - problem.floor[looked_at]).sum())
-    starts += _families(screened, starts, least, has, above)
+    starts += _families(screened, starts, least, has, above, held_still(problem))
     guessed = assumed_drives(now.among(busy), pool, [t.name for t in (*search.fixed, *current.hypothesis)])
     starts += [guessed] if guessed is not None else []
     nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, few), 1e-12)
@@ -280,10 +282,12 @@ def _families(
     least: float,
     has: AbstractSet[str],
     above: float,
+    held: AbstractSet[str],
 ) -> list[tuple[Proposal, Array]]:
     """Effects at all joints, each joint with a value of its own, where several joints promise something: one number for all of
-    them, which the model may have already (``has``), may be too few. ``above``: energy above the noise. And friction by load,
-    linear and quadratic, which pay together."""
+    them, which the model may have already (``has``), may be too few. Of joints that were only ``held`` nothing tells a gain from
+    a torque, and theirs is as that of the others. ``above``: energy above the noise. And friction by load, linear and quadratic,
+    which pay together."""
     out: list[tuple[float, Proposal, Array]] = []
     by_effect: dict[str, list[Screened]] = {}
     whole = has | {s.candidate.effect.name for s in screened if s.candidate.target in WHOLE}
@@ -292,6 +296,8 @@ def _families(
             by_effect.setdefault(s.candidate.effect.name, []).append(s)
     for name, members in by_effect.items():
         visible = [s for s in members if s.starts and s.promise > least]
+        if name == GAIN:
+            visible = [s for s in visible if s.candidate.target not in held]
         if len(visible) < 2:
             continue
         promise, most = sum(s.promise for s in visible), max(s.promise for s in visible)

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, get_type_hints
@@ -26,6 +27,8 @@ LARGEST = 2**16
 """Numbers in one value; larger ones are quicker to simulate again than to keep by the thousand."""
 MOST = 2**30
 """Bytes of a journal; beyond, nothing more is noted."""
+SMALL = 2**12
+"""Bytes of an entry up to which its value is kept in memory too."""
 _HEAD = struct.Struct("<32sB")
 """Key, and how many parts a record has; 0 for a value that is none."""
 _PART = struct.Struct("<BBII")
@@ -35,13 +38,40 @@ _KINDS = (np.dtype("<f8"), np.dtype("<f4"), np.dtype("?"))
 MOST_PARTS = 16
 
 
-class Journal:
-    """Values by key, in memory and in the file at ``path``. Raises OSError where that cannot be written."""
+class Journal(Mapping[str, Any]):
+    """Values by key in the file at ``path``; small ones are in memory too, larger ones are read again each time. Raises OSError
+    where the file cannot be written."""
 
     def __init__(self, path: Path) -> None:
-        self.values: dict[str, Any] = {}
+        self._small: dict[str, Any] = {}
+        self._at: dict[str, int] = {}
+        """Where in the file the entries of the others begin."""
         self._file: BinaryIO = path.open("a+b")
         self._size = self._load()
+
+    def __getitem__(self, key: str) -> Any:
+        if key in self._small:
+            return self._small[key]
+        self._file.seek(self._at[key])
+        entry = self._entry()
+        if entry is None or entry[0] != key:
+            raise KeyError(key)
+        return entry[1]
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._small or key in self._at
+
+    def __iter__(self) -> Iterator[str]:
+        return chain(self._small, self._at)
+
+    def __len__(self) -> int:
+        return len(self._small) + len(self._at)
+
+    def _remember(self, key: str, value: Any, begins: int, ends: int) -> None:
+        if ends - begins <= SMALL:
+            self._small[key] = value
+        else:
+            self._at[key] = begins
 
     def _load(self) -> int:
         """Read what is whole, cut off the rest; bytes that are left."""
@@ -53,9 +83,9 @@ class Journal:
             return len(MAGIC)
         good = len(MAGIC)
         while (entry := self._entry()) is not None:
-            key, value = entry
-            self.values[key] = value
-            good = self._file.tell()
+            begins, good = good, self._file.tell()
+            if entry[0] not in self:
+                self._remember(*entry, begins, good)
         self._file.truncate(good)
         self._file.seek(good)
         return good
@@ -102,9 +132,10 @@ class Journal:
         wrote = False
         for key, value in found:
             packed = _packed(key, value)
-            if packed is not None and key not in self.values and self._size + len(packed) <= MOST:
+            if packed is not None and key not in self and self._size + len(packed) <= MOST:
                 self._file.write(packed)
-                self.values[key], self._size, wrote = value, self._size + len(packed), True
+                self._remember(key, value, self._size, self._size + len(packed))
+                self._size, wrote = self._size + len(packed), True
         if wrote:
             self._save()
 
@@ -172,7 +203,7 @@ class JournaledEvaluator:
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
         if self.journal is None:
             return self.inner.evaluate(jobs)
-        known, keys, before = self.journal.values, [job.key for job in jobs], self.counts.copy()
+        known, keys, before = self.journal, [job.key for job in jobs], self.counts.copy()
         found: list[Any] = [_restored(job, known.get(key)) for job, key in zip(jobs, keys, strict=True)]
         fresh = [k for k, value in enumerate(found) if value is None]
         if fresh:

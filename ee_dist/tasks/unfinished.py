@@ -112,7 +112,7 @@ class Unfinished:
     @property
     def empty(self) -> bool:
         """Whether there is nothing worth going on from."""
-        known = self._journal is not None and bool(self._journal.values)
+        known = self._journal is not None and bool(self._journal)
         return not known and self._journal is not None and not any(self.folder.glob("*.mcap"))
 
     def older_than(self, path: Path) -> bool:

@@ -115,7 +115,7 @@ def begun(path: Path) -> None:
 
 def journal(path: Path) -> None:
     with Journal(path) as found:
-        assert all(isinstance(v, tuple) or np.size(v) for v in found.values.values())
+        assert all(isinstance(v, tuple) or np.size(v) for v in found.values())
 
 
 def beside(path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import tracemalloc
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -258,20 +259,20 @@ def test_a_journal_cut_anywhere_gives_its_whole_entries(tmp_path: Path):
     for length in (*range(0, len(whole), 7), len(whole)):
         path.write_bytes(whole[:length])
         with Journal(path) as journal:
-            counts.append(len(journal.values))
+            counts.append(len(journal))
             inner = _Numbers()
             found = JournaledEvaluator(inner, journal).evaluate(jobs)
             assert str(found) == str(expected)
             assert inner.asked == 9 - counts[-1]
-            assert journal.values.keys() == {j.key for j in jobs if j.number % 3 < 2}
+            assert journal.keys() == {j.key for j in jobs if j.number % 3 < 2}
         assert path.read_bytes().startswith(MAGIC)
     assert counts == sorted(counts)
     assert (counts[0], counts[-1]) == (0, 6)
     for place in range(len(MAGIC), len(whole), 5):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
         with Journal(path) as journal:
-            assert all(str(journal.values[j.key]) == str(e) for j, e in zip(jobs, expected, strict=True)
-                       if j.key in journal.values)  # fmt: skip
+            assert all(str(journal[j.key]) == str(e) for j, e in zip(jobs, expected, strict=True)
+                       if j.key in journal)  # fmt: skip
     shutil.rmtree(tmp_path)
 
 
@@ -308,7 +309,7 @@ def test_a_journal_keeps_what_a_reduction_makes_of_a_log(tmp_path: Path):
     for length in (*range(0, len(whole), 11), len(whole)):
         path.write_bytes(whole[:length])
         with Journal(path) as journal:
-            known, inner = len(journal.values), _Records()
+            known, inner = len(journal), _Records()
             found = JournaledEvaluator(inner, journal).evaluate(jobs)
         assert inner.asked == 5 - known
         for a, b in zip(found, expected, strict=True):
@@ -322,3 +323,26 @@ def test_a_journal_keeps_what_a_reduction_makes_of_a_log(tmp_path: Path):
     with Journal(path) as journal:
         JournaledEvaluator(inner, journal).evaluate(jobs)
     assert inner.asked == 5
+
+
+def test_large_values_of_a_journal_stay_in_its_file(tmp_path: Path):
+    """Minutes of a log in each of a thousand values would take a gigabyte of memory beside the gigabyte on the disk."""
+    values = {f"{k:064x}": np.random.default_rng(k).normal(size=4000) for k in range(200)}
+    path = tmp_path / "j.bin"
+    tracemalloc.start()
+    try:
+        with Journal(path) as journal:
+            journal.note([*values.items()])
+            journal.note([("f" * 64, 0.5)])
+            again = {key: journal[key] for key in reversed(values)}
+            assert all(np.array_equal(again[key], value) for key, value in values.items())
+            journal.note([("e" * 64, np.arange(1000.0))])
+            assert (journal["f" * 64], len(journal)) == (0.5, 202) and journal.get("d" * 64) is None
+        del again
+        before = tracemalloc.get_traced_memory()[0]
+        with Journal(path) as journal:
+            assert journal.keys() == {*values, "f" * 64, "e" * 64}
+            held = tracemalloc.get_traced_memory()[0] - before
+    finally:
+        tracemalloc.stop()
+    assert held < 0.1 * path.stat().st_size

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +11,16 @@ import numpy as np
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates
 from ee_dist.effects.groups import JOIN
+from ee_dist.robots.instruments import MOTOR_TORQUE
+from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of, top_speed
 
 SPARE, MOST_SLOWED = 1.2, 10.0
 """How much more friction than would have stopped a joint at the highest speed that it had, and times what is worth trying
 else;"""
+SCALE_OF_MASS = "part_mass@all_parts"
+STILL_RAD = 1e-3
+"""How far (rad, m) a command goes up to which its joint is only held."""
 OFTEN = 0.99
 """share of the readings below that highest speed: the rest may be noise."""
 
@@ -29,7 +34,32 @@ def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] =
     seen = (c if c.effect.seen_at is None else _seen_at(problem, c, c.effect.name in named) for c in able)
     judged = (as_long(problem, c) for c in (_judged(problem, c) for c in seen if c is not None) if c is not None)
     # Several groups may be one where joints that nothing is known of are left out.
-    return list({c.name: _hinted(problem, as_slow(problem, c)) for c in judged}.values())
+    out = {c.name: _hinted(problem, as_slow(problem, c)) for c in judged}
+    if SCALE_OF_MASS.partition("@")[0] not in named and no_scale(problem.robot, out):
+        out.pop(SCALE_OF_MASS, None)
+    return list(out.values())
+
+
+def no_scale(robot: Robot, names: Collection[str]) -> bool:
+    """Whether nothing says how large torques are but the masses: motion alone is compared, gains and rotors of all drives were
+    assumed, and both are among the ``names`` of what is looked for. One factor on all of these is then the same as one on all
+    masses, of which the description is the better witness."""
+    driven = {d.joint for d in robot.drives if d.command != "none"}
+    guessed = driven <= {*robot.assumed_joints("kp")} & {*robot.assumed_joints("rotor_inertia")}
+    looked_for = {name.partition("@")[0] for name in names}
+    seen = any(s.kind in ("torque", MOTOR_TORQUE) for s in robot.sensors)
+    return bool(driven) and guessed and not seen and {"position_gain", "coulomb_friction"} <= looked_for
+
+
+def held_still(problem: Problem) -> frozenset[str]:
+    """Joints whose command stays where it is in all of the trials: what a soft controller lets them sag by, a torque does too."""
+    found = set()
+    for k, name in enumerate(problem.robot.motor_names):
+        told = [t.log.commands[:, k] for t in problem.measured if t.log.commands.shape[1] > k]
+        spans = [float(np.ptp(c[np.isfinite(c)])) for c in told if np.isfinite(c).any()]
+        if spans and max(spans) <= STILL_RAD:
+            found.add(name)
+    return frozenset(found)
 
 
 def as_long(problem: Problem, c: Candidate) -> Candidate:
