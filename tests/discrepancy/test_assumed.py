@@ -308,6 +308,25 @@ def test_a_guess_goes_before_as_many_numbers_that_it_is_tied_with(
     assert set(order[0].tied_with) == {"most", "each", "guess"} - {first}
 
 
+@pytest.mark.parametrize(
+    ("gain", "size", "first"), [(0.5, 6, "guess"), (0.3, 6, "each"), (0.5, 12, "each"), (0.5, 11, "guess")]
+)
+def test_few_guesses_go_before_many_numbers_at_sound_parts(
+    monkeypatch: pytest.MonkeyPatch, gain: float, size: int, first: str
+) -> None:
+    """A deadband at each of twelve joints leaves less than gains that were guessed, as long as these are as they were guessed."""
+
+    def judged(name: str, size: int, guess: bool, gain: float) -> SimpleNamespace:
+        proposal = SimpleNamespace(parts=(), size=size, guess=guess)
+        return SimpleNamespace(
+            name=name, proposal=proposal, vague=False, earned=True, stands=True, held=np.array([1.0 - gain]), gain=gain
+        )
+
+    monkeypatch.setattr(judge, "tied", lambda *_: False)
+    order = judge.ranked([judged("each", 12, False, 0.8), judged("guess", size, True, gain)])  # type: ignore[arg-type,list-item]
+    assert [order[0].name, [j.rank for j in order]] == [first, [1, 2]]
+
+
 def test_a_guess_is_judged_beside_whatever_promises_more() -> None:
     hidden = (term("motor_weak", JOINTS[1], loss=0.4), term("rotor_inertia", JOINTS[0], added_kg_m2=0.1))
     problem = linear(hidden)

@@ -33,6 +33,8 @@ APART = 6.0
 """Held-out energy of an explanation, over that of another, from which it is no other explanation of the same."""
 NONE = 1e-9
 """Share of its range at which a value is neutral."""
+HALF = 0.5
+"""Share of what many numbers at sound parts take off that fewer guesses must take off to be told before them."""
 FULLER = 0.8
 """Share of what a law leaves above the noise that the same with a further term must leave at most, to go before it in a tie."""
 VAGUE = "none of its numbers is told from neutral; a plainer effect explains as much for each of its own"
@@ -232,6 +234,14 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
             if j.earned and j.name in first.tied_with and j.proposal.guess and j.proposal.size <= first.proposal.size
         ]
         first = min((first, *asked), key=_least_said)
+        # Nor do a dozen numbers at parts that somebody vouched for go before a few of guesses that take off half as much.
+        fewer = [
+            j
+            for j in ordered
+            if j.earned and j.proposal.guess and j.proposal.size < first.proposal.size and j.gain >= HALF * first.gain
+        ]
+        if fewer and not first.proposal.guess:
+            first = max(fewer, key=lambda j: j.gain)
         first = min((j for j in ordered if j.name in first.tied_with and _fuller(j, first)), key=_left, default=first)
         if first is not best:
             # What is tied with either may be it.
