@@ -16,6 +16,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import NEAR, gauss_newton, weighed
 from ee_dist.discrepancy.search.valley import follow_valley
+from ee_dist.discrepancy.torque_scale import MASS, without_masses
 from ee_dist.trials.log import Array
 
 Units = Callable[[Model, int, int], list[list[int]]]
@@ -23,6 +24,8 @@ Units = Callable[[Model, int, int], list[list[int]]]
 NOT_FAR, CHORDS = 5.0, 3
 """How far from neutral, in halves of its interval, a value is without which it is simulated, and in how many steps the others
 follow;"""
+SAME = 1e-6
+"""Share of its energy by which a motion that is computed otherwise may differ and be the same."""
 FEW, REFITS = 16, 3
 """how many values are few, all of which are tried, and in how many descents the others are fitted then."""
 
@@ -42,12 +45,34 @@ def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int, 
     after the other, the least told first, for what one of two alike leaves makes the other plain; then without those that
     are not missed. As many of them leave as held-out data allow; the first ``own`` parts stay. Masses of a body's parts go
     together; far from the noise, where one of them that is told keeps others at their bounds, then each by itself."""
+    current, same = _without_scale(search, current, own)
     told, fit = _left_out(search, current, own, cut, tried, open_only, units_of)
+    told = Told(told.then, (*same, *told.gone), told.instead)
     problem = search.problem
     if open_only or fit.energy <= NEAR * float(problem.floor.sum()):
         return told
     more, _ = _left_out(search, told.then, own, cut, tried, open_only, _each)
     return Told(more.then, (*told.gone, *more.gone), told.instead | more.instead)
+
+
+def _without_scale(search: Search, current: Current, own: int) -> tuple[Current, tuple[str, ...]]:
+    """The model without the masses, of those from part ``own`` on, without which it is the very same motion once all that goes
+    with torques is smaller by their factor; and their names. Slopes over finite steps tell such a mass, as any way along a
+    ridge that is bent, and held-out data cannot say anything of it."""
+    model = Model(current.parts)
+    masses = [[k] for k in range(own, len(current.parts)) if current.parts[k].effect.name == MASS]
+    units = [*masses, [k for (k,) in masses]] if len(masses) > 1 else masses
+    starts = [(unit, without_masses(search.problem.robot, model, current.u, unit)) for unit in units]
+    found = [(unit, u) for unit, u in starts if u is not None]
+    left = [Model(tuple(c for k, c in enumerate(current.parts) if k not in unit)) for unit, _ in found]
+    rows = search.residuals(
+        [model.hypothesis(current.u), *(m.hypothesis(u) for m, (_, u) in zip(left, found, strict=True))]
+    )
+    energy = float(rows[0] @ rows[0])
+    for (unit, u), m, r in zip(found, left, rows[1:], strict=True):
+        if abs(float(r @ r) - energy) <= SAME * energy:
+            return Current(m.parts, u), tuple(current.parts[k].name for k in unit)
+    return current, ()
 
 
 def _left_out(

@@ -14,7 +14,9 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import pool_of
-from ee_dist.effects.catalogue import Term, find, term
+from ee_dist.effects.catalogue import Hypothesis, Term, find, term
+from ee_dist.effects.groups import groups
+from ee_dist.robots.instruments import MOTOR_TORQUE
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -24,7 +26,9 @@ SELDOM_OFF = 0.3
 ALL_OFF = 0.1
 """and all of them by one factor."""
 SCALED = ("N.m", "N.m.s/rad", "N.m/rad", "kg.m^2", "kg")
-"""Units of what is larger with the torques."""
+"""Units of what is larger with the torques,"""
+FACTORS = ("position_gain", "speed_gain", "rotor_factor")
+"""and factors on such values."""
 
 
 def other_scale(
@@ -61,14 +65,49 @@ def _change(t: Term) -> float:
     return float(t.values[0][1])
 
 
+def of_masses(robot: Robot, terms: Hypothesis) -> bool:
+    """Whether a model says how strong all its motors are, or their controllers, and nothing was measured that says how large a
+    torque is: what it tells of torques then goes with the masses."""
+    if any(s.kind in ("torque", MOTOR_TORQUE) for s in robot.sensors):
+        return False
+    told: dict[str, set[str]] = {}
+    for t in terms:
+        told.setdefault(t.effect, set()).update(groups(robot).get(t.target, (t.target,)))
+    for d in robot.drives:
+        says = {"torque": ("command_gain", STRENGTH, WEAK), "none": ()}.get(d.command, ("position_gain", STRENGTH))
+        if d.command != "none" and not any(d.joint in told.get(name, ()) for name in says):
+            return False
+    return any(d.command != "none" for d in robot.drives)
+
+
+def without_masses(robot: Robot, model: Model, u: Array, gone: Sequence[int]) -> Array | None:
+    """Where a fit begins without the masses that are parts number ``gone`` of a model: with all else that goes with torques
+    smaller by their factor, which is the same motion where that is all that there is. None where other parts go, too."""
+    terms = model.hypothesis(u)
+    if any(terms[k].effect != MASS for k in gone):
+        return None
+    factor = 1.0 / float(np.mean([1.0 + _change(terms[k]) for k in gone]))
+    stay = [k for k in range(len(terms)) if k not in gone]
+    values = [model.parts[k].shares(dict(_scaled(robot, terms[k], factor).values)) for k in stay]
+    left = Model(tuple(model.parts[k] for k in stay))
+    return np.clip(np.concatenate([*values, np.zeros(0)]), left.lower, left.upper)
+
+
 def _scaled(robot: Robot, t: Term, factor: float) -> Term:
     """A term with all of what it is on top of larger by a factor, where that goes with torques, as far as its ranges go: a fit
     begins there."""
     drive = next((d for d in robot.drives if d.joint == t.target), None)
     values = {}
     for p, (name, value) in zip(find(t.effect).parameters, t.values, strict=True):
-        if t.effect == MASS:
+        by_torque = t.effect == STRENGTH or (
+            t.effect == "command_gain" and drive is not None and drive.command == "torque"
+        )
+        if t.effect == MASS or by_torque:
             value = (1.0 + value) * factor - 1.0
+        elif t.effect == WEAK:
+            value = 1.0 - (1.0 - value) * factor
+        elif t.effect in FACTORS:
+            value *= factor
         elif p.unit in SCALED:
             described = float(getattr(drive, p.on_top, 0.0)) if p.on_top and drive is not None else 0.0
             value = (described + value) * factor - described

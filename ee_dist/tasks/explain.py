@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ee_dist.basics.names import listed
-from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.account import MEND, Account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.confidence import confidence
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation, explain
@@ -89,7 +89,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))
     following = []
-    if found.verdict != NOTHING_MISSING:
+    # A mistake of the description or the mapping is mended there: no model on top of it is of any use.
+    if found.verdict != NOTHING_MISSING and account.advice != MEND:
         # Where more than this is missing, the rest is looked for beside it.
         alone = found.verdict == EFFECT and found.best is not None and not account.more
         effect = setting("effect", typed(found.best.terms) if alone and found.best else "auto")

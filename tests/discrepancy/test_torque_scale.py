@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,8 +13,12 @@ from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import pool_of
-from ee_dist.discrepancy.torque_scale import STRENGTH, other_scale
-from ee_dist.effects.catalogue import find
+from ee_dist.discrepancy.torque_scale import STRENGTH, other_scale, without_masses
+from ee_dist.effects.catalogue import apply, find
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
+from ee_dist.engines.mujoco.engine import MuJoCoEngine
+from ee_dist.robots.servo_pendulum import servo_pendulum
 
 EFFECTS = ("part_mass", "coulomb_friction", "viscous_friction", "rotor_inertia", "torque_limit", "command_delay")
 
@@ -40,3 +46,26 @@ def test_masses_far_off_are_there_to_be_scaled() -> None:
     u = np.where(model.lower < 0, -1.0, 0.5)
     found = list(other_scale(of_arm, Current(model.parts, u), 0, pool_of(of_arm)))
     assert len(found) == len(find("part_mass").targets(of_arm.robot)) > 1
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.floats(0.05, 0.3), min_size=6, max_size=6), st.sampled_from([0, 1]))
+def test_without_a_mass_all_that_goes_with_torques_is_scaled_and_the_motion_is_the_same(
+    shares: list[float], strong: int
+) -> None:
+    """Of one body led by torques: its mass, its rotor, both frictions and what a command stands for."""
+    pendulum = servo_pendulum()
+    (servo,), arm = pendulum.motor_names, pendulum.parts[1].name
+    robot = pendulum.map_drive(servo, lambda d: replace(d, command="torque", kp=0.0, kd=0.0, speed_limit=np.inf))
+    names = ("part_mass", "rotor_inertia", ("command_gain", STRENGTH)[strong], "coulomb_friction", "viscous_friction")
+    model = Model(tuple(candidate(robot, n, arm if n == "part_mass" else servo) for n in (*names, "command_delay")))
+    u = np.array(shares)
+    scaled = without_masses(robot, model, u, [0])
+    assert scaled is not None and without_masses(robot, model, u, [0, 1]) is None
+    left = Model(model.parts[1:])
+    engine, told = MuJoCoEngine(1), Commands(0.3 * np.sin(np.arange(200) / 15.0)[:, None])
+    with_mass, without = engine.rollout(
+        [Rollout(apply(robot, m.hypothesis(v)), told, 200) for m, v in ((model, u), (left, scaled))]
+    )
+    assert np.ptp(with_mass.sensors) > 0.01
+    assert np.allclose(with_mass.sensors, without.sensors, rtol=0, atol=1e-6)

@@ -84,6 +84,11 @@ def test_a_reversed_elbow_is_told_first_with_where_to_mend_it(cli, tmp_path, by)
     log, said = imported(cli, tmp_path)
     assert "3 of 800 rows were not read and are left out" in said
     _, compared, _ = run(cli, "task=compare", log, f"task.by={by}", *QUICK)
+    _, explained, said = run(cli, "task=explain", log, f"task.by={by}", SUSPECTS, *QUICK)
+    assert explained["candidates"][0]["name"] == "axis_reversed@elbow", explained["headline"]
+    assert " ".join(MEND.split()) in said and "task=improve" not in said, (
+        "no command that goes on with what is to be mended"
+    )
     folder, summary, said = run(cli, "task=improve", "effect=auto", log, f"task.by={by}", SUSPECTS, *QUICK)
     assert summary["ladder"][1]["name"] == "axis_reversed@elbow", summary["headline"]
     assert summary["ladder"][-1]["error_heldout"] < 0.3 * compared["error"]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, BOUND, EITHER, HARDLY, WIDER, ParameterReport, called
+from ee_dist.discrepancy.torque_scale import of_masses
 from ee_dist.discrepancy.words import placed, plain, quantity, span
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term, apply
 from ee_dist.robots.model import Robot
@@ -82,6 +83,16 @@ def weight_text(robot: Robot, terms: Hypothesis) -> list[str]:
     return [
         f"All that moves weighs {now:.3g} kg in this model, and {was:.3g} kg as it is described: a scale would tell, and of what "
         "only moves together the data may tell no more than sums and ratios."
+    ]
+
+
+def scale_text(robot: Robot, terms: Hypothesis) -> list[str]:
+    """A line where only the masses say how large all torques are."""
+    if not of_masses(robot, terms):
+        return []
+    return [
+        "Only motion was measured, so that all torques may be larger or smaller by one factor, with all masses and rotors: their "
+        "values and intervals hold for the masses of this model. Weigh the parts, or measure one torque."
     ]
 
 
