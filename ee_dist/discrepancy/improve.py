@@ -28,6 +28,7 @@ from ee_dist.discrepancy.evidence.holdout import (
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise, settled
+from ee_dist.discrepancy.evidence.ridges import flat_widths
 from ee_dist.discrepancy.evidence.rule import LUCK, NEAR, no_more_than_noise
 from ee_dist.discrepancy.evidence.signs import either_sign
 from ee_dist.discrepancy.evidence.worth import worth_of
@@ -306,7 +307,7 @@ def _finish(
         fit = fit_one(search, model, [current.u], None, (*WIDTHS[2:], 0.006), prior)
         residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
         left = leftovers(problem, residual)
-        reports = parameters(problem, fit, left, tried, either_sign(search, fit))
+        reports = parameters(problem, fit, left, tried, either_sign(search, fit), flat_widths(search, fit))
         told = [replace(p, term=p.term + len(search.fixed)) for p in reports]
         worth = worth_of(problem, fit, base)
     before, after = ladder[0].error_heldout, ladder[-1].error_heldout

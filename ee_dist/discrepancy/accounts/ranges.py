@@ -7,7 +7,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, BOUND, EITHER, HARDLY, WIDER, ParameterReport, called
+from ee_dist.discrepancy.evidence.intervals import (
+    ALL_OF_IT,
+    BOUND,
+    EITHER,
+    HARDLY,
+    TOGETHER,
+    WIDER,
+    ParameterReport,
+    called,
+)
 from ee_dist.discrepancy.torque_scale import of_masses
 from ee_dist.discrepancy.words import placed, plain, quantity, span
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term, apply
@@ -30,7 +39,7 @@ def ranges(
         term = terms[p.term]
         if term.name in told_of:
             range_ = span(term, p.name, p.low, p.high, robot, interval=True)
-            sure = p.flag in ("", HARDLY, EITHER) and np.isfinite(p.high - p.low)
+            sure = p.flag in ("", HARDLY, EITHER, TOGETHER) and np.isfinite(p.high - p.low)
             range_ += f", of which {EITHER}" if p.flag == EITHER else ""
             told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
     out = [(f"{placed(name)}: " if several else "") + ", ".join(values) for name, values in told_of.items() if values]

@@ -40,6 +40,7 @@ LEFT_AT_MOST = 0.15
 NEUTRAL = "not told from neutral"
 HARDLY = "hardly told from neutral: of as many effects as were tried, luck may tell one as far"
 EITHER = "the other sign does as well"
+TOGETHER = "told only together with others of the model, which make up for it"
 WIDER = "widened by what is left unexplained"
 ALL_OF_IT = "what is left unexplained could be all of it"
 
@@ -64,12 +65,19 @@ class ParameterReport:
 
 
 def parameters(
-    problem: Problem, fit: Fit, left: Sequence[Leftover] = (), tried: int = 0, either: Mask | None = None
+    problem: Problem,
+    fit: Fit,
+    left: Sequence[Leftover] = (),
+    tried: int = 0,
+    either: Mask | None = None,
+    flat: Array | None = None,
 ) -> list[ParameterReport]:
     """Every value of a fit, in the order of its terms; ``left`` is what stands out of its residual. ``tried``:
     how many effects were in question, of which one in twenty is told from neutral for nothing (0: those of the fit). ``either``
-    (P,): values of which the other sign does as well (signs.py)."""
+    (P,): values of which the other sign does as well (signs.py); ``flat`` (P,): how far values may go together with others
+    (ridges.py)."""
     half_u = half_widths(problem, fit)
+    along = np.zeros(len(fit.u)) if flat is None else flat
     by_luck = math.sqrt(least_energy(tried)) / scipy.special.ndtri(0.5 + LEVEL / 2) if tried else 1.0
     wider = np.maximum(half_u, half_widths_by_rest(problem, fit, left))
     out, at = [], 0
@@ -79,7 +87,7 @@ def parameters(
         rooms = c.rooms(u)
         for k, (name, value) in enumerate(term.values):
             room = abs(float(rooms[k]))
-            half = float(w[k]) * room if np.isfinite(w[k]) else math.inf
+            half = max(float(w[k]), float(along[at + k])) * room if np.isfinite(w[k]) else math.inf
             # By the data alone: what earned its place is told, though something else may have gone into its value. At a bound the
             # slope is of one side, and may say next to nothing of a value that the other side would tell.
             flag = at_bound(c, k, float(u[k]), value, _described(problem.robot, c, k))
@@ -91,6 +99,8 @@ def parameters(
                 flag = HARDLY
             elif not flag and either is not None and either[at + k]:
                 flag = EITHER
+            if flag in ("", HARDLY, EITHER) and along[at + k] > s[k]:
+                flag = TOGETHER
             doubt = "" if w[k] <= s[k] else ALL_OF_IT if abs(u[k]) < w[k] else WIDER
             low, high = value - half, value + half
             if math.isfinite(half):  # no farther than physics allows
