@@ -19,7 +19,7 @@ from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import SAME, tells_nothing
-from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
+from ee_dist.discrepancy.ways.free_run.problem import ASTRAY, RESTART_S, FreeRun
 from ee_dist.effects.catalogue import term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -173,7 +173,10 @@ def test_a_model_that_stands_still_is_told() -> None:
     assert not any("stays where each window begins" in line for line in problem.remarks(()))
     (line,) = [line for line in problem.remarks(stuck) if "stays where each window begins" in line]
     off = problem.told(error(problem.residuals([stuck])[0]))
-    assert f"this model is by {off}" in line
+    assert f"this model is by {off}" in line and ASTRAY not in line
+    # A torque that drives it away.
+    (line,) = problem.remarks((term("offset_torque", loose.drives[0].joint, torque_nm=5.0),))[-1:]
+    assert ASTRAY in line and "stays where each window begins" in line
 
 
 def test_what_explains_by_standing_still_is_not_what_is_missing() -> None:

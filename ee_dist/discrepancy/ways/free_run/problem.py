@@ -40,6 +40,13 @@ GROWN = 10.0
 Below it noise is all of the floor: it is a bound, and hid what was found without it in simulated robots."""
 HARDLY_BETTER = 0.8
 """Share of the error of a robot that stays where it is, from which a model says next to nothing of the motion."""
+WORSE = 1.5
+"""Times as far off as a robot that stays where it is, from which a model goes the wrong way or too far,"""
+ASTRAY = (
+    "It goes the wrong way, or too far: are sign, scale and unit of commands and positions right, and gains and inertia of the "
+    "description?"
+)
+"""which is asked before"""
 MOVES = "Is there more in the record than rest, and is friction no more than what moved the joints?"
 AT_NOISE = 1.3
 """Times the noise floor up to which a model is right, be it of a robot at rest."""
@@ -340,7 +347,10 @@ class FreeRun(Problem):
             each = [other.told(error(r)) if len(self.units) == 1 else other.told_by_unit(r) for r in rows]
             out += [f"{how}: {_listed(each)}."]
         rest = self.says_nothing(models[-1])
-        return [*out, f"{rest[0].upper()}{rest[1:]}. {MOVES}"] if rest else out
+        if not rest:
+            return out
+        worse = error(self.residuals([models[-1]])[0]) > WORSE * self._at_rest
+        return [*out, f"{rest[0].upper()}{rest[1:]}. {ASTRAY + ' ' if worse else ''}{MOVES}"]
 
     def says_nothing(self, model: Hypothesis) -> str:
         """One with enough friction stands still, and most of a record is often rest."""
