@@ -116,7 +116,7 @@ def _gains(robot: Robot, target: str) -> dict[str, Range]:
     ranges=_gains,
     physics="The drive reads a larger or smaller position (speed, torque) than was sent: a wrong scale between the two, or, "
     "of torques, a motor whose constant is another.",
-    signature="The joint's position (or speed) is a scaled copy of the prediction, at any speed and load; led by torques it moves "
+    signature="The joint's position (or speed) is a scaled copy of the prediction, at any speed and load; by torques it moves "
     "more or less. Nothing shows at a command of zero.",
     everywhere=True,
 )
