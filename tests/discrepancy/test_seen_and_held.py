@@ -70,8 +70,20 @@ def test_joints_that_add_to_what_one_of_them_leaves_are_tried_together(above: fl
         return Screened(c, promise, (np.full(c.size, 0.1),), promise)
 
     screened = [promising(JOINTS[0], 740.0), promising(JOINTS[1], 200.0), promising(ALL_JOINTS, 800.0)]
-    found = _families(screened, [], 20.0, set(), above)
+    found = _families(screened, [], 20.0, set(), above, frozenset())
     assert [p.name for p, _ in found] == (["coulomb_friction@each of 2 joints"] if tried else [])
+
+
+@pytest.mark.parametrize(("effect", "left"), [("position_gain", 2), ("coulomb_friction", 3)])
+def test_a_joint_that_is_only_held_has_no_gain_of_its_own(effect: str, left: int) -> None:
+    """How far it sags says as much of a torque."""
+    places = JOINTS[:3]
+    screened = [
+        Screened(c := candidate(ROBOT, effect, place), promise, (np.full(c.size, 0.1),), promise)
+        for place, promise in [*((p, 500.0) for p in places), (ALL_JOINTS, 600.0)]
+    ]
+    ((proposal, _),) = _families(screened, [], 20.0, set(), 1000.0, frozenset(places[:1]))
+    assert len(proposal.parts) == left
 
 
 def test_small_values_are_fitted_anew_beside_what_came_in_the_place_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
