@@ -117,6 +117,19 @@ def test_goals_of_positions_in_the_log_of_drives_described_to_obey_torques_are_t
     assert "'command: position' with kp and kd" in asked
 
 
+def test_what_may_be_the_command_of_a_torque_drive_is_asked_about(tmp_path: Path) -> None:
+    """As where positions are looked for: of columns that say nothing it may be any."""
+    described = samples.robot_file(tmp_path)
+    described.write_text(described.read_text().replace("kp: 20", "command: torque, torque_limit: 5"))
+    robot, _ = load_robot(described)
+    table = logs.frame_of(
+        T, wave(T - 0.05), np.cos(3.0 * T[:, None] + np.arange(2)), "{joint}_{what}", what=("pos", "push")
+    )
+    proposal = proposal_for([logs.written(tmp_path, table)], robot, Hints())
+    (asked,) = (q for q in proposal.questions if q.startswith("commands"))
+    assert ": is it shoulder_push, elbow_push? write" in asked
+
+
 @pytest.mark.parametrize(
     ("rate_hz", "said"), [(40.0, "rows are readings of the sensors"), (80.0, "lie in gaps between")]
 )

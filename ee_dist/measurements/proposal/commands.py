@@ -62,7 +62,16 @@ def add_commands(v: View) -> None:
             )
             return
         rivals = " or ".join(s.block.name for s in sorted(found, key=lambda s: -s.score)[:3])
-        told = f"commands: {rivals}?" if rivals else f"commands: no columns look like {kind}s that were asked for;"
+        mute = [
+            b.name
+            for b in v.blocks
+            if not b.used and b is not v.position.block and v.moves(b)
+            if (b.reading.kind is None or b.reading.weak) and b.reading.command is not False
+        ]
+        asked = f": is it {' or '.join(mute[:3])}?" if mute else ";"
+        told = (
+            f"commands: {rivals}?" if rivals else f"commands: no columns look like {kind}s that were asked for{asked}"
+        )
         v.out.ask(f"{told} write the right ones into the mapping{_voltages(v, kind) or _goals(v, kind)}")
         for n in names:
             v.out.choices.append(Choice("commands", n, {"column": "???"}, UNKNOWN, "not found"))
