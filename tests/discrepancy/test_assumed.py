@@ -325,6 +325,7 @@ def test_few_guesses_go_before_many_numbers_at_sound_parts(
     monkeypatch.setattr(judge, "tied", lambda *_: False)
     order = judge.ranked([judged("each", 12, False, 0.8), judged("guess", size, True, gain)])  # type: ignore[arg-type,list-item]
     assert [order[0].name, [j.rank for j in order]] == [first, [1, 2]]
+    assert order[0].tied_with == [], "what it goes before does not do as well"
 
 
 def test_a_guess_is_judged_beside_whatever_promises_more() -> None:

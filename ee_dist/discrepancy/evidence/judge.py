@@ -240,10 +240,11 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
             for j in ordered
             if j.earned and j.proposal.guess and j.proposal.size < first.proposal.size and j.gain >= HALF * first.gain
         ]
-        if fewer and not first.proposal.guess:
+        sooner = bool(fewer) and not first.proposal.guess
+        if sooner:
             first = max(fewer, key=lambda j: j.gain)
         first = min((j for j in ordered if j.name in first.tied_with and _fuller(j, first)), key=_left, default=first)
-        if first is not best:
+        if first is not best and not sooner:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
             first.tied_with = [name for name in others if name != first.name]
