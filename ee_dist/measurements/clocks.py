@@ -24,6 +24,8 @@ FASTEST_S, SLOWEST_S = 2e-4, 0.45
 QUICKEST_S = 9e-5
 """The least of one that says its unit: servo drives log at 10 kHz."""
 KEPT = 0.05
+MOSTLY = 0.5
+"""Share of its steps in which a column must rise to be a clock of these rows."""
 _A_TIME = re.compile(r"time|clock|stamp", re.IGNORECASE)
 TORN = 0.5
 """A single gap of more than this share of the record, or a record stretched by it, is a wrong time stamp."""
@@ -75,14 +77,15 @@ def clocked(table: Table, time: Column | Even | None, where: str) -> Clocked:
 
 
 def other_clocks(main: Clocked) -> dict[str, float]:
-    """How far the other columns of a table go that are called a time and rise from row to row."""
+    """How far the other columns of a table go that are called a time and rise from row to row, but for a few; whole seconds are
+    off by up to one."""
     found: dict[str, float] = {}
     for address in main.table.addresses():
         if address == main.name or not _A_TIME.search(address):
             continue
         with contextlib.suppress(MeasurementError):
             values = main.table.numbers(address)
-            if (np.diff(values) >= 0).all() and values[-1] > values[0]:
+            if (np.diff(values) >= 0).all() and (np.diff(values) > 0).mean() > MOSTLY:
                 found[address] = float(values[-1] - values[0])
     return found
 

@@ -71,8 +71,13 @@ def test_words_for_what_was_asked_and_measured_share_out_columns_in_an_order_tha
 
 def test_another_clock_of_the_same_rows_that_lasts_otherwise_is_told(tmp_path: Path) -> None:
     table = frame(0)
-    for name, rate, told in (("hw_timestamp", 0.5, True), ("hw_timestamp", 1e6, False), ("loop_time", 0.0, False)):
-        file = logs.written(tmp_path, table.assign(**{name: rate * T + 7.0}))
+    for name, other, told in (
+        ("hw_timestamp", 0.5 * T + 7.0, True),
+        ("hw_timestamp", 1e6 * T, False),
+        ("loop_time", 0.0 * T, False),
+        ("stamp_sec", np.floor(T + 0.9), False),
+    ):
+        file = logs.written(tmp_path, table.assign(**{name: other}))
         _, report = logs.imported(tmp_path, file, LEGS)
         said = [s for s in report.suspicious if s.startswith("time:")]
         assert bool(said) == told, said
