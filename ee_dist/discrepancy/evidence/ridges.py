@@ -22,6 +22,7 @@ TIMES = 4
 """as often."""
 FOLLOWED = 4
 """Steps by which the others follow (the chord method: Newton's with slopes that stay)."""
+DOING = "how far values go together"
 FLAT = 0.1
 """Share of what slopes foretell that a profile may rise by and be called flat."""
 
@@ -38,6 +39,7 @@ def flat_widths(search: Search, fit: Fit) -> Array:
     going = [(k, side) for k in range(len(fit.u)) if np.isfinite(half[k]) and 0 < half[k] < 1 for side in (1.0, -1.0)]
     begin = dict.fromkeys(going, fit.u)
     for n in range(TIMES):
+        search.progress(DOING, n / TIMES)
         goals = {(k, side): fit.u[k] + side * APART * 2.0**n * half[k] for k, side in going}
         able = [one for one in going if fit.model.lower[one[0]] <= goals[one] <= fit.model.upper[one[0]]]
         reached = _followed(search, fit, normal, {one: (goals[one], begin[one]) for one in able})
