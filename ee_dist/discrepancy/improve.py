@@ -28,9 +28,9 @@ from ee_dist.discrepancy.evidence.holdout import (
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise, settled
-from ee_dist.discrepancy.evidence.ridges import flat_widths
 from ee_dist.discrepancy.evidence.rule import LUCK, NEAR, no_more_than_noise
 from ee_dist.discrepancy.evidence.signs import either_sign
+from ee_dist.discrepancy.evidence.together import flat_widths
 from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.exchanges import exchanged, refitted, twins_of

@@ -64,6 +64,8 @@ def _without_scale(search: Search, current: Current, own: int) -> tuple[Current,
     units = [*masses, [k for (k,) in masses]] if len(masses) > 1 else masses
     starts = [(unit, without_masses(search.problem.robot, model, current.u, unit)) for unit in units]
     found = [(unit, u) for unit, u in starts if u is not None]
+    if not found:
+        return current, ()
     left = [Model(tuple(c for k, c in enumerate(current.parts) if k not in unit)) for unit, _ in found]
     rows = search.residuals(
         [model.hypothesis(current.u), *(m.hypothesis(u) for m, (_, u) in zip(left, found, strict=True))]

@@ -16,7 +16,7 @@ from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.effects.catalogue import Hypothesis, Term, find, term
 from ee_dist.effects.groups import groups
-from ee_dist.robots.instruments import MOTOR_TORQUE
+from ee_dist.robots.instruments import measures_torques
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -68,7 +68,7 @@ def _change(t: Term) -> float:
 def of_masses(robot: Robot, terms: Hypothesis) -> bool:
     """Whether a model says how strong all its motors are, or their controllers, and nothing was measured that says how large a
     torque is: what it tells of torques then goes with the masses."""
-    if any(s.kind in ("torque", MOTOR_TORQUE) for s in robot.sensors):
+    if measures_torques(robot):
         return False
     told: dict[str, set[str]] = {}
     for t in terms:

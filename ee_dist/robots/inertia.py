@@ -98,9 +98,8 @@ def _fixed(values: Array) -> Array:
 def _reach(joint: Joint) -> tuple[float, float]:
     """The part of a joint's range around zero in which poses are looked at; of a range beyond a turn the end that is nearest."""
     widest = math.pi if joint.kind == "hinge" else 1.0
-    low, high = max(joint.lower, -widest), min(joint.upper, widest)
-    if low <= high:
-        return low, high
-    return (joint.lower, min(joint.upper, joint.lower + widest)) if joint.lower > 0 else (
-        max(joint.lower, joint.upper - widest), joint.upper
-    )  # fmt: skip
+    if joint.lower > widest:
+        return joint.lower, min(joint.upper, joint.lower + widest)
+    if joint.upper < -widest:
+        return max(joint.lower, joint.upper - widest), joint.upper
+    return max(joint.lower, -widest), min(joint.upper, widest)

@@ -23,3 +23,8 @@ def with_motor_torques(robot: Robot) -> Robot:
 
 def _slides(robot: Robot, joint: str) -> bool:
     return bool(robot.joint(joint).kind == "slide")
+
+
+def measures_torques(robot: Robot) -> bool:
+    """Whether some sensor of the robot says how large a torque is, a joint's or a motor's."""
+    return any(s.kind in ("torque", MOTOR_TORQUE) for s in robot.sensors)

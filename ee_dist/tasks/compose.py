@@ -41,7 +41,7 @@ USED_BY = {
     "system": (("recover",), "the others know robots only"),
     "robot": (
         ("recover", "online", "trial", "import", "workbench"),
-        "the others take the robot from the log or the model file",
+        "task=robot reads urdf=FILE or mjcf=FILE, the others take the robot from the log or the model file",
     ),
     "measured": (
         ("compare", "explain", "improve", "import", "plan", "workbench"),
@@ -167,8 +167,6 @@ def check_used(overrides: list[str], task: str) -> None:
         if task not in verbs and value != "null":
             *most, last = (f"task={v}" for v in verbs)
             having = f"{', '.join(most)} and {last}" if most else last
-            if task == "robot" and name.partition(".")[0] == "robot":
-                instead = "task=robot reads urdf=FILE or mjcf=FILE"
             hint = f", {instead}" if instead else ""
             raise ConfigError(f"{short(override)}: task={task} has no use for it; it is for {having}{hint}")
         other = next((o for o in overrides if re.match(r"\+{0,2}system=", o)), None)

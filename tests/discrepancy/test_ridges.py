@@ -1,81 +1,76 @@
-"""Values that only hold together with others: what slopes over finite steps tell, and what a profile shows."""
+"""A valley that slopes lead down, and a deeper one behind a ridge."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from way_samples import Sample, measure, problem_by
+from linear_problem import PER, ROBOT, SEGMENTS, Linear
 
-from ee_dist.discrepancy.evidence.holdout import PRIOR
-from ee_dist.discrepancy.evidence.intervals import TOGETHER, ParameterReport, half_widths, parameters
-from ee_dist.discrepancy.evidence.ridges import flat_widths
 from ee_dist.discrepancy.search.candidates import candidate
-from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.fitted import Fit, Model
+from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
-from ee_dist.effects.catalogue import Hypothesis, term
-from ee_dist.robots.servo_pendulum import servo_pendulum
-from ee_dist.trials.excitation import Excitation
-from ee_dist.trials.noise import with_noise
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.trials.log import Array
 
-PENDULUM = with_noise(servo_pendulum(), 1e-3)
-SERVO, ARM = PENDULUM.motor_names[0], PENDULUM.parts[1].name
-LED = PENDULUM.map_drive(SERVO, lambda d: replace(d, command="torque", kp=0.0, kd=0.0, speed_limit=np.inf))
-"""It obeys torques, so that nothing but its masses says how large these are."""
-TRUTH = (
-    term("rotor_inertia", SERVO, added_kg_m2=0.0015),
-    term("command_gain", SERVO, change=0.6),
-    term("coulomb_friction", SERVO, torque_nm=0.019),
-    term("viscous_friction", SERVO, damping_nm_s_rad=0.0074),
-)
-PLAN = tuple(
-    Excitation(k, 3.0, a, n) for k, a, n in (("multisine", 0.2, 1), ("steps", 0.15, 2), ("slow_sines", 0.1, 3))
-)
+PARTS = tuple(candidate(ROBOT, name, ROBOT.motor_names[0]) for name in ("viscous_friction", "coulomb_friction"))
+TRUTH = np.array([0.4, 0.3])
+SIZE = 5.0
 
 
-def told(terms: Hypothesis) -> tuple[dict[str, ParameterReport], np.ndarray, np.ndarray]:
-    """Reports of the values of these terms, fitted from there; half intervals by slopes, and how far values go together."""
-    search = Search(problem_by("open_loop", measure(Sample(LED, PLAN, TRUTH, ()), TRUTH), LED))
-    model = Model(tuple(candidate(LED, t.effect, t.target) for t in terms))
-    start = np.concatenate([c.shares(dict(t.values)) for c, t in zip(model.parts, terms, strict=True)])
-    (fit,) = follow_valley(search, [(model, start)], search.everything, PRIOR)
-    flat = flat_widths(search, fit)
-    reports = parameters(search.problem, fit, flat=flat)
-    return {t.effect: p for t, p in zip(terms, reports, strict=True)}, half_widths(search.problem, fit), flat
+class Paces(Linear):
+    """A swing whose pace one value sets, so that a swing more or less is a valley of its own, and whose size the other sets."""
+
+    def __init__(self) -> None:
+        super().__init__(())
+        self.noise = np.random.default_rng(3).standard_normal(SEGMENTS * PER)
+
+    def swing(self, u: Array) -> Array:
+        time = np.arange(SEGMENTS * PER) * 0.01
+        return np.asarray(SIZE * (0.5 + u[1]) * np.sin(12.0 * time * (1.0 + 0.3 * u[0])))
+
+    def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
+        rows = []
+        for h in hypotheses:
+            u = [c.shares(dict(t.values))[0] for c, t in zip(PARTS, h, strict=False)] + [0.0] * (2 - len(h))
+            rows.append(self.noise + self.swing(TRUTH) - self.swing(np.array(u)))
+        return np.array(rows)
 
 
-def test_values_that_all_grow_with_a_mass_hold_only_together() -> None:
-    tenth_more = (
-        term("part_mass", ARM, change=0.1),
-        term("rotor_inertia", SERVO, added_kg_m2=1.1 * 0.0035 - 0.002),
-        term("command_gain", SERVO, change=1.1 * 1.6 - 1.0),
-        term("coulomb_friction", SERVO, torque_nm=1.1 * 0.019),
-        term("viscous_friction", SERVO, damping_nm_s_rad=1.1 * 0.0074),
-    )
-    found, half, flat = told(tenth_more)
-    assert half[2] < 0.05, "slopes tell the gain, though it may be anything"
-    assert flat[2] > 0.3
-    gain = found["command_gain"]
-    assert gain.flag == TOGETHER and gain.low < 0.3 and gain.high > 1.5
-    assert found["rotor_inertia"].flag == TOGETHER
+def descend(problem: Paces, start: float) -> Fit:
+    search = Search(problem)
+    return follow_valley(search, [(Model(PARTS), np.array([start, 0.3]))], search.everything, widths=(0.01,))[0]
 
 
-def test_values_of_which_the_masses_tell_the_size_are_told_as_slopes_say() -> None:
-    found, _, flat = told(TRUTH)
-    assert not flat.any()
-    for t in TRUTH:
-        p = found[t.effect]
-        assert p.low < t.values[0][1] < p.high and p.flag == "", p
-    assert found["command_gain"].high - found["command_gain"].low < 0.2
+@pytest.mark.parametrize("start", [0.12, 0.68])
+def test_the_deeper_valley_is_found_from_the_other(start: float) -> None:
+    problem = Paces()
+    caught = descend(problem, start)
+    assert caught.energy > 3.0 * len(problem.noise)
+    found = over_ridges(Search(problem), caught)
+    assert found.u == pytest.approx(TRUTH, abs=0.02)
+    assert found.energy < 1.1 * len(problem.noise)
 
 
-@pytest.mark.parametrize("count", [1, 17])
-def test_a_single_value_and_very_many_are_left_as_they_are(count: int) -> None:
-    search = Search(problem_by("open_loop", measure(Sample(LED, PLAN[:1], (), ()), ()), LED))
-    (one,) = follow_valley(
-        search, [(Model((candidate(LED, "command_gain", SERVO),)), np.zeros(1))], search.everything, PRIOR, 1
-    )
-    many = replace(one, u=np.zeros(count), slopes=np.repeat(one.slopes, count, axis=1))
-    assert not flat_widths(search, many).any()
+def test_what_is_at_the_noise_stays_as_it_is() -> None:
+    problem = Paces()
+    fit = descend(problem, 0.41)
+    assert over_ridges(Search(problem), fit) is fit
+
+
+def test_only_the_values_that_were_fitted_count() -> None:
+    """What is held out has no say in which valley it is."""
+    problem = Paces()
+    search = Search(problem)
+    mask = np.arange(len(problem.noise)) < 0.8 * len(problem.noise)
+    (caught,) = follow_valley(search, [(Model(PARTS), np.array([0.12, 0.3]))], mask, widths=(0.01,))
+    problem.noise[~mask] = 100.0
+    again = over_ridges(search, caught)
+    problem.noise[~mask] = -50.0
+    other = over_ridges(search, caught)
+    assert np.array_equal(again.u, other.u)
+    assert again.energy < 0.5 * caught.energy
+    assert again.mask is caught.mask

@@ -75,7 +75,7 @@ def parameters(
     """Every value of a fit, in the order of its terms; ``left`` is what stands out of its residual. ``tried``:
     how many effects were in question, of which one in twenty is told from neutral for nothing (0: those of the fit). ``either``
     (P,): values of which the other sign does as well (signs.py); ``flat`` (P,): how far values may go together with others
-    (ridges.py)."""
+    (together.py)."""
     half_u = half_widths(problem, fit)
     along = np.zeros(len(fit.u)) if flat is None else flat
     by_luck = math.sqrt(least_energy(tried)) / scipy.special.ndtri(0.5 + LEVEL / 2) if tried else 1.0

@@ -11,7 +11,7 @@ import numpy as np
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates
 from ee_dist.effects.groups import JOIN
-from ee_dist.robots.instruments import MOTOR_TORQUE
+from ee_dist.robots.instruments import measures_torques
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of, top_speed
 
@@ -42,13 +42,14 @@ def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] =
 
 def no_scale(robot: Robot, names: Collection[str]) -> bool:
     """Whether nothing says how large torques are but the masses: motion alone is compared, gains and rotors of all drives were
-    assumed, and both are among the ``names`` of what is looked for. One factor on all of these is then the same as one on all
-    masses, of which the description is the better witness."""
+    assumed, and gains and friction are among the ``names`` of what is looked for. One factor on all of these is then the same as
+    one on all masses, of which the description is the better witness."""
     driven = {d.joint for d in robot.drives if d.command != "none"}
     guessed = driven <= {*robot.assumed_joints("kp")} & {*robot.assumed_joints("rotor_inertia")}
     looked_for = {name.partition("@")[0] for name in names}
-    seen = any(s.kind in ("torque", MOTOR_TORQUE) for s in robot.sensors)
-    return bool(driven) and guessed and not seen and {"position_gain", "coulomb_friction"} <= looked_for
+    return (
+        bool(driven) and guessed and not measures_torques(robot) and {"position_gain", "coulomb_friction"} <= looked_for
+    )
 
 
 def held_still(problem: Problem) -> frozenset[str]:
