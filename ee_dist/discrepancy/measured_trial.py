@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 import scipy  # which loads its parts when they are used: signals take a second
 
+from ee_dist.discrepancy.past import Past, limited
 from ee_dist.discrepancy.steps import SPEEDS, between_steps, held
 from ee_dist.effects.catalogue import Hypothesis, applied, term
 from ee_dist.effects.fixture import STAND
@@ -16,10 +17,30 @@ from ee_dist.engines.drivers import Commands, Driver, Network
 from ee_dist.engines.halfway import goes_halfway
 from ee_dist.robots.model import Robot
 from ee_dist.trials.excitation import Excitation
-from ee_dist.trials.log import Array, SensorLog
+from ee_dist.trials.log import Array, SensorLog, State
 
 SMOOTHED, SMOOTH_ORDER = 15, 2
 """Rows that a parabola is laid through to smooth a noisy speed; its order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """How a stretch from within a record begins: so long (s) after the record, with its joints where they were measured."""
+
+    after_s: float
+    state: State
+    past: Past
+
+    def start(self, model: Robot) -> State:
+        """With the goals to which limited controllers of a model have come."""
+        return replace(self.state, goals=self.past.goals(model)) if any(map(limited, model.drives)) else self.state
+
+    def later(self, model: Robot) -> Robot:
+        """The model whose clocks begin with the record, as one whose begin with the stretch: what sticks from some time on."""
+        if not any(s.stuck and s.stuck_from_s for s in model.sensors):
+            return model
+        sensors = tuple(replace(s, stuck_from_s=max(0.0, s.stuck_from_s - self.after_s)) for s in model.sensors)
+        return replace(model, sensors=sensors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +60,8 @@ class MeasuredTrial:
     commands_held: bool | None = False
     hardware: bool = False
     """Whether it is known to be no simulation of ours, whatever became of its commands."""
+    begun: Begun | None = None
+    """Of a stretch from within a record, how it begins."""
 
     @property
     def real(self) -> bool:

@@ -218,6 +218,11 @@ class Problem(ABC):
         return self
 
     @property
+    def whole(self) -> Problem:
+        """For people to look at: all of these measurements, of which a search may have taken a part."""
+        return self
+
+    @property
     def as_searched(self) -> Problem:
         """The measure that a search goes by, of all of these trials, for what took no part in it: errors stand beside those of
         the search."""

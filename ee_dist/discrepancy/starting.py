@@ -40,6 +40,8 @@ def start_of(trial: MeasuredTrial, robot: Robot) -> State | None:
     its description says if it is simulated; a real one with its joints as they were read, tilted as its sensors say, and on the
     floor."""
     log = trial.log
+    if trial.begun is not None:
+        return trial.begun.start(robot)
     if log.joints is None or not np.abs(log.joints[0]).max() > 0 or (robot.free_base and not trial.real):
         return None
     speeds, _ = _first_speeds(trial, speed_sensors(robot), goes_halfway(robot))
@@ -51,8 +53,8 @@ def starts_beside(trial: MeasuredTrial, robot: Robot) -> list[State]:
     """Where it may have begun as well: one standard deviation of the noise that sensors of speed declare beside ``start_of``, a
     joint at a time. None where that is not told by them, or it stood."""
     start = start_of(trial, robot)
-    if start is None:
-        return []
+    if start is None or trial.begun is not None:
+        return []  # what a stretch begins with is forgotten before it is compared
     _, off = _first_speeds(trial, speed_sensors(robot), goes_halfway(robot))
     return [replace(start, speeds=start.speeds + step) for step in np.diag(off) if step.any()]
 

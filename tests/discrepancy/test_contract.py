@@ -11,7 +11,7 @@ from way_samples import CASES, evaluator_for, measured, problem, problem_by, sam
 
 from ee_dist.discrepancy.compare import compare, regimes
 from ee_dist.discrepancy.evidence.left import leftovers
-from ee_dist.discrepancy.problem import Problem, error
+from ee_dist.discrepancy.problem import Problem, Series, error
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
@@ -27,7 +27,7 @@ every_way = pytest.mark.parametrize(("name", "way"), CASES, ids=[f"{n}-{w}" for 
 def test_every_value_has_its_place(name: str, way: str) -> None:
     p = problem(name, way)
     layout, n = p.layout, len(p.segment_of)
-    assert p.way == way
+    assert p.way == way.removesuffix(" by stretches")
     for facts in (layout.channel_of, layout.time_s, layout.reading, layout.floor, layout.known, p.trial_of):
         assert facts.shape == (n,)
     assert set(p.segment_of) == set(range(len(p.segments))), "no segment is empty"
@@ -80,12 +80,21 @@ def test_an_effect_at_its_neutral_value_changes_nothing(name: str, way: str) -> 
         np.testing.assert_allclose(row, base, atol=1e-9, err_msg=str(t))
 
 
+def end_to_end(series: list[Series]) -> list[Series]:
+    """One of each trial and channel, stretches of it one after another."""
+    found: dict[tuple[int, int], list[Series]] = {}
+    for s in series:
+        found.setdefault((s.trial, s.channel), []).append(s)
+    names = ("times_s", "measured", "predicted")
+    return [replace(s[0], **{n: np.concatenate([getattr(x, n) for x in s]) for n in names}) for s in found.values()]
+
+
 @every_way
 def test_raw_values_are_measured_less_predicted_in_the_units_of_the_channels(name: str, way: str) -> None:
     p, hidden = problem(name, way), samples()[name].hidden
     raw = p.raw(p.residuals([()])[0])
     assert raw.shape == p.segment_of.shape and np.isfinite(raw[p.layout.reading]).all()
-    said = p.series(())
+    said = end_to_end(p.series(()))
     seen = [k for k, c in enumerate(p.channels) if not c.startswith("command_")]
     assert {(s.trial, s.channel) for s in said} == {(k, c) for k in range(len(p.trials)) for c in seen}
     for s in said:

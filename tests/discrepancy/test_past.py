@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from way_samples import Sample, evaluator_for, measure
 
+from ee_dist.discrepancy.past import Past
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.ways.free_run.past import Past
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.effects.catalogue import apply, term
 from ee_dist.robots.servo_pendulum import servo_pendulum

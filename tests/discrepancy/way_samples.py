@@ -14,6 +14,7 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.discrepancy.ways.open_loop.stretches import at_most, stretches
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.contract import Engine
 from ee_dist.engines.drivers import Commands
@@ -125,8 +126,11 @@ def problem_by(
     way: str, trials: tuple[MeasuredTrial, ...], robot: Robot, evaluator: Evaluator | None = None
 ) -> Problem:
     evaluator = evaluator or evaluator_for(robot)
-    if way == "open_loop":
-        return OpenLoop(trials, robot, evaluator)
+    if way.startswith("open_loop"):
+        whole = OpenLoop(trials, robot, evaluator)
+        if way == "open_loop":
+            return whole
+        return whole.of(trials, at_most(stretches(robot, trials, whole.window, 0.7), 2))
     return FreeRun(trials, robot, evaluator) if way == "free_run" else ForceBalance(trials, robot)
 
 
@@ -176,3 +180,4 @@ def problem(name: str, way: str) -> Problem:
 
 CASES = [(name, way) for name in ("pendulum", "stage", "arm", "quadruped")
          for way in ("open_loop", "free_run", "force_balance") if name != "quadruped" or way == "open_loop"]  # fmt: skip
+CASES += [("arm", "open_loop by stretches")]

@@ -63,7 +63,7 @@ def improve_scene(
 def said(problem: Problem, label: str, terms: Hypothesis) -> drawn.Account:
     """What a model says of each trial: simulated where the way simulates, else the channels that it compares."""
     motions = problem.simulated(terms)
-    series = problem.series(terms)
+    series = problem.whole.series(terms)
     logs = []
     for k, (trial, motion) in enumerate(zip(problem.measured, motions, strict=True)):
         # Of a trial in windows the first, which is what is simulated.

@@ -36,7 +36,9 @@ Models = Sequence[tuple[str, Hypothesis]]
 def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
     """Every channel of every trial, with the error that the first of the models leaves there."""
     rms = by_trial(problem, residual)
-    later = [{(s.trial, s.channel): s.predicted for s in joined(problem.series(terms))} for _, terms in models[1:]]
+    later = [
+        {(s.trial, s.channel): s.predicted for s in joined(problem.whole.series(terms))} for _, terms in models[1:]
+    ]
     return [
         Overlay(
             plain(problem.channels[s.channel]),
@@ -48,7 +50,7 @@ def curves(problem: Problem, residual: Array, models: Models) -> list[Overlay]:
             later[0].get((s.trial, s.channel)) if later else None,
             float(rms[s.trial, s.channel]),
         )
-        for s in joined(problem.series(models[0][1]))
+        for s in joined(problem.whole.series(models[0][1]))
     ]
 
 

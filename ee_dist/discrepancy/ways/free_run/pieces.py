@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
+from ee_dist.discrepancy.past import Past, limited
 from ee_dist.discrepancy.problem import Index
 from ee_dist.discrepancy.starting import starting_speeds
-from ee_dist.discrepancy.ways.free_run.past import Past, limited
+from ee_dist.discrepancy.thinning import one_of_each
 from ee_dist.effects.scales import longest_delay
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -23,7 +24,6 @@ from ee_dist.trials.log import Array, SensorLog, State
 
 MOST_STEPS, FEWEST = 60_000, 6
 """Steps that a search simulates for each model at most, of windows that start anew; but so many windows of each trial."""
-GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True)
@@ -209,9 +209,7 @@ def thinned(windows: Sequence[Piece], one_in: int) -> list[Piece]:
     of_trial: dict[int, list[Piece]] = {}
     for p in windows:
         of_trial.setdefault(p.trial, []).append(p)
-    found = []
+    found: list[Piece] = []
     for own in of_trial.values():
-        for k, first in enumerate(range(0, len(own), one_in)):
-            some = own[first : first + one_in]
-            found.append(some[int((k * GOLDEN) % 1.0 * len(some))])
+        found += one_of_each(own[first : first + one_in] for first in range(0, len(own), one_in))
     return found

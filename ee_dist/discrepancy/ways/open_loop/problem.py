@@ -8,13 +8,15 @@ compare how noisy and how frozen the channel is, which is all that a noisy or dr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
+from ee_dist.basics.names import counted
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
-from ee_dist.discrepancy.problem import Layout, Problem, Series, joints_of
+from ee_dist.discrepancy.problem import Index, Layout, Problem, Series, joints_of
 from ee_dist.discrepancy.ways.open_loop.falls import fallen
 from ee_dist.discrepancy.ways.open_loop.in_units import InUnits, farther_off, in_units, told_in_units
 from ee_dist.discrepancy.ways.open_loop.predictability import MEMBERS, ensemble
@@ -30,6 +32,16 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
     rollout_of,
 )
 from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale
+from ee_dist.discrepancy.ways.open_loop.stretches import (
+    STRETCH_S,
+    Stretch,
+    at_most,
+    enough,
+    forgets,
+    stretches,
+    too_long,
+    whole,
+)
 from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving, repeating
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
 from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
@@ -78,7 +90,8 @@ class OpenLoop(Problem):
     are a segment. Rows that an import filled in are simulated and not compared. ``unmodelled`` widens the scales by what a
     calibrated model is known to leave; ``gained``: energy that an effect took off an untouched robot.
     ``before``: what the model is believed to have; the spread of ``members`` neighbours of that model weighs the
-    residuals. ``scale``: of the channels, where it is known.
+    residuals. ``scale``: of the channels, where it is known. ``parts``: the stretches of the trials that are compared, where
+    these are long; each trial as a whole where none are given.
     """
 
     way = "open_loop"
@@ -95,10 +108,14 @@ class OpenLoop(Problem):
         before: Hypothesis = (),
         members: int = MEMBERS,
         scale: Scale | None = None,
+        parts: Sequence[Stretch] = (),
     ) -> None:
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
         spacing = reading_s(trials)
         self.block = block if not spacing else min(block, max(1, round(BLOCK_S / spacing)))
+        self._whole: OpenLoop | None = None
+        self.parts = tuple(parts) or whole(trials)
+        trials = [p.run for p in self.parts]
         self._rows = [len(t.log.readings) for t in trials]
         # Of a single window nothing could be held out.
         window = min(window, sum(self._rows) // 2)
@@ -106,9 +123,9 @@ class OpenLoop(Problem):
         block, window = self.block, self.window
         self._members, self._before = members, before
         self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}
-        self.scale = scale or channel_scale(robot, trials)
+        self.scale = scale or channel_scale(robot, self.measured)
         self._unmodelled, self.gained, self.calibrated = unmodelled or {}, gained, unmodelled is not None
-        self.predictor = Predictor(self.measured, robot, evaluator, block, window)
+        self.predictor = Predictor(trials, robot, evaluator, block, window)
         self._looped = tuple(k for k, t in enumerate(trials) if isinstance(t.driver, Network))
         rows = self.predictor.rows
         read = [of_rows(t.log.sensors, r) for t, r in zip(trials, rows, strict=True)]
@@ -138,13 +155,37 @@ class OpenLoop(Problem):
     def trust(self) -> tuple[float, ...]:
         return self._trust
 
+    @cached_property
+    def searched(self) -> OpenLoop:
+        """Of records that would take a search too long some stretches, where these tell as much."""
+        if self._whole is not None or not too_long(self.robot, self.measured) or not forgets(self.robot, self.measured):
+            return self
+        parts = stretches(self.robot, self.measured, self.window)
+        some = at_most(parts, enough(self.robot, parts)) if parts else ()
+        return self if len(some) == len(parts) else self.of(self.measured, some)
+
+    @property
+    def whole(self) -> OpenLoop:
+        return self._whole or self
+
+    @property
+    def piece_of(self) -> Index:
+        return np.repeat(np.arange(len(self.parts)), [s.stop - s.start for s in self.slices])
+
     def beginning(self, seconds: float) -> Problem:
+        if self._whole is not None:
+            some = at_most(self.parts, max(2, round(seconds / STRETCH_S)))
+            return self if len(some) == len(self.parts) else self.of(self.measured, some)
         rows = [int(np.searchsorted(t.log.times_s, t.log.times_s[0] + seconds)) for t in self.measured]
         if self.looped or sum(rows) > SAVED * sum(len(t.log) for t in self.measured):
             return self
         # What a stretch at rest says of the noise of a channel is not what the whole log says.
-        return OpenLoop(
-            [replace(t, log=t.log.head(n)) for t, n in zip(self.measured, rows, strict=True)],
+        return self.of([replace(t, log=t.log.head(n)) for t, n in zip(self.measured, rows, strict=True)])
+
+    def of(self, trials: Sequence[MeasuredTrial], parts: Sequence[Stretch] = ()) -> OpenLoop:
+        """The same of other trials, or of ``parts`` of its own."""
+        found = OpenLoop(
+            trials,
             self.robot,
             self.evaluator,
             self.block,
@@ -154,13 +195,17 @@ class OpenLoop(Problem):
             self._before,
             self._members,
             self.scale,
+            parts,
         )
+        if parts:
+            found._whole = self.whole
+        return found
 
     def _weigh(self, before: Hypothesis) -> None:
         """Standard deviations of block means (blocks, S) and of the log of roughness (windows, S), trial by trial."""
         models = [apply(self.robot, before)]
         models += ensemble(models[0], self._members)
-        pairs = [(k, m) for k in range(len(self.measured)) for m in self._held(models, k)]
+        pairs = [(k, m) for k in range(len(self.parts)) for m in self._held(models, k)]
         found = self.predictor.digests(pairs)
         seen = zip(self._data, found[:: len(models)], self._moving, strict=True)
         self.repeating = repeating(self.robot, seen, self.window)
@@ -168,7 +213,7 @@ class OpenLoop(Problem):
         self._begun = [self.predictor.by_start(k, held) for k, held in pairs[:: len(models)]]
         self.deviation: list[Array] = []
         self.grain_deviation: list[Array] = []
-        for k in range(len(self.measured)):
+        for k in range(len(self.parts)):
             mine = found[k * len(models) : (k + 1) * len(models)]
             base, others = mine[0], [d for d in mine[1:] if d.finite]
             noise = self.scale.scale**2 / self.block + self._begun[k] + self._known(k)[0]
@@ -182,7 +227,9 @@ class OpenLoop(Problem):
 
         quiet = np.array([s.kind != "touch" for s in self.robot.sensors])
         alone = self.scale.scale**2 / self.block
-        self._trust = tuple(float(1.0 / np.mean((d**2 / alone)[:, quiet])) for d in self.deviation)
+        widened = np.array([float(np.mean((d**2 / alone)[:, quiet])) for d in self.deviation])
+        of = np.array([p.trial for p in self.parts])
+        self._trust = tuple(float(1.0 / np.mean(widened[of == k])) for k in range(len(self.measured)))
 
     @property
     def _tiny(self) -> Array:
@@ -215,15 +262,23 @@ class OpenLoop(Problem):
 
     @property
     def notes(self) -> list[str]:
-        return [
+        lines = [
             f"Most {kind} sensors repeat readings more often than the model's (coarse steps, rows that were filled "
             "in): how often they do is not compared."
             for kind in sorted(self.repeating)
         ]
+        if self._whole is not None:
+            compared = sum(self._rows) * (reading_s(self.measured) or self.robot.time_step_s)
+            lasting = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)
+            lines.append(
+                f"So that the search ends, it goes by {counted(len(self.parts), 'stretch', 'stretches')} of {lasting:.0f} s, "
+                f"{compared:.0f} s together, each begun from the measured positions; compare takes all of it."
+            )
+        return lines
 
-    def _known(self, trial: int) -> Array:
-        """(2, S) mean squares that calibration left in a trial: of block means, and of the log of roughness."""
-        return of_trial(self._unmodelled, self.measured[trial].name, len(self.robot.sensors)) ** 2
+    def _known(self, part: int) -> Array:
+        """(2, S) mean squares that calibration left in the trial of a part: of block means, and of the log of roughness."""
+        return of_trial(self._unmodelled, self.parts[part].run.name, len(self.robot.sensors)) ** 2
 
     def _lay_out(self) -> None:
         """Segments, channels and floors of all residual values, trial after trial."""
@@ -242,12 +297,12 @@ class OpenLoop(Problem):
         noise = self.scale.noise**2
         noisy = (noise / (noise + self._tiny) * (1.0 + TINY**2)) ** 2
         pure = 2 * 1.95 / self.window + 0.01
-        for k, trial in enumerate(self.measured):
+        for k, (number, trial) in enumerate((p.trial, p.run) for p in self.parts):
             blocks, windows = self._rows[k] // self.block, self._rows[k] // self.window
             first = len(names)
             count = max(1, windows)
             names += [f"{trial.name}@{self._begins(k, w):.1f}s" for w in range(count)]
-            trial_of_segment += [k] * count
+            trial_of_segment += [number] * count
             of_block = first + np.minimum(np.arange(blocks) // per, count - 1)
             seg += [np.repeat(of_block, s), np.repeat(first + np.arange(windows), 2 * s)]
             chan += [np.tile(np.arange(s), blocks), np.tile(np.arange(s), 2 * windows)]
@@ -287,22 +342,30 @@ class OpenLoop(Problem):
             joint_of_channel=joints_of(robot, [*(x.target for x in robot.sensors), *computed]),
         )
 
-    def _begins(self, trial: int, window: int) -> float:
+    def _begins(self, part: int, window: int) -> float:
         """When a window begins, s."""
-        log, row = self.measured[trial].log, window * self.window
+        log, row = self.parts[part].run.log, window * self.window
         return row * self.robot.time_step_s if log.filled is None else float(log.times_s[log.readings[row]])
 
-    def _middles(self, trial: int, size: int) -> Array:
-        """(R // size,) middles of stretches of ``size`` readings, s."""
-        log, count = self.measured[trial].log, self._rows[trial] // size
+    def _middles(self, part: int, size: int) -> Array:
+        """(R // size,) middles of so many readings in a row, s."""
+        own, count = self.parts[part], self._rows[part] // size
+        log, step = own.run.log, self.robot.time_step_s
         if log.filled is None:
-            return (np.arange(count) + 0.5) * size * self.robot.time_step_s
-        return block_sums(log.times_s[log.readings][:, None], size)[:, 0] / size
+            return (np.arange(count) + 0.5) * size * step
+        # What is read in every row stands for a step, of which its time is the beginning.
+        half = step / 2 if self.measured[own.trial].log.filled is None else 0.0
+        return block_sums(log.times_s[log.readings][:, None], size)[:, 0] / size + half
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
-        models = applied(self.robot, hypotheses)
-        chosen = list(range(len(self.measured))) if trials is None else list(trials)
+        own = None if trials is None else set(trials)
+        return self.residuals_of_pieces(
+            hypotheses, [k for k, p in enumerate(self.parts) if own is None or p.trial in own]
+        )
+
+    def residuals_of_pieces(self, hypotheses: Sequence[Hypothesis], pieces: Collection[int]) -> Array:
+        models, chosen = applied(self.robot, hypotheses), sorted(pieces)
         out = np.zeros((len(models), len(self.segment_of)))
         size = max(1, TOGETHER // max(1, len(self.segment_of)))
         for k in range(0, len(models), size):
@@ -310,10 +373,10 @@ class OpenLoop(Problem):
         return out
 
     def _fill(self, out: Array, models: Sequence[Robot], chosen: Sequence[int]) -> None:
-        """Residuals (H, n) of some models on the chosen trials, into ``out``."""
+        """Residuals (H, n) of some models on the chosen parts, into ``out``."""
         digests = self.predictor.digests([(k, m) for k in chosen for m in self._held(models, k)])
         for place, k in enumerate(chosen):
-            mine, trial = digests[place * len(models) : (place + 1) * len(models)], self.measured[k]
+            mine, trial = digests[place * len(models) : (place + 1) * len(models)], self.parts[k].run
             first, last = self.slices[k].start, self.slices[k].stop
             if isinstance(trial.driver, Network):
                 sent = self._command_residuals(trial, models)
@@ -322,9 +385,13 @@ class OpenLoop(Problem):
             for row, d in zip(out, mine, strict=True):
                 row[first:last] = self._compare(k, d)
 
-    def _held(self, models: Sequence[Robot], trial: int) -> list[Robot]:
-        """The models as they are held in a trial; trials held alike share them, for a robot's digest is not free."""
-        setup = self.measured[trial].setup
+    def _held(self, models: Sequence[Robot], part: int) -> list[Robot]:
+        """The models as they are held in a part of a trial; those held alike share them, for a robot's digest is not free."""
+        run = self.parts[part].run
+        held = self._set_up(models, run.setup)
+        return held if run.begun is None else [run.begun.later(m) for m in held]
+
+    def _set_up(self, models: Sequence[Robot], setup: Hypothesis) -> list[Robot]:
         if not setup:
             return list(models)
         known = self._setups.setdefault(setup, {})
@@ -336,14 +403,14 @@ class OpenLoop(Problem):
             known.clear()
         return held
 
-    def _compare(self, trial: int, predicted: Digest) -> Array:
-        measured = self._data[trial]
+    def _compare(self, part: int, predicted: Digest) -> Array:
+        measured = self._data[part]
         if not predicted.finite:
             return np.full(measured.means.size + 2 * measured.rough.size, np.inf)
-        shape = (measured.means.astype(float) - predicted.means) / self.deviation[trial]
-        grain = np.log((measured.rough + self._tiny) / self._rough(predicted)) / self.grain_deviation[trial]
+        shape = (measured.means.astype(float) - predicted.means) / self.deviation[part]
+        grain = np.log((measured.rough + self._tiny) / self._rough(predicted)) / self.grain_deviation[part]
         compared = np.array([x.kind not in self.repeating for x in self.robot.sensors])
-        texture = np.stack([grain, frozen(measured, predicted, self.window) * compared * self._moving[trial]], axis=1)
+        texture = np.stack([grain, frozen(measured, predicted, self.window) * compared * self._moving[part]], axis=1)
         return np.concatenate([soften(shape).ravel(), soften(texture).ravel()])
 
     def _command_residuals(self, trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
@@ -364,21 +431,21 @@ class OpenLoop(Problem):
 
     # -- views of a residual -----------------------------------------------------------------------------------------
 
-    def blocks(self, trial: int, residual: Array) -> Array:
-        """(R // block, S): the part of a residual (n,) that compares means, of one trial with R readings."""
-        rows, s = self._rows[trial] // self.block, len(self.robot.sensors)
-        return residual[self.slices[trial]][: rows * s].reshape(rows, s)
+    def blocks(self, part: int, residual: Array) -> Array:
+        """(R // block, S): the part of a residual (n,) that compares means, of one part with R readings."""
+        rows, s = self._rows[part] // self.block, len(self.robot.sensors)
+        return residual[self.slices[part]][: rows * s].reshape(rows, s)
 
-    def raw_blocks(self, trial: int, residual: Array) -> Array:
+    def raw_blocks(self, part: int, residual: Array) -> Array:
         """The same before softening, in the units of the channels."""
-        return np.asarray(SOFT * np.sinh(self.blocks(trial, residual) / SOFT) * self.deviation[trial])
+        return np.asarray(SOFT * np.sinh(self.blocks(part, residual) / SOFT) * self.deviation[part])
 
-    def raw_grain(self, trial: int, residual: Array) -> Array:
+    def raw_grain(self, part: int, residual: Array) -> Array:
         """(R // window, S): differences of the log of roughness, before softening."""
-        rows, s = self._rows[trial], len(self.robot.sensors)
+        rows, s = self._rows[part], len(self.robot.sensors)
         first, windows = rows // self.block * s, rows // self.window
-        texture = residual[self.slices[trial]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
-        return np.asarray(SOFT * np.sinh(texture / SOFT) * self.grain_deviation[trial])
+        texture = residual[self.slices[part]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
+        return np.asarray(SOFT * np.sinh(texture / SOFT) * self.grain_deviation[part])
 
     def raw(self, residual: Array) -> Array:
         """(n,) in the units of the channels; NaN where the texture of a channel is compared."""
@@ -386,7 +453,7 @@ class OpenLoop(Problem):
         for k, part in enumerate(self.slices):
             values = self.raw_blocks(k, residual).ravel()
             out[part.start : part.start + len(values)] = values
-            if isinstance(self.measured[k].driver, Network):
+            if isinstance(self.parts[k].run.driver, Network):
                 spans = COMMAND_SHARE * _spans(self.robot)
                 sent = residual[part][-len(self._data[k].means) * len(spans) :].reshape(-1, len(spans))
                 out[part.stop - sent.size : part.stop] = (SOFT * np.sinh(sent / SOFT) * spans).ravel()
@@ -395,10 +462,10 @@ class OpenLoop(Problem):
     def series(self, hypothesis: Hypothesis) -> list[Series]:
         """What every channel of every trial reported, and should have reported without noise."""
         out = []
-        for k, values in enumerate(self.predicted(hypothesis)):
-            log, read = self.measured[k].log, self.measured[k].log.readings
+        for part, values in zip(self.parts, self.predicted(hypothesis), strict=True):
+            log, read = part.run.log, part.run.log.readings
             for c, sensor in enumerate(self.robot.sensors):
-                out.append(Series(k, c, sensor.unit, log.times_s[read], log.sensors[read, c], values[read, c]))
+                out.append(Series(part.trial, c, sensor.unit, log.times_s[read], log.sensors[read, c], values[read, c]))
         return out
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
@@ -420,7 +487,7 @@ class OpenLoop(Problem):
         return farther_off(self._in_units(before), self._in_units(after))
 
     def _in_units(self, model: Hypothesis) -> InUnits:
-        return in_units(self.series(model), self.robot.sensors)
+        return in_units(self.whole.series(model), self.robot.sensors)
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         believed = apply(self.robot, hypothesis)
@@ -428,11 +495,11 @@ class OpenLoop(Problem):
         return list(self.evaluator.evaluate([Job(r, Whole()) for r in rollouts]))
 
     def predicted(self, hypothesis: Hypothesis) -> list[Array]:
-        """What the channels of each trial should have reported, without noise: (T, S) by trial."""
-        model = apply(self.robot, hypothesis)
-        models = [apply(model, t.setup) for t in self.measured]
-        rollouts = [rollout_of(t, m) for t, m in zip(self.measured, models, strict=True)]
-        jobs = [Job(r, ToSensors(t.early(self.robot))) for t, r in zip(self.measured, rollouts, strict=True)]
+        """What the channels should have reported, without noise: (T, S) by trial, or by stretch."""
+        model, runs = apply(self.robot, hypothesis), [p.run for p in self.parts]
+        models = [self._held([model], k)[0] for k in range(len(runs))]
+        rollouts = [rollout_of(t, m) for t, m in zip(runs, models, strict=True)]
+        jobs = [Job(r, ToSensors(t.early(self.robot))) for t, r in zip(runs, rollouts, strict=True)]
         true = self.evaluator.evaluate(jobs)
         return [report(m, v) for m, v in zip(models, true, strict=True)]
 

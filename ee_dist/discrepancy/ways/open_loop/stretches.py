@@ -1,0 +1,105 @@
+"""Stretches of long records, which a search simulates in place of the whole.
+
+A search simulates a robot ten thousand times. Of minutes of a motion that is led by positions some stretches tell as much as all
+of it: a joint that a controller leads forgets within moments where it was. So a stretch begins with its joints where they were
+measured, and is compared once they have come to where the model takes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ee_dist.discrepancy.measured_trial import Begun, MeasuredTrial, reading_s, released
+from ee_dist.discrepancy.past import Past
+from ee_dist.discrepancy.starting import starting_speeds
+from ee_dist.discrepancy.thinning import one_of_each
+from ee_dist.effects.scales import longest_delay
+from ee_dist.engines.drivers import Commands, Network
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import State
+
+STRETCH_S, SETTLED_S = 4.0, 0.5
+"""How much of a record is compared in one go, and how much before is simulated alone, for joints to come to where they go."""
+MOST, FEWEST = 36_000, 5
+"""Steps of a simulation, times joints, that a search takes for each model at most: three trials of 20 s of six joints in steps of
+10 ms; but so many stretches of each trial."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A part of the trial of that number."""
+
+    trial: int
+    run: MeasuredTrial
+
+
+def whole(trials: Sequence[MeasuredTrial]) -> tuple[Stretch, ...]:
+    """Each trial in one go."""
+    return tuple(Stretch(k, t) for k, t in enumerate(trials))
+
+
+def forgets(robot: Robot, trials: Sequence[MeasuredTrial]) -> bool:
+    """Whether it hardly matters to the robot in these trials where its joints were a moment ago: controllers without an integral
+    lead all of them by positions that were recorded, and its base stays."""
+    led = bool(robot.drives) and all(d.command == "position" and d.kp > 0 and not d.ki for d in robot.drives)
+    known = all(t.log.joints is not None and not isinstance(t.driver, Network) and t.begun is None for t in trials)
+    return led and known and not robot.free_base
+
+
+def stretches(
+    robot: Robot, trials: Sequence[MeasuredTrial], window: int, seconds: float = STRETCH_S
+) -> tuple[Stretch, ...]:
+    """Of trials of a robot that ``forgets``, one after another, of about so many seconds: whole windows of so many readings."""
+    spacing = reading_s(trials) or robot.time_step_s
+    count = window * max(1, round(seconds / (window * spacing)))
+    return tuple(s for k, t in enumerate(trials) for s in _of_trial(k, t, robot, count))
+
+
+def _of_trial(number: int, trial: MeasuredTrial, robot: Robot, count: int) -> list[Stretch]:
+    log, step = trial.log, robot.time_step_s
+    assert log.joints is not None
+    speeds, read = starting_speeds(trial, robot), log.readings
+    commands, enabled = released(trial.obeyed(log.commands, robot))
+    run_up = math.ceil((SETTLED_S + longest_delay(robot)) / step)
+    found = []
+    for first in range(0, len(read) - count + 1, count):
+        begin, last = int(max(0, read[first] - run_up)), int(read[first + count - 1]) + 1
+        part = log.part(begin, last)
+        filled = np.zeros(len(part), dtype=bool) if part.filled is None else part.filled.copy()
+        filled[: read[first] - begin] = True
+        begun = None
+        if begin:
+            past = Past(commands, enabled, log.joints, step, begin)
+            begun = Begun(begin * step, State(log.joints[begin].copy(), speeds[begin].copy()), past)
+        driver = Commands(trial.driver.values[begin:last]) if isinstance(trial.driver, Commands) else trial.driver
+        run = replace(trial, log=replace(part, filled=filled), driver=driver, begun=begun)
+        found.append(Stretch(number, run))
+    return found
+
+
+def too_long(robot: Robot, trials: Sequence[MeasuredTrial]) -> bool:
+    """Whether a search would take too long on all of them."""
+    return len(robot.drives) * sum(len(t.log) for t in trials) > MOST
+
+
+def enough(robot: Robot, of: Sequence[Stretch]) -> int:
+    """How many stretches of a trial a search takes: of short trials all."""
+    counts = np.bincount([s.trial for s in of])
+    steps = max(len(s.run.log) for s in of)
+    total, most = MOST // (steps * len(robot.drives)), int(counts.max(initial=0))
+    return next((n for n in range(most, FEWEST, -1) if int(np.minimum(counts, n).sum()) <= total), min(most, FEWEST))
+
+
+def at_most(of: Sequence[Stretch], count: int) -> tuple[Stretch, ...]:
+    """So many of each trial, spread over all of it."""
+    found: list[Stretch] = []
+    for number in dict.fromkeys(s.trial for s in of):
+        own = [s for s in of if s.trial == number]
+        edges = np.round(np.linspace(0, len(own), min(count, len(own)) + 1)).astype(int)
+        found += one_of_each(own[a:b] for a, b in pairwise(edges.tolist()))
+    return tuple(found)

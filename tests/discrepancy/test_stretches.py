@@ -1,0 +1,105 @@
+"""Of long records a search simulates some stretches, which say of a model what the whole says."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from way_samples import Sample, evaluator_for, measure, sines, two_joint_arm
+
+from ee_dist.discrepancy.evidence.holdout import MOTIONS, held_out_by
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.ways.open_loop import stretches as module
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.discrepancy.ways.open_loop.stretches import Stretch, at_most, enough, forgets
+from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.robots.quadruped_lab import quadruped_lab
+from ee_dist.trials.noise import with_noise
+
+ARM = with_noise(two_joint_arm(), 2e-4)
+SECONDS = 40.0
+HIDDEN: dict[str, Hypothesis] = {
+    "friction": (term("coulomb_friction", "elbow", torque_nm=0.25),),
+    "a controller that goes no faster": (term("command_speed", "shoulder", slowness_s_rad=0.7),),
+    "late commands": (term("command_delay", "elbow", delay_s=0.03),),
+    "a sensor that sticks late": (term("sensor_stuck", "position_elbow", share=1.0, from_s=13.1),),
+}
+
+
+@cache
+def measured(name: str) -> tuple[MeasuredTrial, ...]:
+    return measure(Sample(ARM, sines(ARM, 0.6, SECONDS), (), ()), HIDDEN[name])
+
+
+def cut(name: str, most: int = 10_000) -> tuple[OpenLoop, OpenLoop]:
+    """The whole, and what a search takes of it if it may take so many steps."""
+    whole = OpenLoop(measured(name), ARM, evaluator_for(ARM))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "MOST", most)
+        return whole, whole.searched
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_stretches_say_of_a_model_what_the_whole_says(name: str) -> None:
+    whole, some = cut(name)
+    assert len(some.parts) == 10 and Counter(p.trial for p in some.parts) == {0: 5, 1: 5}
+    right = [error(p.residuals([HIDDEN[name]])[0]) for p in (whole, some)]
+    wrong = [error(p.residuals([()])[0]) for p in (whole, some)]
+    assert right[1] < 1.1 * some.noise_floor()[0] and right[0] < 1.1 * whole.noise_floor()[0]
+    assert wrong[1] == pytest.approx(wrong[0], rel=0.25) and wrong[1] > 3 * right[1]
+
+
+def test_where_a_stretch_lies_is_told_in_the_time_of_its_record() -> None:
+    whole, some = cut("friction")
+    starts = [float(name.split("@")[1].removesuffix("s")) for name in some.segments]
+    spread = [t for t, k in zip(starts, some.trial_of_segment, strict=True) if k == 0]
+    assert spread == sorted(spread) and spread[0] < SECONDS / 4 and spread[-1] > SECONDS / 2
+    assert some.layout.time_s.max() <= SECONDS
+    # What is compared of a stretch is what was read there.
+    residuals = some.residuals([HIDDEN["friction"]])[0]
+    time, other = some.layout.time_s[some.layout.reading], whole.layout.time_s[whole.layout.reading]
+    assert set(np.round(time, 4)) <= set(np.round(other, 4)) and np.isfinite(residuals).all()
+
+
+def test_motions_stay_the_evidence_and_people_are_told() -> None:
+    whole, some = cut("friction")
+    assert [c.name for c in held_out_by(some)] == [MOTIONS] == [c.name for c in held_out_by(whole)]
+    (note,) = set(some.notes) - set(whole.notes)
+    assert "10 stretches of 80 s" in note and "compare takes all of it" in note
+    assert some.whole is whole is whole.whole, "what is drawn is all of it"
+    assert some.as_searched is some and whole.as_searched is whole
+    brief = some.beginning(8.0)
+    assert isinstance(brief, OpenLoop) and len(brief.parts) == 4
+
+
+def test_short_records_are_simulated_as_they_are() -> None:
+    whole, some = cut("friction", 10**9)
+    assert some is whole
+
+
+def test_a_robot_that_does_not_forget_is_simulated_from_where_it_began() -> None:
+    trials = measured("friction")
+    assert forgets(ARM, trials)
+    drives = tuple(replace(d, ki=1.0) for d in ARM.drives)
+    pushed = tuple(replace(d, command="torque") for d in ARM.drives)
+    assert not forgets(replace(ARM, drives=drives), trials)
+    assert not forgets(replace(ARM, drives=pushed), trials)
+    assert not forgets(quadruped_lab(), trials)
+    assert not forgets(ARM, [replace(t, log=replace(t.log, joints=None)) for t in trials])
+
+
+@given(st.lists(st.integers(1, 40), min_size=1, max_size=6), st.integers(1, 12))
+def test_each_trial_keeps_so_many_in_order(counts: list[int], most: int) -> None:
+    trial = measured("friction")[0]
+    of = [Stretch(k, replace(trial)) for k, n in enumerate(counts) for _ in range(n)]
+    some = at_most(of, most)
+    assert Counter(s.trial for s in some) == {k: min(n, most) for k, n in enumerate(counts)}
+    places = [next(i for i, s in enumerate(of) if s is own) for own in some]
+    assert places == sorted(places)
+    assert enough(ARM, of) <= max(max(counts), module.FEWEST)
