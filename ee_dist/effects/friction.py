@@ -34,7 +34,9 @@ def _viscous(robot: Robot, target: str) -> float:
 
 
 def _viscous_range(robot: Robot, target: str) -> dict[str, Range]:
-    return {"damping_nm_s_rad": (0.0 - drive_of(robot, target).viscous, _viscous(robot, target))}
+    # Who describes more than would hold the drive at its stated speed does not believe in that speed.
+    described = drive_of(robot, target).viscous
+    return {"damping_nm_s_rad": (0.0 - described, max(_viscous(robot, target), described))}
 
 
 @effect(

@@ -205,3 +205,14 @@ def test_a_torque_drive_may_be_braked_far_below_the_speed_that_is_stated() -> No
         most[command, limit] = find("viscous_friction").bounds(altered, drive.joint)["damping_nm_s_rad"][1]
     assert most["torque", 8.0] == pytest.approx(10 * most["position", 8.0])
     assert most["torque", math.inf] < most["torque", 8.0]
+
+
+def test_as_much_again_as_is_described_is_worth_trying() -> None:
+    """Many files state a speed that nobody measured: what is described would keep the drive from ever reaching it."""
+    robot = servo_pendulum()
+    (drive,) = robot.drives
+    least = find("viscous_friction").bounds(robot, drive.joint)["damping_nm_s_rad"][1]
+    for described in (0.5 * least, 3.0 * least):
+        altered = robot.with_drive(drive.joint, viscous=described)
+        bounds = find("viscous_friction").bounds(altered, drive.joint)["damping_nm_s_rad"]
+        assert bounds == pytest.approx((-described, max(least, described)))
