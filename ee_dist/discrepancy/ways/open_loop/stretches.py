@@ -25,9 +25,9 @@ from ee_dist.trials.log import State
 
 STRETCH_S, SETTLED_S = 4.0, 0.5
 """How much of a record is compared in one go, and how much before is simulated alone, for joints to come to where they go."""
-MOST, FEWEST = 36_000, 5
+MOST, FEWEST = 36_000, 15
 """Steps of a simulation, times joints, that a search takes for each model at most: three trials of 20 s of six joints in steps of
-10 ms; but so many stretches of each trial."""
+10 ms; but so many stretches, and one of each trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +91,8 @@ def enough(robot: Robot, of: Sequence[Stretch]) -> int:
     """How many stretches of a trial a search takes: of short trials all."""
     counts = np.bincount([s.trial for s in of])
     steps = max(len(s.run.log) for s in of)
-    total, most = MOST // (steps * len(robot.drives)), int(counts.max(initial=0))
-    return next((n for n in range(most, FEWEST, -1) if int(np.minimum(counts, n).sum()) <= total), min(most, FEWEST))
+    total = max(MOST // (steps * len(robot.drives)), FEWEST)
+    return next((n for n in range(int(counts.max()), 1, -1) if int(np.minimum(counts, n).sum()) <= total), 1)
 
 
 def at_most(of: Sequence[Stretch], count: int) -> tuple[Stretch, ...]:
