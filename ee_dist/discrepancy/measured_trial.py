@@ -60,6 +60,8 @@ class MeasuredTrial:
     commands_held: bool | None = False
     hardware: bool = False
     """Whether it is known to be no simulation of ours, whatever became of its commands."""
+    on_lines: bool = False
+    """Whether commands go on by straight lines from row to row."""
     begun: Begun | None = None
     """Of a stretch from within a record, how it begins."""
 
@@ -69,8 +71,8 @@ class MeasuredTrial:
         return self.hardware or self.commands_held is not False
 
     def obeyed(self, commands: Array, robot: Robot) -> Array:
-        """Commands (T, M) as the steps of a simulation take them."""
-        return held(commands) if self.commands_held and not goes_halfway(robot) else commands
+        """Commands (T, M) as the steps of a simulation take them. Those on lines are about their row what they are in it."""
+        return held(commands) if self.commands_held and not self.on_lines and not goes_halfway(robot) else commands
 
     def early(self, robot: Robot) -> tuple[int, ...]:
         """The channels that a simulation reads half a step before their row."""

@@ -81,6 +81,10 @@ def _one(parts: Sequence[Series]) -> Series:
     return replace(parts[0], times_s=across("times_s"), measured=across("measured"), predicted=across("predicted"))
 
 
+IN_STEPS = (
+    "Each command is taken to have acted in one step of a simulation, and not to have been held until the next row, as a robot's "
+    "drives do ('commands_between: held' in the mapping says that they did)."
+)
 TIMES_NOISE = "times the noise"
 """The unit of an error of channels that have no unit in common."""
 
@@ -201,7 +205,7 @@ class Problem(ABC):
     @property
     def notes(self) -> list[str]:
         """What of these measurements is not compared, or not as it was recorded, and why: every verb says so."""
-        return []
+        return [IN_STEPS] if any(t.hardware and t.commands_held is False for t in self.measured) else []
 
     @property
     def doubts(self) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.mapping import Column, Mapping
+from ee_dist.measurements.mapping import LINES, Column, Mapping
 from ee_dist.measurements.on_grid import HELD, OnGrid
 from ee_dist.measurements.report import COMMAND, TORQUE
 from ee_dist.measurements.robot_channels import command_kind, command_kinds, command_units, torque_units
@@ -33,7 +33,7 @@ class Led:
 
     def __init__(self, on: OnGrid, mapping: Mapping, robot: Robot, goes_on: bool = False) -> None:
         self.on, self.mapping, self.robot, self.report = on, mapping, robot, on.report
-        self.goes_on = goes_on or mapping.commands_between == "lines"
+        self.goes_on = goes_on or mapping.commands_between == LINES
 
     def _commands(self, torques: Array | None, lines: bool) -> Array:
         """What the drives were told, (T, M). Without any: the torques where the drives obey torques, else NaN; of joints that
@@ -59,6 +59,7 @@ class Led:
         found = None if self.goes_on else self._on_lines(torques, positions)
         self.goes_on = self.goes_on or found is not None
         found = self._commands(torques, self.goes_on) if found is None else found
+        self.report.between = LINES if self.goes_on else self.mapping.commands_between or ""
         if self.goes_on:
             self.report.done = [line.replace(HELD, "") for line in self.report.done]
             self.report.done.append(

@@ -12,6 +12,12 @@ from typing import Any
 
 from ee_dist.measurements.readers.options import Options
 
+BETWEEN, LINES = "commands_between", "lines"
+"""Where a mapping and a recording say what commands do from one row to the next; that they are points between which a controller
+goes on."""
+HELD_IF = {"held": True, LINES: True, "steps": False}
+"""Whether drives are those of a robot, by what may be said there; else each command was taken in one step of a simulation."""
+
 
 @dataclass(frozen=True)
 class Column:
@@ -118,7 +124,7 @@ class Mapping:
     split: Split | None = None
     rate_hz: float | None = None
     commands_between: str | None = None
-    """What commands do from one row to the next (``held`` or ``lines``); None where the joints are to show it."""
+    """What commands do from one row to the next (a word of ``HELD_IF``); None where the joints are to show it."""
     trial: str | None = None
     """Name of a trial, with {key} for entries of the file's header."""
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError, nearest
-from ee_dist.measurements.mapping import Clock, Column, Estimated, Even, Given, Mapping, Setting, Split
+from ee_dist.measurements.mapping import HELD_IF, Clock, Column, Estimated, Even, Given, Mapping, Setting, Split
 from ee_dist.measurements.readers.options import Options
 from ee_dist.measurements.units import UNITS
 from ee_dist.measurements.yaml_file import load_yaml, shown
@@ -26,8 +26,6 @@ UNKNOWN = "???"
 """Stands in a proposed mapping where only a person can know."""
 
 
-BETWEEN = ("held", "lines")
-"""What commands may do from one row to the next."""
 _KEYS = (
     "robot", "format", "records", "separator", "header", "decimal", "tables", "side_by_side", "split", "time", "rate_hz",
     "sensors", "commands", "commands_between", "torques", "external", "supply", "enabled", "settings", "gains", "trial",
@@ -100,9 +98,9 @@ def mapping_of(data: Any, file: Path) -> Mapping:
 
 
 def _between(value: Any, where: str) -> str | None:
-    if value is None or value in BETWEEN:
+    if value is None or (isinstance(value, str) and value in HELD_IF):
         return value
-    raise MeasurementError(f"{where}: expected {' or '.join(map(quoted, BETWEEN))}, not {quoted(value)}")
+    raise MeasurementError(f"{where}: expected {' or '.join(map(quoted, HELD_IF))}, not {quoted(value)}")
 
 
 def _check_once(mapping: Mapping) -> None:

@@ -119,9 +119,8 @@ class OnGrid:
         if not quiet and not column.signed_bits:
             title = f"{name} ({column.column})"
             said = suspicions(title, raw[good], _turn(column))
-            over = (
-                rolled_over(title, raw[good]) if reading and not (said or column.unwrap or column.rolls_over) else None
-            )
+            looked = reading and not (said or column.unwrap or column.rolls_over)
+            over = rolled_over(title, raw[good], abs(column.scale) * size) if looked else None
             self.report.suspicious += [*said, over] if over else said
         if len(good) < len(raw):
             how = "in which the last value holds" if step_like else "filled by straight lines"

@@ -31,6 +31,8 @@ class Report:
     ranges: dict[str, tuple[float, float, str]] = field(default_factory=dict)
     done: list[str] = field(default_factory=list)
     suspicious: list[str] = field(default_factory=list)
+    between: str = ""
+    """How commands go on from row to row, where the mapping says it or the joints do: a word of ``commands_between``."""
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)

@@ -38,6 +38,8 @@ ROUNDED = 0.15
 """Of a step that is large, by how much a round may be off the plain number that it is taken for."""
 STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
+LEAST_ROUND = 0.005
+"""rad (m) that the round of an encoder has at least: of a motor's behind a gear of a thousand."""
 ROLLS, MOST_ROLLS = 0.85, 0.1
 """Share of where a position is by which it jumps as it begins anew, and at what share of all rows at most."""
 CLOCKS, MOST_APART = 1.03, 15.0
@@ -165,10 +167,11 @@ def repeat_suspicion(readings: Array) -> str | None:
     )
 
 
-def rolled_over(name: str, numbers: Array) -> str | None:
-    """Whether an encoder begins anew now and then: a sentence."""
+def rolled_over(name: str, numbers: Array, size: float = 1.0) -> str | None:
+    """Whether an encoder begins anew now and then: a sentence. ``size``: of one of its numbers, rad (m). A joint that stands and
+    trembles has rounds of nothing."""
     found = round_of(numbers)
-    if found is None:
+    if found is None or found[1] * size < LEAST_ROUND:
         return None
     rows, jump, size = found
     return (

@@ -23,7 +23,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.folders import recordings_in
 from ee_dist.measurements.importer import import_files
-from ee_dist.measurements.mapping import Mapping
+from ee_dist.measurements.mapping import BETWEEN, Mapping
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.pieces import in_pieces, pieces_asked
 from ee_dist.measurements.proposal.files import proposal_for
@@ -94,6 +94,9 @@ def run(config: Config, options: Options, out: Path) -> None:
     text = describe(reports)
     out.mkdir(parents=True, exist_ok=True)
     metadata = {"task": "import", "mapping": str(mapping.source), SOURCES: sources_of(mapping, config)}
+    # One controller leads all trials.
+    if said := next((report.between for report in reports if report.between), ""):
+        metadata[BETWEEN] = said
     with RunWriter(out / options.output, robot, metadata) as writer:
         for record in records:
             writer.trial(record)

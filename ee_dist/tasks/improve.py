@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -101,7 +101,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             )
     also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
     also = (*also, *problem.spoiled(found.terms), *way.instead(bool(found.left)))
-    word = None if apart is None else told_of(apart, way, config, found.terms, problem.channels)
+    word = None if apart is None else told_of(apart, way, config, found.terms, problem)
     farther = problem.farther_off(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ""
     warnings = (*measured.remarks, *([f"{farther}."] if farther else []))
     account = improve_account(problem, found, planning(out, problem.robot), also, word).warned(warnings)
@@ -134,11 +134,12 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     return problem, found, account
 
 
-def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis, fitted: Sequence[str]) -> LastWord:
+def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis, fitted: Problem) -> LastWord:
     """How far the model as it was and the one with ``terms`` are from trials that nothing was fitted to, compared
-    by the same measure; ``fitted``: the channels of what was."""
+    by the same measure, and their commands taken as those of what was ``fitted``."""
     models = (apart.model, terms)
-    return last_word([way.make(replace(apart, model=m), config).as_searched for m in models], models, fitted)
+    problems = [way.as_read(replace(apart, model=m), config, fitted).as_searched for m in models]
+    return last_word(problems, models, fitted.channels)
 
 
 def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:

@@ -20,6 +20,7 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.measurements.commanded import disobeying
 from ee_dist.measurements.jumps import jumping
+from ee_dist.measurements.mapping import BETWEEN, HELD_IF, LINES
 from ee_dist.measurements.need import held_beyond
 from ee_dist.measurements.taking import taking
 from ee_dist.recording.reader import read_run
@@ -91,9 +92,10 @@ def load(config: Config) -> Measurements:
                 continue
             # What an import says about a trial (a gain, a payload) comes on top of how it was held.
             setup = (*(held[t.index] if t.index < len(held) else ()), *t.believed)
-            held_so = _commands_held(run)
-            log = checked(t.log, robot, f"{file}, {t.name}")
-            trials.append(MeasuredTrial(t.name, log, t.driver, setup, held_so, held_so is None))
+            log, hardware = checked(t.log, robot, f"{file}, {t.name}"), _hardware(run)
+            between = run.metadata.get(BETWEEN, "")
+            held_so = HELD_IF.get(between) if hardware else False
+            trials.append(MeasuredTrial(t.name, log, t.driver, setup, held_so, hardware, between == LINES))
             names.append(TrialName(len(trials), file.stem, t.name))
             of_file.append(file)
     if not trials:
@@ -164,10 +166,9 @@ def _with_room(robot: Robot, trials: Sequence[MeasuredTrial], remarks: list[str]
     return robot
 
 
-def _commands_held(run: RunRecord) -> bool | None:
-    """Drives of our own simulations do not hold their commands; of others it is to be found out."""
-    real = run.metadata.get("task") == "import" or (run.metadata.get("task") == "trial" and "seal" not in run.metadata)
-    return None if real else False
+def _hardware(run: RunRecord) -> bool:
+    """Whether it is no simulation of ours, whose drives do not hold their commands."""
+    return run.metadata.get("task") == "import" or (run.metadata.get("task") == "trial" and "seal" not in run.metadata)
 
 
 def with_known_noise(measured: Measurements) -> Robot:

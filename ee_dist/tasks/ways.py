@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ee_dist.basics.names import listed
+from ee_dist.discrepancy.as_held import taken_in_steps, times_the_noise
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques, torques_known
@@ -42,27 +42,21 @@ class Way:
         return (f"{self.beside}.",) if left and self.beside else ()
 
     def make(self, measured: Measurements, config: Config) -> Problem:
-        """The problem. Where nobody knows whether drives held their commands from row to row, the reading of the log with which
-        the robot as it is described leaves fewer times the noise, curve by curve: drives of a robot do, those of somebody's
-        simulation may not. Every curve has one voice, for where much else is wrong at a joint it says little of this."""
+        """The problem. Where nobody knows whether drives held their commands from row to row, what the robot as it is described
+        leaves tells of somebody's simulation; drives of a robot do (``discrepancy/as_held.py``)."""
         if not self.commanded or all(t.commands_held is not None for t in measured.trials):
             return self.build(measured, config)
-        readings = [self.build(_as_held(measured, held), config) for held in (False, True)]
-        return min(readings, key=times_the_noise)
+        steps, held = (self.build(_as_held(measured, held), config) for held in (False, True))
+        return steps if taken_in_steps(times_the_noise(steps), times_the_noise(held)) else held
+
+    def as_read(self, measured: Measurements, config: Config, like: Problem) -> Problem:
+        """The problem of other trials of the same robot, whose commands are taken as those of another problem are: one recording
+        is not read in two ways."""
+        held = {t.commands_held for t in like.measured} - {None}
+        return self.make(_as_held(measured, held.pop()) if len(held) == 1 else measured, config)
 
 
-def times_the_noise(problem: Problem) -> float:
-    """Sum over curves of the logarithm of the energy that the robot as it is described leaves, over that of noise."""
-    r = problem.residuals([()])[0]
-    if not np.isfinite(r).all():
-        return math.inf
-    curve = problem.trial_of * len(problem.channels) + problem.channel_of
-    energy, noise = np.bincount(curve, weights=r**2), np.bincount(curve, weights=problem.floor)
-    there = noise > 0
-    return float(np.log(np.maximum(energy[there] / noise[there], 1.0)).sum())
-
-
-def _as_held(measured: Measurements, held: bool) -> Measurements:
+def _as_held(measured: Measurements, held: bool | None) -> Measurements:
     trials = [t if t.commands_held is not None else replace(t, commands_held=held) for t in measured.trials]
     return replace(measured, trials=tuple(trials))
 

@@ -128,7 +128,7 @@ class Sight:
             return self.problem
         if trial not in self._single:
             alone = replace(self.measured, trials=(self.measured.trials[trial],))
-            self._single[trial] = self.way.make(alone, self.config)
+            self._single[trial] = self.way.as_read(alone, self.config, self.problem)
         return self._single[trial]
 
 

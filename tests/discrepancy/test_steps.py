@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ee_dist.discrepancy.as_held import taken_in_steps, times_the_noise
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.steps import between_steps, held
@@ -21,7 +22,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
 from ee_dist.tasks.measurements import Measurements
-from ee_dist.tasks.ways import WAYS, times_the_noise
+from ee_dist.tasks.ways import WAYS
 from ee_dist.trials.log import SensorLog
 
 STEP_S, FINER = 0.008, 16
@@ -125,7 +126,7 @@ def test_every_way_that_simulates_takes_it_so(way: str) -> None:
 def test_each_curve_has_one_voice_in_how_commands_were_read() -> None:
     """Play at an elbow, the largest error by far, fits commands a little better that come too early; base and shoulder do not."""
 
-    def left(base: float, shoulder: float, elbow: float) -> float:
+    def left(base: float, shoulder: float, elbow: float) -> np.ndarray | None:
         r = np.repeat([base, shoulder, elbow], 50)
         problem = SimpleNamespace(
             residuals=lambda _: r[None], trial_of=np.zeros(150, int), channel_of=np.repeat([0, 1, 2], 50),
@@ -133,6 +134,17 @@ def test_each_curve_has_one_voice_in_how_commands_were_read() -> None:
         )  # fmt: skip
         return times_the_noise(problem)  # type: ignore[arg-type]
 
-    assert left(1.5, 2.0, 40.0) < left(8.0, 9.0, 36.0)
-    assert left(0.5, 0.5, 3.0) == left(1.0, 1.0, 3.0), "at the noise nothing is told"
-    assert left(np.inf, 1.0, 1.0) == np.inf
+    assert not taken_in_steps(left(8.0, 9.0, 36.0), left(1.5, 2.0, 40.0))
+    assert taken_in_steps(left(1.5, 2.0, 40.0), left(8.0, 9.0, 36.0))
+    np.testing.assert_array_equal(left(0.5, 0.5, 3.0), left(1.0, 1.0, 3.0))  # at the noise nothing is told
+    assert left(np.inf, 1.0, 1.0) is None
+    assert taken_in_steps(left(1.5, 2.0, 40.0), None) and not taken_in_steps(None, None)
+
+
+def test_of_a_model_that_is_far_off_nobody_takes_a_robot_for_a_simulation() -> None:
+    """One that lags leaves less of commands that come too early. Where only some curves are far off, the others tell."""
+    far = np.full(12, 300.0)
+    assert not taken_in_steps(far, 2.0 * far)
+    some = np.where(np.arange(12) < 4, 300.0, 1.2)
+    assert taken_in_steps(some, 2.0 * some)
+    assert not taken_in_steps(far, 1.1 * far), "as much under both"

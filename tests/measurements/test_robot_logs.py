@@ -71,6 +71,7 @@ def test_points_between_which_a_controller_goes_on_are_not_held(tmp_path: Path, 
     assert held != lines
     assert any("by straight lines" in d and "points between which" in d for d in report.done) == lines
     assert any("commands held" in d for d in report.done) != lines
+    assert report.between == ("lines" if lines else "")
 
 
 def test_what_one_trial_shows_goes_for_all(tmp_path: Path) -> None:
@@ -94,7 +95,7 @@ def test_a_person_may_say_what_commands_do_between_rows(tmp_path: Path, said: st
     ((record, report),) = import_files([file], read_mapping(mapping), robot)
     held = np.isclose(record.log.commands[1::2], record.log.commands[:-1:2]).all()
     assert held == (said == "held")
-    assert any("commands held" in d for d in report.done) == (said == "held")
+    assert any("commands held" in d for d in report.done) == (said == "held") and report.between == said
     mapping.write_text(mapping.read_text().replace(f"commands_between: {said}", "commands_between: leapt"))
-    with pytest.raises(MeasurementError, match="commands_between: expected 'held' or 'lines', not 'leapt'"):
+    with pytest.raises(MeasurementError, match="commands_between: expected 'held' or 'lines' or 'steps', not 'leapt'"):
         read_mapping(mapping)

@@ -43,6 +43,8 @@ def wrapped(round_: float) -> np.ndarray:
 def test_an_encoder_that_begins_anew_is_told_with_its_round() -> None:
     said = rolled_over("position (q)", wrapped(25.0))
     assert said is not None and "set 'rolls_over: 25'" in said and "jumps by 24.78 at 8 rows" in said
+    assert rolled_over("q", wrapped(25.0), 1e-4) is None, "a joint that stands, and trembles by a milliradian"
+    assert rolled_over("q", wrapped(25.0), 0.01) == said.replace("position (q)", "q")
     assert rolled_over("q", 12.0 * np.sign(np.sin(T))) is None, "a square wave"
     assert rolled_over("q", TURNED[:, 0]) is None and rolled_over("q", np.zeros(50)) is None
     once = np.where(T < 10, 0.0, 5.0)

@@ -218,3 +218,17 @@ def test_columns_are_called_after_their_file_and_keep_their_numbers(
     assert np.allclose(np.stack([found.numbers(a) for a in addresses], axis=1), wanted, rtol=1e-12)
     if named:
         assert addresses[0] == "q.axis 0" and addresses[-1] == f"tau.axis {width - 1}"
+
+
+@pytest.mark.parametrize("trial", ["", "yaw_"])
+def test_a_file_may_be_called_just_as_its_joint_is(tmp_path: Path, trial: str) -> None:
+    """Of joint_a1 and joint_a2, as ROS calls them, no word but a number tells one from the other."""
+    m, joints = samples.motion(), [f"joint_a{k + 1}" for k in range(len(JOINTS))]
+    for k, joint in enumerate(joints):
+        values = np.stack([m["t"], m["q"][:, k], m["g"][:, k]], axis=1)
+        table(tmp_path / f"{trial}{joint}.csv", values, ["time", "position[rad]", "command_position[rad]"])
+    found = put_together(sorted(tmp_path.glob("*.csv")), joints)
+    assert isinstance(found, tuple)
+    assert list(found[0].first) == joints and list(found[0].patterns) == joints
+    others = [tmp_path / f"{trial}{joint}.csv" for joint in joints]
+    assert put_together(others, ["a", *joints[1:]]) is None

@@ -71,8 +71,15 @@ def _tells(word: str) -> bool:
 def _joints(stems: Sequence[str], joints: Sequence[str]) -> list[tuple[int, int] | None]:
     """Where in the name of each file a joint's stands, or a word for one with its number."""
     words = joint_words(joints)
+    # As it is, the longest first: joint_a1 says by its words no more than a number.
+    whole = re.compile(
+        rf"(?<![^\W_])(?:{'|'.join(map(re.escape, sorted(joints, key=len, reverse=True)))})(?![^\W_])", re.IGNORECASE
+    )
     out: list[tuple[int, int] | None] = []
     for stem in stems:
+        if joints and (named := whole.search(stem)):
+            out.append(named.span())
+            continue
         joint = joint_in(stem, words) if len(joints) > 1 else None
         at = re.search(re.escape(joint), stem, re.IGNORECASE) if joint else None
         if at is None and joint:

@@ -262,7 +262,7 @@ class OpenLoop(Problem):
 
     @property
     def notes(self) -> list[str]:
-        lines = [
+        lines = super().notes + [
             f"Most {kind} sensors repeat readings more often than the model's (coarse steps, rows that were filled "
             "in): how often they do is not compared."
             for kind in sorted(self.repeating)
