@@ -28,6 +28,8 @@ FORESEEN_S, SLOW_S, CLEARER = 0.02, 0.5, 0.5
 correlation of one at most;"""
 EXCHANGED, APART = 0.95, 0.4
 """correlation with what another joint is told from which it may be that one's, and by how much less with its own."""
+THERE = 0.1
+"""Of the distance to its own command, and of the range, that to another's at which a joint does what that one is told;"""
 MANY = 3.0
 """Times what a drive can give from which a command is in another unit."""
 
@@ -63,8 +65,10 @@ def beside_their_commands(robot: Robot, commands: Array, position_of: dict[str, 
     if not led or len(commands) <= FEWEST_ROWS or not np.isfinite(commands[:, led]).all():
         return
     asked, seen = commands[:, led], np.stack([position_of[robot.drives[k].joint] for k in led], axis=1)
+    told_of_another = [*_where_another_is_told_to_be(robot, [robot.drives[k].joint for k in led], asked, seen)]
+    yield from told_of_another
     both = lively(asked, seen)
-    if not both:
+    if not both or told_of_another:
         return
     asked, seen, names = asked[:, both], seen[:, both], [robot.drives[led[k]].joint for k in both]
     found, now = lead(asked, seen, step_s), abs(relation(asked, seen).correlation)
@@ -86,6 +90,20 @@ def beside_their_commands(robot: Robot, commands: Array, position_of: dict[str, 
             yield (
                 f"position of {name}: it does what {names[other]} is told (correlation {fits[other, j]:.3g}), not what it is "
                 f"told itself ({fits[j, j]:.2g}): exchanged columns?"
+            )
+
+
+def _where_another_is_told_to_be(robot: Robot, joints: Sequence[str], asked: Array, seen: Array) -> Iterator[str]:
+    """A line on ``joints`` that move, and lie (T, J) all the time where another one is told to be, and not where they are told to
+    themselves."""
+    off = np.sqrt(((seen[:, None] - asked[:, :, None]) ** 2).mean(axis=0))
+    for j, name in enumerate(joints):
+        other, reach = int(np.argmin(off[:, j])), reach_of(robot.joint(name))
+        if off[other, j] < min(THERE * off[j, j], THERE * reach) and np.ptp(seen[:, j]) > REST * reach:
+            unit = "rad" if robot.joint(name).kind == "hinge" else "m"
+            yield (
+                f"position of {name}: it lies where {joints[other]} is told to be (to {off[other, j]:.2g} {unit}), and "
+                f"{off[j, j]:.2g} {unit} from where it is told to be itself: exchanged columns?"
             )
 
 

@@ -70,3 +70,18 @@ def test_commands_that_stay_are_one_line() -> None:
     found = in_one_line([still[0], other, *still[1:]])
     assert found == ["commands of 4 joints stay as they are for the whole record, first command of j0", other]
     assert in_one_line([*still[:2], other]) == [*still[:2], other]
+
+
+def test_joints_that_move_against_one_another_are_told_by_where_they_are(told) -> None:
+    """Of two that mirror each other either looks as if its sign were swapped."""
+    swing = 0.4 * np.sin(np.arange(300) * 0.05)
+    commands = np.stack([0.5 + swing, -0.5 - swing], axis=1)
+    lines = told(commands, commands[:, ::-1] + 1e-3)
+    assert len(lines) == 2 and all("it lies where" in line and "exchanged columns?" in line for line in lines)
+    assert JOINTS[1] in lines[0] and JOINTS[0] in lines[1]
+    assert not any("it lies where" in line for line in told(commands, commands + 0.05))
+    still = commands.copy()
+    still[:, 1] = 0.3
+    assert not any(
+        "it lies where" in line for line in told(np.stack([still[:, 1], still[:, 0]], axis=1), still[:, [1, 1]])
+    )

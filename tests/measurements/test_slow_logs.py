@@ -84,3 +84,13 @@ def test_commands_that_were_kept_seldom_are_said_to_look_like_a_delay(tmp_path: 
     _, report = logs.imported(tmp_path, logs.written(tmp_path, table))
     line = [d for d in report.done if "half a row (100 ms) of what looks like delay is none" in d]
     assert bool(line) == said
+
+
+def test_exchanged_joints_that_move_against_one_another_have_no_sign_turned(tmp_path: Path) -> None:
+    """Each runs against what it is told itself, and lies where the other is told to be."""
+    q, g = (np.stack([0.8 + w, -0.7 - w], axis=1) for w in (0.3 * np.sin(2.1 * (SLOW - s)) for s in (0.02, 0.0)))
+    _, found = logs.proposed(tmp_path, logs.written(tmp_path, logs.frame_of(SLOW, q[:, ::-1], g)))
+    (question,) = found.questions
+    assert "the positions of shoulder, elbow are exchanged" in question and "put that right" in question
+    _, found = logs.proposed(tmp_path, logs.written(tmp_path, logs.frame_of(SLOW, q, g)))
+    assert not found.questions

@@ -27,6 +27,12 @@ AGAINST = (
     "the positions of {joints} run against these, and yet lie where they ask and not where their negatives would: they are late "
     "or early (half a period of a motion that repeats), or other joints' columns"
 )
+EXCHANGED = (
+    "the positions of {joints} are exchanged, or these: the first run against what they are asked for, and lie where those of the "
+    "other are asked to"
+)
+THERE = 0.1
+"""Of the distance to its own command with its sign turned, that to another's at which a joint does what that one is told."""
 WHAT = {"position": POSITION, "speed": SPEED}
 """What is asked of a drive by what it obeys."""
 UNLESS = "put that right, or write unit and sign into the mapping if they are what was asked for"
@@ -213,6 +219,10 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
                 if r.correlation < 0:
                     entry["sign"] = -1
                     size = UNITS[str(entry["unit"])][1] / UNITS[unit][1]
+                    other = None if "scale" in base or values is None else _asked_of_another(size * values, y[:, 0], k)
+                    if other is not None:
+                        names = listed([v.joints[k].name, v.joints[other].name])
+                        return UnitChoice((), UNKNOWN, EXCHANGED.format(joints=names))
                     same = "scale" not in base and _lie_where_asked(size * x[:, 0], y[:, 0])
                     (against if same else turned).append(v.joints[k].name)
             elif stated:
@@ -246,6 +256,16 @@ def _lie_where_asked(asked: Array, seen: Array) -> bool:
     sign is wrong."""
     here, there = (abs(float(np.mean(sign * asked) - np.mean(seen))) for sign in (1.0, -1.0))
     return there > max(2.0 * here, float(np.ptp(seen)))
+
+
+def _asked_of_another(asked: Array, seen: Array, joint: int) -> int | None:
+    """The other joint, of those that are asked for (T, J), where the positions (T,) of one are, if that is far nearer than what
+    the joint is asked for by itself with its sign turned."""
+    off = np.sqrt(np.mean((asked - seen[:, None]) ** 2, axis=0))
+    off[joint] = np.inf
+    other = int(np.argmin(off))
+    mine = float(np.sqrt(np.mean((asked[:, joint] + seen) ** 2)))
+    return other if off[other] < THERE * min(mine, float(np.ptp(seen))) else None
 
 
 def _as_the_others(v: View, entries: list[dict[str, Any]], still: list[int]) -> None:
