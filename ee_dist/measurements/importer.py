@@ -149,7 +149,8 @@ class _Import:
                 values = self.channels[name]
                 self.report.ranges[name] = (float(values.min()), float(values.max()), sensors[name].unit)
                 self.report.done.append(
-                    f"{name}: estimated from {column.speed_of}: central differences behind a {low_pass}"
+                    f"{name}: estimated from {column.speed_of}, to be seen and not compared: central "
+                    f"differences behind a {low_pass}"
                 )
         return positions
 

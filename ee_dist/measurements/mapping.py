@@ -15,6 +15,8 @@ from ee_dist.measurements.readers.options import Options
 BETWEEN, LINES = "commands_between", "lines"
 """Where a mapping and a recording say what commands do from one row to the next; that they are points between which a controller
 goes on."""
+ESTIMATED = "estimated"
+"""Where a recording says which of its channels nobody measured: speeds that were made of positions."""
 HELD_IF = {"held": True, LINES: True, "steps": False}
 """Whether drives are those of a robot, by what may be said there; else each command was taken in one step of a simulation."""
 

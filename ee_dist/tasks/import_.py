@@ -6,6 +6,7 @@ Without a mapping one is proposed, written down, and used where nothing was left
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import os
 from dataclasses import dataclass, replace
@@ -23,7 +24,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.folders import recordings_in
 from ee_dist.measurements.importer import import_files
-from ee_dist.measurements.mapping import BETWEEN, Mapping
+from ee_dist.measurements.mapping import BETWEEN, ESTIMATED, Estimated, Mapping
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.pieces import in_pieces, pieces_asked
 from ee_dist.measurements.proposal.files import proposal_for
@@ -94,6 +95,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     text = describe(reports)
     out.mkdir(parents=True, exist_ok=True)
     metadata = {"task": "import", "mapping": str(mapping.source), SOURCES: sources_of(mapping, config)}
+    metadata[ESTIMATED] = json.dumps([name for name, c in mapping.sensors.items() if isinstance(c, Estimated)])
     # One controller leads all trials.
     if said := next((report.between for report in reports if report.between), ""):
         metadata[BETWEEN] = said

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.model_file import read_model
 from ee_dist.measurements.commanded import disobeying
 from ee_dist.measurements.jumps import jumping
-from ee_dist.measurements.mapping import BETWEEN, HELD_IF, LINES
+from ee_dist.measurements.mapping import BETWEEN, ESTIMATED, HELD_IF, LINES
 from ee_dist.measurements.need import held_beyond
 from ee_dist.measurements.taking import taking
 from ee_dist.recording.reader import read_run
@@ -75,6 +75,8 @@ def load(config: Config) -> Measurements:
         raise ConfigError("model=: which model file? leave it out for the robot as it is described")
     files = files_of(config.measured)
     runs = [read_run(f) for f in files]
+    made_of_others = {name for run in runs for name in _estimated(run)}
+    runs = [_as_measured(run, made_of_others) for run in runs]
     robot = runs[0].robot
     trials: list[MeasuredTrial] = []
     names: list[TrialName] = []
@@ -124,7 +126,7 @@ def load(config: Config) -> Measurements:
             lagged, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks), held_out=held_out
         )
     believed = read_model(config.model)
-    robot, different = agreed(believed.robot, robot, f"model={config.model}")
+    robot, different = agreed(without_sensors(believed.robot, made_of_others), robot, f"model={config.model}")
     robot = _with_room(robot, trials, remarks)
     if different:
         remarks.append(f"The model's robot is used; it has otherwise than the log's: {'; '.join(different[:SHOWN])}")
@@ -164,6 +166,25 @@ def _with_room(robot: Robot, trials: Sequence[MeasuredTrial], remarks: list[str]
         for line in passed
     ]
     return robot
+
+
+def _as_measured(run: RunRecord, gone: Collection[str]) -> RunRecord:
+    """The run without channels that nobody measured: speeds made of positions are no evidence beside these."""
+    if not gone:
+        return run
+    trials = [replace(t, log=t.log.without(gone)) for t in run.trials]
+    return replace(run, robot=without_sensors(run.robot, gone), trials=trials)
+
+
+def _estimated(run: RunRecord) -> set[str]:
+    found = json_of(run.metadata.get(ESTIMATED, "[]"))
+    return {name for name in found if isinstance(name, str)} if isinstance(found, list) else set()
+
+
+def without_sensors(robot: Robot, names: Collection[str]) -> Robot:
+    """The robot without some sensors; itself where it has none of them."""
+    left = tuple(s for s in robot.sensors if s.name not in names)
+    return robot if len(left) == len(robot.sensors) else replace(robot, sensors=left)
 
 
 def _hardware(run: RunRecord) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -84,6 +85,16 @@ class SensorLog:
         """Whether every value is a number: a model can be too stiff for its time step."""
         known = (self.sensors, self.commands, self.base_pose, self.joints)
         return all(bool(np.isfinite(values).all()) for values in known if values is not None)
+
+    def without(self, names: Collection[str]) -> SensorLog:
+        """Without some of its sensors."""
+        left = [i for i, name in enumerate(self.sensor_names) if name not in names]
+        return replace(
+            self,
+            sensors=np.ascontiguousarray(self.sensors[:, left]),
+            sensor_names=tuple(self.sensor_names[i] for i in left),
+            sensor_units=tuple(self.sensor_units[i] for i in left),
+        )
 
     def head(self, steps: int) -> SensorLog:
         """The first ``steps`` rows."""

@@ -28,8 +28,8 @@ AGAINST = (
     "or early (half a period of a motion that repeats), or other joints' columns"
 )
 EXCHANGED = (
-    "the positions of {joints} are exchanged, or these: the first run against what they are asked for, and lie where those of the "
-    "other are asked to"
+    "the positions of {joints} are exchanged, or these: the first run against what they are asked for, and lie where those of "
+    "the other are asked to"
 )
 THERE = 0.1
 """Of the distance to its own command with its sign turned, that to another's at which a joint does what that one is told."""
