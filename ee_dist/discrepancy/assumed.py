@@ -42,6 +42,9 @@ STARTS = 3
 CARRIED, MUCH = "weight_carried", 0.9
 """Controllers of arms that are sold carry the weight. Held up by gains alone it takes stiff ones and much friction, which no
 single effect leads away from: soft gains sag. So they are looked for with most of it carried, too,"""
+LATE, LATER = "command_delay", (0.3, 0.7)
+"""What passes between a command and a controller that nobody knows is not known either; a soft one looks late too, and leads
+away from a stiff one that is. So they are looked for with a delay, from these shares of the lag that joints were seen to have,"""
 LESS = 0.9
 """and found so where that leaves less than this share of what is above the noise otherwise."""
 LEAST, MOST = -0.7, 1.0
@@ -51,8 +54,8 @@ AGAIN = 2
 """How often more room is made for a guess that ended as far as it might go."""
 LABEL = "assumed drives"
 GUESSED = (
-    "The description only guessed at what these drives do: their gains, limit, rotor and friction were found together. Write "
-    "them into it, or keep this model."
+    "The description only guessed at what these drives do: their gains, limit, rotor, friction and delay were found together. "
+    "Write them into it, or keep this model."
 )
 """What is said of them in the place of an effect's physics."""
 GUESS = "The description only guessed at what it changes: write the value found into it, or keep this model."
@@ -83,18 +86,22 @@ def assumed_drives(
         return None
     best, u, energy = _fitted(search, joints, parts)
     carried = tuple(c for c in pool if c.effect.name == CARRIED and c.name not in taken)
+    noise = float(search.problem.floor[search.everything].sum())
     if carried:
-        noise = float(search.problem.floor[search.everything].sum())
         other = _fitted(search, joints, (*parts, *carried))
         if other[2] - noise < LESS * (energy - noise):
             best, u, energy = other
-    best, u = _farther(search, best, u, energy)
-    return Proposal(best, LABEL), u
+    late = tuple(as_slow(search.problem, c) for c in _at(robot, LATE, joints) if LATE in names and c.name not in taken)
+    alone = _farther(search, best, u, energy)
+    if late and _lag(robot, joints):
+        other = _farther(search, *_fitted(search, joints, (*best, *late)))
+        alone = other if other[2] - noise < LESS * (alone[2] - noise) else alone
+    return Proposal(alone[0], LABEL), alone[1]
 
 
 def _farther(
     search: Search, parts: tuple[Candidate, ...], u: Array, energy: float
-) -> tuple[tuple[Candidate, ...], Array]:
+) -> tuple[tuple[Candidate, ...], Array, float]:
     """The same with more room where a guess ended as far from it as it may go: from what was found one may go as far again, as
     somebody would who wrote that into the description. Kept where it takes much off what is left."""
     noise = float(search.problem.floor[search.everything].sum())
@@ -110,7 +117,7 @@ def _farther(
         if fit.energy - noise >= LESS * (energy - noise):
             break
         parts, u, energy = wider, fit.u, fit.energy
-    return parts, u
+    return parts, u, energy
 
 
 def _ends(c: Candidate, u: Array) -> bool:
@@ -153,7 +160,10 @@ def _fitted(
 def puts_right(robot: Robot, c: Candidate) -> bool:
     """Whether it is one of these effects, at joints whose gains were assumed; or one value for all of whatever was assumed."""
     at = {*(c.members(robot) or (c.target,))}
-    return c.effect.guesses_at(robot, c.target) or (c.effect.name in TOGETHER and at <= {*robot.assumed_joints("kp")})
+    assumed = {*robot.assumed_joints("kp")}
+    if c.effect.name == LATE:
+        return at == assumed
+    return c.effect.guesses_at(robot, c.target) or (c.effect.name in TOGETHER and at <= assumed)
 
 
 def beside(robot: Robot, parts: Sequence[Candidate], terms: Hypothesis, others: Sequence[Candidate]) -> list[Candidate]:
@@ -187,14 +197,20 @@ def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:
         return []
 
 
+def _lag(robot: Robot, joints: Sequence[str]) -> float:
+    """s by which most of the joints were seen to follow their commands; 0 where that is not known of most."""
+    return float(np.median([robot.joint(j).lag_s for j in joints]))
+
+
 def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
     """A grid: damping falls with the gain, so that a joint follows as fast, and friction holds as large an error. Rotors are as
     assumed, or fall with the gain too: who took a motor for ten times as strong as it is took its rotor for as heavy."""
-    drives = [drive_of(robot, j) for j in joints]
+    drives, lag = [drive_of(robot, j) for j in joints], _lag(robot, joints)
     stiffness, rotor = (float(np.median([getattr(d, n) for d in drives])) for n in ("kp", "rotor_inertia"))
     scaled = (False, True) if any(c.effect.name in ROTORS for c in model.parts) else (False,)
+    delays = tuple(share * lag for share in LATER) if any(c.effect.name == LATE for c in model.parts) else (0.0,)
     found = []
-    for gain, lag, limit, lighter in product(GAINS, LAGS_RAD, LIMITS, scaled):
+    for gain, apart, limit, lighter, delay in product(GAINS, LAGS_RAD, LIMITS, scaled, delays):
         if lighter and gain == 1.0:
             continue
         values = {
@@ -203,7 +219,8 @@ def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
             "position_gain": gain,
             "speed_gain": gain,
             "torque_limit": limit,
-            "coulomb_friction": lag * gain * stiffness,
+            "coulomb_friction": apart * gain * stiffness,
+            LATE: delay,
             CARRIED: MUCH,
         }
         mains = [(c, c.effect.main) for c in model.parts]

@@ -22,6 +22,7 @@ from ee_dist.discrepancy.everywhere import instead, taken_apart
 from ee_dist.discrepancy.evidence import judge
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import explain
+from ee_dist.discrepancy.lags import with_lags
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import Proposal, candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
@@ -87,6 +88,26 @@ def test_gains_that_were_assumed_are_found_together_with_friction() -> None:
     assert found["coulomb_friction"]["torque_nm"] == pytest.approx(np.mean(DRIER), rel=0.5)
     as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
     assert better < 0.2 * as_it_is
+
+
+@pytest.mark.parametrize("late_s", [0.02, 0.0])
+def test_a_stiff_controller_that_is_late_is_not_a_soft_one(late_s: float) -> None:
+    """Guessed too soft, it lags as much without any delay; where it is not late no delay comes with it."""
+    sample: Sample = samples()["arm"]
+    hidden = (term("command_delay", "all_joints", delay_s=late_s),) if late_s else ()
+    trials = measure(sample, hidden)
+    robot = with_lags(sample.robot, trials)
+    assert all(j.lag_s > late_s for j in robot.joints)
+    softer = tuple(replace(d, kp=d.kp / 5, kd=d.kd / 5) for d in robot.drives)
+    robot = replace(robot, drives=softer, assumed=tuple((d.joint, f) for d in softer for f in ("kp", "kd")))
+    problem = problem_by("open_loop", trials, robot)
+    proposal, u = assumed_drives(Search(problem), candidates(robot)) or pytest.fail("nothing was proposed")
+    found = {t.effect: dict(t.values) for t in Model(proposal.parts).hypothesis(u)}
+    assert found["position_gain"]["factor"] == pytest.approx(5.0, rel=0.15)
+    if late_s:
+        assert found["command_delay"]["delay_s"] == pytest.approx(late_s, abs=0.002)
+    else:
+        assert "command_delay" not in found
 
 
 def test_a_guess_that_is_farther_off_than_one_may_go_at_first_is_found_by_going_on_from_there() -> None:
