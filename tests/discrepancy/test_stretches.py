@@ -78,6 +78,21 @@ def test_motions_stay_the_evidence_and_people_are_told() -> None:
     assert isinstance(brief, OpenLoop) and len(brief.parts) == 4
 
 
+def test_a_trial_that_is_shorter_than_a_stretch_is_one() -> None:
+    long, other = measured("friction")
+    short = replace(other, log=other.log.head(500), name="short")
+    whole = OpenLoop([long, short], ARM, evaluator_for(ARM))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "MOST", 10_000)
+        patch.setattr(module, "FEWEST", 5)
+        some = whole.searched
+    assert Counter(p.trial for p in some.parts) == {0: 4, 1: 1} and some.parts[-1].run is short
+    assert np.isfinite(some.trust).all() and len(some.trust) == 2
+    parts = [r[some.trial_of == 1] for r in some.residuals([(), HIDDEN["friction"]])]
+    kept = [r[whole.trial_of == 1] for r in whole.residuals([(), HIDDEN["friction"]])]
+    np.testing.assert_allclose([error(r) for r in parts], [error(r) for r in kept], rtol=0.05)
+
+
 def test_short_records_are_simulated_as_they_are() -> None:
     whole, some = cut("friction", 10**9)
     assert some is whole

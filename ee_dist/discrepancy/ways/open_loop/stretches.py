@@ -62,6 +62,8 @@ def stretches(
 
 def _of_trial(number: int, trial: MeasuredTrial, robot: Robot, count: int) -> list[Stretch]:
     log, step = trial.log, robot.time_step_s
+    if len(log.readings) < count:
+        return [Stretch(number, trial)]
     assert log.joints is not None
     speeds, read = starting_speeds(trial, robot), log.readings
     commands, enabled = released(trial.obeyed(log.commands, robot))
