@@ -168,7 +168,7 @@ class OpenLoop(Problem):
     def whole(self) -> OpenLoop:
         return self._whole or self
 
-    @property
+    @cached_property
     def piece_of(self) -> Index:
         return np.repeat(np.arange(len(self.parts)), [s.stop - s.start for s in self.slices])
 
