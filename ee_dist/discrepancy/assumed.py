@@ -54,7 +54,7 @@ AGAIN = 2
 """How often more room is made for a guess that ended as far as it might go."""
 LABEL = "assumed drives"
 GUESSED = (
-    "The description only guessed at what these drives do: their gains, limit, rotor, friction and delay were found together. "
+    "The description only guessed at what these drives do: their gains, limit, rotor and friction{late} were found together. "
     "Write them into it, or keep this model."
 )
 """What is said of them in the place of an effect's physics."""
@@ -68,6 +68,11 @@ def assumed_text(robot: Robot) -> list[str]:
     names = listed(dict.fromkeys(f for _, f in robot.assumed if f != "command"))
     drives = counted(count, "drive")
     return [f"The description only assumed {names} of {drives}: explain and improve look there first."] if count else []
+
+
+def guessed_text(terms: Hypothesis) -> str:
+    """``GUESSED`` of what was found."""
+    return GUESSED.format(late=", and how late commands come," if any(t.effect == LATE for t in terms) else "")
 
 
 def assumed_drives(

@@ -20,6 +20,8 @@ APART, LEAST = 4.0, 0.02
 MOST_POINTS = 400_000
 SHARED = 0.9
 """Share of the stamps of the shorter record that the other has, too, if one clock made both."""
+ROWS_APART = 0.02
+"""Share of its rows that one of two records may have more than the other where both are of one logger."""
 UNEVEN = 1e-6
 """Steps that differ by this share of one were measured, not counted: two records do not have the same by chance."""
 
@@ -45,14 +47,25 @@ def one_epoch(a_s: Array, b_s: Array) -> bool:
 
 
 def one_clock(a_s: Array, b_s: Array) -> bool:
-    """Whether two tables were stamped by one clock: they count from one epoch, or have the same uneven stamps."""
-    if one_epoch(a_s, b_s):
+    """Whether two tables were stamped by one clock: they count from one epoch, have the same uneven stamps, or begin and end
+    together in the middle of its time."""
+    if one_epoch(a_s, b_s) or _side_by_side(a_s, b_s):
         return True
     few, many = sorted((np.unique(a_s), np.unique(b_s)), key=len)
     steps = np.diff(few)
     if len(few) < 10 or np.ptp(steps) < UNEVEN * np.median(steps):
         return False
     return float(np.isin(few, many).mean()) > SHARED
+
+
+def _side_by_side(a_s: Array, b_s: Array) -> bool:
+    """Whether two records of as many rows begin and end at the same time, to a row, and not when their clocks do: a logger that
+    counts from its own start begins at 0."""
+    if min(len(a_s), len(b_s)) < 10 or abs(len(a_s) - len(b_s)) > ROWS_APART * len(a_s):
+        return False
+    step = max(_median(a_s), _median(b_s))
+    begun = min(abs(float(a_s[0])), abs(float(b_s[0]))) > 2.0 * step
+    return begun and all(abs(float(a - b)) < step for a, b in ((a_s[0], b_s[0]), (a_s[-1], b_s[-1])))
 
 
 def match(a_s: Array, a: Array, b_s: Array, b: Array, held: bool) -> Match:

@@ -75,7 +75,8 @@ class TrialClocks:
                 continue
             if one_clock(self.main.times_s, found.times_s):
                 self.done.append(
-                    f"{name}: its clock and that of {self.first} count from one epoch, or stamp the same rows: taken as the same"
+                    f"{name}: its clock and that of {self.first} count from one epoch, stamp the same rows, or begin and end "
+                    "together: taken as the same"
                 )
                 continue
             fit = self._fit(name)

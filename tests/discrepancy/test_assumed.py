@@ -16,7 +16,7 @@ from way_samples import Sample, measure, problem_by, samples
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
-from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL, assumed_drives, puts_right
+from ee_dist.discrepancy.assumed import GUESS, LABEL, assumed_drives, guessed_text, puts_right
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.everywhere import instead, taken_apart
 from ee_dist.discrepancy.evidence import judge
@@ -375,7 +375,10 @@ def test_it_is_told_that_the_description_only_guessed() -> None:
     )
     pool = candidates(problem.robot, only=["position_gain", "speed_gain", "coulomb_friction", "part_mass"])
     lines = explain_account(problem, explain(problem, pool), None).lines
-    assert GUESSED in lines
+    assert guessed_text(()) in lines
+    assert "late" in guessed_text((term("command_delay", "all_joints", delay_s=0.01),)) and "late" not in guessed_text(
+        ()
+    )
 
 
 def test_a_shared_effect_that_istaken_apart_is_not_called_dropped() -> None:

@@ -117,6 +117,8 @@ def test_one_clock_is_told_by_its_uneven_stamps(other, same: bool) -> None:  # t
 def test_counted_stamps_prove_nothing() -> None:
     t = np.arange(ROWS) * STEP_S
     assert not one_clock(t, t), "each of two loggers may count from its own start"
+    assert one_clock(0.171 + t, 0.173 + t), "records that begin and end together, and not when their clocks do"
+    assert not one_clock(0.171 + t, 0.171 + 1.1 * t) and not one_clock(0.171 + t, 0.171 + t + 5 * STEP_S)
 
 
 def pair(folder: Path, seed: int, late_s: float) -> list[Path]:

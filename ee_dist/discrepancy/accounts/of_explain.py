@@ -33,7 +33,7 @@ from ee_dist.discrepancy.accounts.account import (
     was_or_were,
 )
 from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, ranges
-from ee_dist.discrepancy.assumed import GUESS, GUESSED, LABEL
+from ee_dist.discrepancy.assumed import GUESS, LABEL, guessed_text
 from ee_dist.discrepancy.confidence import COUNTED_WAY
 from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.discrepancy.evidence.judge import Judged, contains
@@ -125,7 +125,7 @@ def explain_account(
         values = ranges(found.after, found.parameters, some, robot, len(best.terms) > 1)
         sure += f"{_rivals(found.tried, best.tied_with, more)}{unsure_of(unsure)}{values}."
         advice = slower(unsure) if unsure else MEND if entry.mistake else ""
-        lines.append(f"{GUESSED}{_still(problem)}" if guessed else entry.physics)
+        lines.append(f"{guessed_text(best.terms)}{_still(problem)}" if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""
         lines += [] if guessed else [f"Its mark in a residual: {entry.signature}{turned}"]
         lines += [GUESS] if best.proposal.guess and not guessed else []
