@@ -1,0 +1,33 @@
+"""A long record on the command line: stretches of it are searched, all of it is shown, and every output says so."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from ee_dist.discrepancy.ways.open_loop import stretches
+
+PLAN = "task.excitations=['multisine:seconds=24,amplitude=0.3,seed=1','slow_sines:seconds=24,amplitude=0.3,seed=2']"
+HIDDEN = "+hidden=[{effect: coulomb_friction, target: servo, torque_nm: 0.06}]"
+
+
+def test_what_a_search_goes_by_is_told_everywhere(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = cli("task=trial", "robot=servo_pendulum", "engine=mujoco", HIDDEN, PLAN, "task.noise=0.0005")
+    assert made.status == 0, made.err
+    monkeypatch.setattr(stretches, "MOST", 5000)
+    monkeypatch.setattr(stretches, "FEWEST", 4)
+    found = cli(
+        "task=explain",
+        f"measured={made.runs()[0]}",
+        "engine=mujoco",
+        "evaluator=serial",
+        "task.only=[coulomb_friction]",
+    )
+    assert found.status == 0, found.err
+    (run,) = found.runs()
+    summary = (run / "summary.json").read_text()
+    for text in (found.out, summary, (run / "report.html").read_text()):
+        said = " ".join(text.split())
+        assert "So that the search ends, it goes by 4 stretches of 48 s" in said and "compare takes all of it" in said
+    assert json.loads(summary)["verdict"] == "effect"
