@@ -25,11 +25,15 @@ SMOOTHED, SMOOTH_ORDER = 15, 2
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """How a stretch from within a record begins: so long (s) after the record, with its joints where they were measured."""
+    """How a stretch from within a record begins: with its joints where they were measured, after this ``past``."""
 
-    after_s: float
     state: State
     past: Past
+
+    @property
+    def after_s(self) -> float:
+        """How long the record had lasted."""
+        return self.past.begin * self.past.step_s
 
     def start(self, model: Robot) -> State:
         """With the goals to which limited controllers of a model have come."""

@@ -10,7 +10,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.robot_channels import command_kind
-from ee_dist.measurements.signals import AGAINST, lead, lively, moves, relation
+from ee_dist.measurements.signals import AGAINST, apart, lead, lively, moves, relation
 from ee_dist.measurements.standing import REST, reach_of, stands_still
 from ee_dist.measurements.suspicious import command_suspicion
 from ee_dist.robots.model import Robot
@@ -96,14 +96,14 @@ def beside_their_commands(robot: Robot, commands: Array, position_of: dict[str, 
 def _where_another_is_told_to_be(robot: Robot, joints: Sequence[str], asked: Array, seen: Array) -> Iterator[str]:
     """A line on ``joints`` that move, and lie (T, J) all the time where another one is told to be, and not where they are told to
     themselves."""
-    off = np.sqrt(((seen[:, None] - asked[:, :, None]) ** 2).mean(axis=0))
     for j, name in enumerate(joints):
-        other, reach = int(np.argmin(off[:, j])), reach_of(robot.joint(name))
-        if off[other, j] < min(THERE * off[j, j], THERE * reach) and np.ptp(seen[:, j]) > REST * reach:
+        off, reach = apart(asked, seen[:, j]), reach_of(robot.joint(name))
+        other = int(np.argmin(off))
+        if off[other] < THERE * min(off[j], reach) and np.ptp(seen[:, j]) > REST * reach:
             unit = "rad" if robot.joint(name).kind == "hinge" else "m"
             yield (
-                f"position of {name}: it lies where {joints[other]} is told to be (to {off[other, j]:.2g} {unit}), and "
-                f"{off[j, j]:.2g} {unit} from where it is told to be itself: exchanged columns?"
+                f"position of {name}: it lies where {joints[other]} is told to be (to {off[other]:.2g} {unit}), and "
+                f"{off[j]:.2g} {unit} from where it is told to be itself: exchanged columns?"
             )
 
 

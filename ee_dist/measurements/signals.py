@@ -52,6 +52,11 @@ LEAST_GOING, MOST_HELD = 20, 0.3
 """Rows in motion that are needed to tell, and the share of them in which what has noise may stand still."""
 
 
+def apart(asked: Array, seen: Array) -> Array:
+    """(J,) how far a series (T,) is from each of others (T, J): root mean squares."""
+    return np.asarray(np.sqrt(np.mean((asked - seen[:, None]) ** 2, axis=0)))
+
+
 def moves(values: Array) -> bool:
     """Whether a series does anything."""
     return bool(np.isfinite(values).all() and np.ptp(values) > 1e-12 * max(1.0, float(np.abs(values).max())))

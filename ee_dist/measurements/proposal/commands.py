@@ -261,10 +261,9 @@ def _lie_where_asked(asked: Array, seen: Array) -> bool:
 def _asked_of_another(asked: Array, seen: Array, joint: int) -> int | None:
     """The other joint, of those that are asked for (T, J), where the positions (T,) of one are, if that is far nearer than what
     the joint is asked for by itself with its sign turned."""
-    off = np.sqrt(np.mean((asked - seen[:, None]) ** 2, axis=0))
+    off = signals.apart(asked, seen)
     off[joint] = np.inf
-    other = int(np.argmin(off))
-    mine = float(np.sqrt(np.mean((asked[:, joint] + seen) ** 2)))
+    other, mine = int(np.argmin(off)), float(signals.apart(-asked[:, [joint]], seen)[0])
     return other if off[other] < THERE * min(mine, float(np.ptp(seen))) else None
 
 

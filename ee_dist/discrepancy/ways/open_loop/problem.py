@@ -38,9 +38,9 @@ from ee_dist.discrepancy.ways.open_loop.stretches import (
     at_most,
     enough,
     forgets,
+    in_one_go,
     stretches,
     too_long,
-    whole,
 )
 from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving, repeating
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
@@ -114,7 +114,7 @@ class OpenLoop(Problem):
         spacing = reading_s(trials)
         self.block = block if not spacing else min(block, max(1, round(BLOCK_S / spacing)))
         self._whole: OpenLoop | None = None
-        self.parts = tuple(parts) or whole(trials)
+        self.parts = tuple(parts) or in_one_go(trials)
         trials = [p.run for p in self.parts]
         self._rows = [len(t.log.readings) for t in trials]
         # Of a single window nothing could be held out.

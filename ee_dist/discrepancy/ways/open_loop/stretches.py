@@ -38,7 +38,7 @@ class Stretch:
     run: MeasuredTrial
 
 
-def whole(trials: Sequence[MeasuredTrial]) -> tuple[Stretch, ...]:
+def in_one_go(trials: Sequence[MeasuredTrial]) -> tuple[Stretch, ...]:
     """Each trial in one go."""
     return tuple(Stretch(k, t) for k, t in enumerate(trials))
 
@@ -77,7 +77,7 @@ def _of_trial(number: int, trial: MeasuredTrial, robot: Robot, count: int) -> li
         begun = None
         if begin:
             past = Past(commands, enabled, log.joints, step, begin)
-            begun = Begun(begin * step, State(log.joints[begin].copy(), speeds[begin].copy()), past)
+            begun = Begun(State(log.joints[begin].copy(), speeds[begin].copy()), past)
         driver = Commands(trial.driver.values[begin:last]) if isinstance(trial.driver, Commands) else trial.driver
         run = replace(trial, log=replace(part, filled=filled), driver=driver, begun=begun)
         found.append(Stretch(number, run))
