@@ -17,13 +17,8 @@ def test_what_a_search_goes_by_is_told_everywhere(cli, monkeypatch: pytest.Monke
     assert made.status == 0, made.err
     monkeypatch.setattr(stretches, "MOST", 5000)
     monkeypatch.setattr(stretches, "FEWEST", 4)
-    found = cli(
-        "task=explain",
-        f"measured={made.runs()[0]}",
-        "engine=mujoco",
-        "evaluator=serial",
-        "task.only=[coulomb_friction]",
-    )
+    asked = ("task=explain", f"measured={made.runs()[0]}", "engine=mujoco", "task.only=[coulomb_friction]")
+    found = cli(*asked, "evaluator=serial")
     assert found.status == 0, found.err
     (run,) = found.runs()
     summary = (run / "summary.json").read_text()
@@ -31,3 +26,6 @@ def test_what_a_search_goes_by_is_told_everywhere(cli, monkeypatch: pytest.Monke
         said = " ".join(text.split())
         assert "So that the search ends, it goes by 4 stretches of 48 s" in said and "compare takes all of it" in said
     assert json.loads(summary)["verdict"] == "effect"
+    apart = cli(*asked, "evaluator=ray", "evaluator.workers=2", "task.rerun=false")
+    assert apart.status == 0, apart.err
+    assert apart.summary()["result_digest"] == found.summary()["result_digest"], "whoever simulates them"
