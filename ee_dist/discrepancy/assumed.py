@@ -33,12 +33,16 @@ TOGETHER = ("position_gain", "speed_gain", "torque_limit", "rotor_inertia", "cou
 GAINS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Shares of the assumed gains to look from: a guess may be off by an order of magnitude."""
 ROTORS = ("rotor_factor", "rotor_inertia")
+OF_ONE = ("position_gain", "speed_gain", *ROTORS)
+"""What a controller that somebody guessed at is known by as a whole: how late a joint follows tells no more than their ratios."""
 LAGS_RAD = (0.0, 0.02, 0.05)
 """Errors (rad, m) at which a joint comes to rest by dry friction, to look from: those of hobby servos."""
 LIMITS = (0.0, 0.7)
 """Shares of the stated torque limit that are not there, to look from."""
 STARTS = 3
 """Of the starts that many are fitted."""
+MUCH_DAMPED = 2.0
+"""Times the damping that was guessed from which a joint that follows as late as it was seen to follows as a filter does."""
 CARRIED, MUCH = "weight_carried", 0.9
 """Controllers of arms that are sold carry the weight. Held up by gains alone it takes stiff ones and much friction, which no
 single effect leads away from: soft gains sag. So they are looked for with most of it carried, too,"""
@@ -162,6 +166,13 @@ def _fitted(
     return parts, fit.u, fit.energy
 
 
+def of_one_guess(model: Model) -> set[int]:
+    """Numbers of the parts that stay or go together: a controller that was guessed is not put right by its gain beside damping
+    that is as guessed, however little these data tell the two apart. There is nothing right in a guess to be near to."""
+    found = {k for k, c in enumerate(model.parts) if c.guess and c.effect.name in OF_ONE}
+    return found if len(found) > 1 else set()
+
+
 def puts_right(robot: Robot, c: Candidate) -> bool:
     """Whether it is one of these effects, at joints whose gains were assumed; or one value for all of whatever was assumed."""
     at = {*(c.members(robot) or (c.target,))}
@@ -188,6 +199,12 @@ def _bounded(c: Candidate) -> Candidate:
     return replace(c, bounds=tuple((max(low, LEAST), min(high, MOST)) for low, high in c.bounds))
 
 
+def guess_of(robot: Robot, effect: str, field: str) -> list[Candidate]:
+    """The one number of an effect for all drives of which that field was assumed; none where it was of none."""
+    joints = robot.assumed_joints(field)
+    return _at(robot, _by_factor(robot, effect, joints), joints) if joints else []
+
+
 def _by_factor(robot: Robot, effect: str, joints: Sequence[str]) -> str:
     """The effect, or, of rotors that were guessed from the size of each motor, the one that they share: by that guess."""
     guessed = uneven_rotors(robot) if effect == "rotor_inertia" else ()
@@ -208,21 +225,25 @@ def _lag(robot: Robot, joints: Sequence[str]) -> float:
 
 
 def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
-    """A grid: damping falls with the gain, so that a joint follows as fast, and friction holds as large an error. Rotors are as
-    assumed, or fall with the gain too: who took a motor for ten times as strong as it is took its rotor for as heavy."""
+    """A grid: damping falls with the gain, so that a joint follows as fast, or is what makes it as late as it was seen to be,
+    and friction holds as large an error. Rotors are as assumed, or fall with the gain too: who took a motor for ten times as
+    strong as it is took its rotor for as heavy."""
     drives, lag = [drive_of(robot, j) for j in joints], _lag(robot, joints)
-    stiffness, rotor = (float(np.median([getattr(d, n) for d in drives])) for n in ("kp", "rotor_inertia"))
+    stiffness, damping, rotor = (
+        float(np.median([getattr(d, n) for d in drives])) for n in ("kp", "kd", "rotor_inertia")
+    )
     scaled = (False, True) if any(c.effect.name in ROTORS for c in model.parts) else (False,)
     delays = tuple(share * lag for share in LATER) if any(c.effect.name == LATE for c in model.parts) else (0.0,)
     found = []
-    for gain, apart, limit, lighter, delay in product(GAINS, LAGS_RAD, LIMITS, scaled, delays):
-        if lighter and gain == 1.0:
+    for gain, apart, limit, lighter, delay, filters in product(GAINS, LAGS_RAD, LIMITS, scaled, delays, (False, True)):
+        damped = (lag - delay) * stiffness / damping if filters and damping > 0 else 1.0
+        if (lighter and gain == 1.0) or (filters and damped < MUCH_DAMPED):
             continue
         values = {
             "rotor_factor": gain if lighter else 1.0,
             "rotor_inertia": (gain - 1.0) * rotor if lighter else 0.0,
             "position_gain": gain,
-            "speed_gain": gain,
+            "speed_gain": gain * damped,
             "torque_limit": limit,
             "coulomb_friction": apart * gain * stiffness,
             LATE: delay,

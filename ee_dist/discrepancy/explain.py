@@ -13,6 +13,7 @@ from ee_dist.discrepancy.evidence.judge import Judged, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise
 from ee_dist.discrepancy.evidence.signs import either_sign
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Current, Effort, Examined, examine
+from ee_dist.discrepancy.left_as_guessed import beside_guesses
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import Candidate, known, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
@@ -159,7 +160,8 @@ def _how_sure(search: Search, best: Judged, found: Examined) -> list[ParameterRe
     problem, model, u = search.problem, best.model, best.u
     residual = search.residuals([model.hypothesis(u)])[0]
     fit = Fit(model, u, float(residual @ residual), residual, slopes_at(search, model, u), search.everything)
-    reports = parameters(problem, fit, found.left, found.tried, either_sign(search, fit))
+    beside = beside_guesses(search, fit)
+    reports = parameters(problem, fit, found.left, found.tried, either_sign(search, fit), guesses=beside)
     return [replace(p, term=p.term + len(search.fixed)) for p in reports]
 
 

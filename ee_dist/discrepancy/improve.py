@@ -37,6 +37,7 @@ from ee_dist.discrepancy.exchanges import exchanged, refitted, twins_of
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung, Twin
 from ee_dist.discrepancy.last_steps import last_steps
+from ee_dist.discrepancy.left_as_guessed import beside_guesses
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import without_useless
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of
@@ -307,7 +308,8 @@ def _finish(
         fit = fit_one(search, model, [current.u], None, (*WIDTHS[2:], 0.006), prior)
         residual, terms = fit.residual, (*search.fixed, *fit.hypothesis)
         left = leftovers(problem, residual)
-        reports = parameters(problem, fit, left, tried, either_sign(search, fit), flat_widths(search, fit))
+        beside = beside_guesses(search, fit)
+        reports = parameters(problem, fit, left, tried, either_sign(search, fit), flat_widths(search, fit), beside)
         told = [replace(p, term=p.term + len(search.fixed)) for p in reports]
         worth = worth_of(problem, fit, base)
     before, after = ladder[0].error_heldout, ladder[-1].error_heldout

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import of_one_guess
 from ee_dist.discrepancy.everywhere import FEWEST, stands_out
 from ee_dist.discrepancy.evidence.holdout import PRIOR
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY
@@ -90,9 +91,10 @@ def instead_of(
     now, *fits = follow_valley(search, [(model, current.u), *starts], mine, PRIOR, widths=(WIDTH,))
     allowed = TIE_ENERGY * max(float(floor[mine].mean()), now.energy / int(mine.sum()))
     out: dict[str, Instead] = {}
+    guessed = {current.parts[k].name for k in of_one_guess(model)}
     for fit in sorted(fits, key=lambda f: f.energy):
         (gone,) = (c for c in current.parts if c not in fit.model.parts)
-        nearer = bool(fit.u @ fit.u + NEARER < now.u @ now.u)
+        nearer = gone.name not in guessed and bool(fit.u @ fit.u + NEARER < now.u @ now.u)
         if fit.energy - now.energy < allowed and gone.name not in out:
             better = now.energy - fit.energy > allowed
             out[gone.name] = Instead(gone, Current(fit.model.parts, fit.u), nearer, better)

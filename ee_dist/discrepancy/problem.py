@@ -85,6 +85,8 @@ IN_STEPS = (
     "Each command is taken to have acted in one step of a simulation, and not to have been held until the next row, as a robot's "
     "drives do ('commands_between: held' in the mapping says that they did)."
 )
+EVENT = 170.0
+"""Energy of a few values that come a step early or late, at a contact or a reversal: a model good to the noise misses some."""
 TIMES_NOISE = "times the noise"
 """The unit of an error of channels that have no unit in common."""
 
@@ -231,6 +233,12 @@ class Problem(ABC):
         """The measure that a search goes by, of all of these trials, for what took no part in it: errors stand beside those of
         the search."""
         return self
+
+    @cached_property
+    def events(self) -> Array:
+        """(trials, channels) energy that a few values may have which come a step early or late: as much as contacts have, unless
+        a way knows better."""
+        return np.full((len(self.measured), len(self.channels)), EVENT)
 
     @property
     def looped(self) -> tuple[int, ...]:

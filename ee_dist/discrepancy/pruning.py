@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import of_one_guess
 from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, HeldOut, cross_fit, held_by_slopes
 from ee_dist.discrepancy.evidence.judge import does_nothing
 from ee_dist.discrepancy.evidence.rule import WORTH, least_energy
@@ -135,11 +136,13 @@ def _luck(problem: Problem, fit: Fit) -> Array:
 
 def units_of(model: Model, first: int, end: int) -> list[list[int]]:
     """Numbers of the parts from ``first`` to ``end`` that have values, by what stays or goes together: masses of a body's parts
-    share their marks, and some of them without the others would have to stand in for these."""
+    share their marks, and some of them without the others would have to stand in for these. What puts right what was guessed of
+    controllers as a whole stays."""
     units: dict[str, list[int]] = {}
+    stays = of_one_guess(model)
     for k in range(first, end):
         c = model.parts[k]
-        if c.size:
+        if c.size and k not in stays:
             units.setdefault(c.effect.name if c.effect.family == "body" and c.effect.everywhere else c.name, []).append(
                 k
             )
@@ -151,7 +154,8 @@ def without_useless(
 ) -> tuple[Current, tuple[str, ...]]:
     """The model without the terms that the last ones have made useless: leaving them out costs no more held-out energy
     than luck, and less than a term must be worth."""
-    old = range(own, len(current.parts) - added)
+    stays = of_one_guess(Model(current.parts))
+    old = [k for k in range(own, len(current.parts) - added) if k not in stays]
     if not old:
         return current, ()
     if len(current.u) >= LARGE:
@@ -168,7 +172,7 @@ def without_useless(
     if costs[cheapest] > most * 0.5:
         return current, ()
     model, start = models[1 + cheapest]
-    name = current.parts[own + cheapest].name
+    name = current.parts[old[cheapest]].name
     fit = fit_all(search, [(model, start)], None, WIDTHS[2:])[0]
     return Current(model.parts, fit.u), (name,)
 

@@ -8,6 +8,7 @@ that no controller holds go by half steps (``engines.halfway``): there only damp
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -15,7 +16,8 @@ from functools import lru_cache
 import numpy as np
 
 from ee_dist.basics.altered import altered
-from ee_dist.engines.drive import stiff_joints
+from ee_dist.engines.drive import LOOK_SHARE
+from ee_dist.robots.inertia import felt_inertia, steady_inertia
 from ee_dist.robots.model import Drive, Robot
 from ee_dist.trials.log import Array
 
@@ -42,18 +44,29 @@ def centred(values: Array, columns: Sequence[int]) -> Array:
 
 def between_steps(robot: Robot) -> Robot:
     """The robot whose steps follow what this one does in continuous time. Damping by the speed of half a step ago pushes where
-    it should resist, as if half a step's damping were missing from the inertia: it is put back on the rotor. Damping that
-    an engine takes at the end of a step is as much too much."""
-    ends = stiff_joints(robot)
-    drives = [_made_up(d, robot.time_step_s / 2, bool(end)) for d, end in zip(robot.drives, ends, strict=True)]
+    it should resist, as if half a step's damping were missing from the inertia: it is put back on the rotor. Passive damping,
+    which engines take at the end of a step, is as much too much.
+
+    Of damping that stops a joint in half a step or less so much is put on it that it stops in one, whatever the engine. Such a
+    joint goes as fast as damping lets it be pushed, whatever its inertia is: the step of an implicit method."""
+    slopes = np.array([_active(d) for d in robot.drives])
+    looks = np.any(slopes * robot.time_step_s > LOOK_SHARE * felt_inertia(robot))
+    stopped = (steady_inertia(robot) / robot.time_step_s).tolist() if looks else [math.inf] * len(slopes)
+    drives = [_made_up(d, robot.time_step_s / 2, most) for d, most in zip(robot.drives, stopped, strict=True)]
     return altered(robot, drives=tuple(drives))
 
 
 @lru_cache(4096)
-def _made_up(drive: Drive, half_s: float, at_end: bool) -> Drive:
+def _made_up(drive: Drive, half_s: float, stopped: float) -> Drive:
+    """``stopped``: the damping (N.m.s/rad) that stops the joint in a step."""
+    active = _active(drive)
+    begin, end = max(active, 2 * (active - stopped)), drive.viscous + drive.back_emf * drive.strength
+    return replace(drive, rotor_inertia=max(0.0, drive.rotor_inertia + half_s * (begin - end)))
+
+
+@lru_cache(4096)
+def _active(drive: Drive) -> float:
+    """N.m.s/rad by which the controller and its motor damp the joint at the speed that a step begins with."""
     controller = {"position": drive.kd, "speed": drive.kp}.get(drive.command, 0.0)
     voltage = drive.command in ("position", "speed") and np.isfinite(drive.speed_limit)
-    active = (controller + (drive.torque_limit / drive.speed_limit if voltage else 0.0)) * drive.strength
-    begin, end = (0.0, active) if at_end else (active, 0.0)
-    end += drive.viscous + drive.back_emf * drive.strength
-    return replace(drive, rotor_inertia=max(0.0, drive.rotor_inertia + half_s * (begin - end)))
+    return (controller + (drive.torque_limit / drive.speed_limit if voltage else 0.0)) * drive.strength

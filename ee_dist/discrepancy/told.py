@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import of_one_guess
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, prior_of
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.examine import Current
@@ -109,8 +110,9 @@ def _left_out(
 
 
 def _each(model: Model, first: int, end: int) -> list[list[int]]:
-    """Numbers of the parts from ``first`` to ``end`` that have values, each by itself."""
-    return [[k] for k in range(first, end) if model.parts[k].size]
+    """Numbers of the parts from ``first`` to ``end`` that have values, each by itself, but for what stays."""
+    stays = of_one_guess(model)
+    return [[k] for k in range(first, end) if model.parts[k].size and k not in stays]
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,13 +44,27 @@ def motor_weak(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     return robot.map_drive(target, weaker)
 
 
+LEAST_LOSS, MOST_LOSS = -4.0, 0.95
+"""Shares of a torque limit that may be lost, the first of one that was guessed at: it may have been five times too low."""
+
+
+def _limits(robot: Robot, target: str) -> dict[str, Range]:
+    return {"loss": (LEAST_LOSS if (target, "torque_limit") in robot.assumed else 0.0, MOST_LOSS)}
+
+
 @effect(
     "torque_limit",
     family="drive",
     targets=motors_with_torque_limit,
-    parameters=(Parameter("loss", "1", 0.0, 0.95, 0.0, "share of the torque limit that is lost", 0.02),),
+    parameters=(
+        Parameter(
+            "loss", "1", -9.0, 0.95, 0.0, "share of the torque limit that is lost; below 0 there is more of it", 0.02
+        ),
+    ),
+    ranges=_limits,
     physics="The electronics cap the drive (a lower limit on duty cycle or current) below what the model allows; under the "
-    "cap it works as modelled. With the voltage, the speed without load falls by the same share.",
+    "cap it works as modelled. With the voltage, the speed without load falls by the same share. A limit that was only guessed "
+    "at may be too low as well.",
     signature="Nothing while little torque is asked; then torque is flat at the cap and the joint falls behind.",
     reference=MOTORS,
     guesses=Assumed("torque_limit"),

@@ -29,6 +29,8 @@ __all__ = [
 
 STEPS = 2.8
 """Time steps in a radian of a joint's own oscillation from which its controller is simulated as it is."""
+LATE_STEPS = 2.0
+"""Time steps that such a joint is late, at least."""
 DELAYED_STEPS, DELAYED_S = 20.0, 0.1
 """Longest delay worth trying: of a controller that works in the robot's steps, and of one that does not;"""
 OF_THE_LAG = 1.25
@@ -100,8 +102,11 @@ def stiffest(robot: Robot, joint: str) -> float:
 
 
 def firmest(robot: Robot, joint: str) -> float:
-    """The largest gain of a position controller that the time step resolves; N.m/rad (N/m)."""
-    return inertia(robot, joint) / (STEPS * robot.time_step_s) ** 2
+    """The largest gain of a position controller that the time step resolves; N.m/rad (N/m). A joint that is damped so much that
+    its inertia hardly matters follows as a filter does, and what counts is how late."""
+    drive, dt = drive_of(robot, joint), robot.time_step_s
+    late = drive.kd / (LATE_STEPS * dt) if drive.command == "position" else 0.0
+    return max(inertia(robot, joint) / (STEPS * dt) ** 2, late)
 
 
 def weight(robot: Robot) -> float:

@@ -16,7 +16,7 @@ from way_samples import Sample, measure, problem_by, samples
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
-from ee_dist.discrepancy.assumed import GUESS, LABEL, assumed_drives, guessed_text, puts_right
+from ee_dist.discrepancy.assumed import GUESS, LABEL, assumed_drives, guessed_text, of_one_guess, puts_right
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.everywhere import instead, taken_apart
 from ee_dist.discrepancy.evidence import judge
@@ -24,6 +24,7 @@ from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.lags import with_lags
 from ee_dist.discrepancy.problem import Problem, error
+from ee_dist.discrepancy.pruning import units_of
 from ee_dist.discrepancy.search.candidates import Proposal, candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import as_slow
@@ -125,6 +126,45 @@ def test_a_guess_that_is_farther_off_than_one_may_go_at_first_is_found_by_going_
     assert found["position_gain"]["factor"] == pytest.approx(softer, rel=0.15)
     as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
     assert better < 0.2 * as_it_is
+
+
+def test_a_joint_that_follows_as_a_filter_does_has_far_more_damping_than_was_guessed() -> None:
+    """More than an explicit step of it holds, and no friction, delay or softer gain in its place."""
+    sample, late_s = samples()["arm"], 0.15
+    drives = tuple(replace(d, kd=late_s * d.kp, rotor_inertia=0.3 * d.rotor_inertia) for d in sample.robot.drives)
+    trials = measure(replace(sample, robot=replace(sample.robot, drives=drives)), ())
+    guess = tuple(replace(d, kd=d.kd / 4) for d in sample.robot.drives)
+    described = replace(sample.robot, drives=guess, assumed=tuple((d.joint, f) for d in drives for f in ("kp", "kd")))
+    robot = with_lags(described, trials)
+    for d in guess:
+        (_, most), (_, unseen) = (
+            find("speed_gain").bounds(r, d.joint)["factor"] for r in (robot, replace(robot, joints=described.joints))
+        )
+        assert unseen * d.kd < late_s * d.kp < most * d.kd, "as long as nobody saw how late it is, what steps hold"
+    problem = problem_by("open_loop", trials, robot)
+    pool = candidates(robot, only=["position_gain", "speed_gain", "rotor_inertia", "coulomb_friction"])
+    proposal, u = assumed_drives(Search(problem), pool) or pytest.fail("nothing was proposed")
+    terms = Model(proposal.parts).hypothesis(u)
+    found = apply(robot, terms).drives
+    for d in found:
+        assert d.kd / d.kp == pytest.approx(late_s, rel=0.05)
+    as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
+    assert better < 0.1 * as_it_is
+
+
+def test_a_limit_that_was_guessed_may_be_too_low() -> None:
+    sample = samples()["arm"]
+    lower = tuple(replace(d, torque_limit=0.1 * d.torque_limit) for d in sample.robot.drives)
+    trials = measure(sample, ())
+    guess = tuple((d.joint, f) for d in lower for f in ("torque_limit", "kp", "kd"))
+    robot = replace(sample.robot, drives=lower, assumed=guess)
+    problem = problem_by("open_loop", trials, robot)
+    assert find("torque_limit").bounds(replace(robot, assumed=()), lower[0].joint)["loss"][0] == 0.0
+    pool = candidates(robot, only=["position_gain", "speed_gain", "torque_limit"])
+    proposal, u = assumed_drives(Search(problem), pool) or pytest.fail("nothing was proposed")
+    found = apply(robot, Model(proposal.parts).hypothesis(u))
+    assert found.drives[0].torque_limit > 2.0 * lower[0].torque_limit
+    assert found.drives[0].kp == pytest.approx(lower[0].kp, rel=0.1)
 
 
 def test_weight_that_controllers_carry_is_found_with_them() -> None:
@@ -284,6 +324,19 @@ def linear(hidden: Hypothesis, twins: bool = False) -> Linear:
     problem = Guessed(hidden)
     problem.robot = replace(LINEAR, assumed=((JOINTS[0], "rotor_inertia"),))
     return problem
+
+
+def test_a_guessed_controller_is_put_right_as_a_whole_or_not_at_all() -> None:
+    """Gain, damping and rotor, of which a log may tell ratios alone; a limit that is never reached goes as anything else."""
+    robot = replace(LINEAR, assumed=tuple((j, f) for j in LINEAR.motor_names for f in ("kp", "kd", "torque_limit")))
+    names = ("position_gain", "speed_gain", "torque_limit", "coulomb_friction")
+    model = Model(tuple(candidate(robot, n, "all_joints") for n in names))
+    assert of_one_guess(model) == {0, 1}
+    assert units_of(model, 0, len(names)) == [[2], [3]]
+    alone = Model((model.parts[0], *model.parts[2:]))
+    assert of_one_guess(alone) == set() and units_of(alone, 0, 3) == [[0], [1], [2]]
+    known = Model(tuple(candidate(LINEAR, n, "all_joints") for n in names))
+    assert of_one_guess(known) == set()
 
 
 def test_of_what_is_tied_a_guess_goes_before_a_sound_part() -> None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from linear_problem import Linear
+from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.accounts.account import curves_of
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.discrepancy.problem import Layout
+from ee_dist.discrepancy.problem import EVENT, Layout
 
 TRIALS, CHANNELS, PER = 6, 20, 15
 
@@ -71,3 +75,24 @@ def test_repeats_of_a_motion_are_told_apart() -> None:
     left = leftovers(p, residual)
     assert curves_of(left) == 2 and {g.index for g in left} == {4, 5}
     assert {str(g).split(" (")[0] for g in left} == {"channel 3 during 5. sway", "channel 3 during 6. sway"}
+
+
+@pytest.mark.parametrize("real", [True, False])
+def test_of_a_real_arm_that_touches_nothing_a_smooth_error_stands_out(real: bool) -> None:
+    """Of a simulation, whose model may be exact, contacts and reversals a step early are granted as before."""
+    sample = samples()["arm"]
+    trials = tuple(replace(t, hardware=real, commands_held=real) for t in measure(sample, ()))
+    p = problem_by("open_loop", trials, sample.robot)
+    (shoulder, *_) = (c for c, s in enumerate(sample.robot.sensors) if s.kind == "position")
+    there = (p.channel_of == shoulder) & p.layout.reading & (p.trial_of == 0)
+    p.layout = replace(p.layout, floor=np.where(there, 0.01, p.layout.floor))
+    residual = np.where(there, np.sqrt(400.0 / there.sum()) * np.sin(7 * p.layout.time_s), 0.0)
+    assert 0 < p.events[0, shoulder] <= EVENT
+    assert (p.events[0, shoulder] < 0.2 * EVENT) == real
+    assert [g.channel for g in leftovers(p, residual)] == ([sample.robot.sensors[shoulder].name] if real else [])
+
+
+def test_what_walks_about_may_touch_down_a_step_early() -> None:
+    sample = samples()["quadruped"]
+    trials = tuple(replace(t, hardware=True, commands_held=True) for t in measure(sample, ()))
+    assert (problem_by("open_loop", trials, sample.robot).events == EVENT).all()

@@ -18,6 +18,7 @@ from ee_dist.engines.contract import Engine, Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.pybullet.engine import PyBulletEngine
+from ee_dist.robots.inertia import steady_inertia
 from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig
@@ -79,6 +80,23 @@ def test_steps_follow_what_a_robot_does_in_between(engine: str, command: str) ->
         left.append(np.sqrt(np.mean((angles(robot, found) - angles(robot, log)) ** 2)))
     runs.close()
     assert left[1] < 0.15 * left[0], left
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("times", [1.9, 3.0, 20.0])
+def test_a_joint_may_be_damped_far_more_than_a_step_of_explicit_damping_holds(engine: str, times: float) -> None:
+    """A servo that follows as a filter does: its damping takes all of the joint's speed in a fraction of a step."""
+    runs, robot = ENGINES[engine](), coarse()
+    stopped = float(steady_inertia(robot)[0]) / STEP_S
+    kd = times * stopped
+    drive = replace(robot.drives[0], kp=kd / 0.1, kd=kd, torque_limit=1e4, speed_limit=np.inf)
+    robot = replace(robot, drives=(drive,))
+    log = in_continuous_time(robot, motion(1, robot), runs)
+    trial = MeasuredTrial("m", log, Commands(log.commands), commands_held=True)
+    (found,) = runs.rollout([rollout_of(trial, robot)])
+    runs.close()
+    late = np.sqrt(np.mean((angles(robot, log) - log.commands[:, 0]) ** 2))
+    assert np.sqrt(np.mean((angles(robot, found) - angles(robot, log)) ** 2)) < 0.03 * late
 
 
 def test_a_held_command_is_met_in_the_middle_and_a_released_drive_stays_released() -> None:

@@ -106,14 +106,16 @@ def test_two_files_with_their_own_clocks_and_lists_in_cells(tmp_path: Path) -> N
         assert float(said.split()[1]) == pytest.approx(-12.0 + 0.04, abs=0.02)
 
 
-@pytest.mark.parametrize("other", ["ee", "measured"])
-def test_commands_and_what_is_called_nothing_in_one_folder(tmp_path: Path, other: str) -> None:
-    """Two files with the same columns are one trial where one of them is called commands."""
+@pytest.mark.parametrize(
+    ("other", "commands"), [("ee", "cmd"), ("measured", "cmd"), ("joint_states_ori", "joint_states_cmd")]
+)
+def test_commands_and_what_is_called_nothing_in_one_folder(tmp_path: Path, other: str, commands: str) -> None:
+    """Two files with the same columns are one trial where one of them is called commands, whatever else both are called."""
     robot, _ = load_robot(samples.robot_file(tmp_path))
     m = samples.motion()
     folder = tmp_path / "run"
     folder.mkdir()
-    for name, values in ((other, m["q"]), ("cmd", m["g"])):
+    for name, values in ((other, m["q"]), (commands, m["g"])):
         columns = {"time": m["t"]} | {j: values[:, k] for k, j in enumerate(samples.JOINTS)}
         pd.DataFrame(columns).to_csv(folder / f"{name}.csv", index=False)
     proposal = proposal_for(sorted(folder.iterdir()), robot, Hints())

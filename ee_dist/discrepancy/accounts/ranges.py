@@ -9,6 +9,7 @@ import numpy as np
 
 from ee_dist.discrepancy.evidence.intervals import (
     ALL_OF_IT,
+    BESIDE_GUESSES,
     BOUND,
     EITHER,
     HARDLY,
@@ -39,7 +40,7 @@ def ranges(
         term = terms[p.term]
         if term.name in told_of:
             range_ = span(term, p.name, p.low, p.high, robot, interval=True)
-            sure = p.flag in ("", HARDLY, EITHER, TOGETHER) and np.isfinite(p.high - p.low)
+            sure = p.flag in ("", HARDLY, EITHER, TOGETHER, BESIDE_GUESSES) and np.isfinite(p.high - p.low)
             range_ += f", of which {EITHER}" if p.flag == EITHER else ""
             told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
     out = [(f"{placed(name)}: " if several else "") + ", ".join(values) for name, values in told_of.items() if values]

@@ -26,6 +26,8 @@ PARTS = 4
 """Windows of what stands out that count as pieces by themselves, where fewer curves do. Of 141 values of 47 robots of one joint,
 one record each by a balance of forces, whose models lacked one or two effects, 99 % were within the interval so, and 100 % at 4.6
 times its width, by curves alone."""
+FARTHER = 2.0
+"""Times its interval that a value may be off beside what was guessed, to be told so."""
 FEW = 3
 """Trials from which they are the pieces that vary; with fewer, segments are."""
 NOT_DETERMINED = "not determined by these data"
@@ -41,6 +43,7 @@ NEUTRAL = "not told from neutral"
 HARDLY = "hardly told from neutral: of as many effects as were tried, luck may tell one as far"
 EITHER = "the other sign does as well"
 TOGETHER = "told only together with others of the model, which make up for it"
+BESIDE_GUESSES = "told only beside what the description guessed of these drives, which may make up for it"
 WIDER = "widened by what is left unexplained"
 ALL_OF_IT = "what is left unexplained could be all of it"
 
@@ -71,13 +74,15 @@ def parameters(
     tried: int = 0,
     either: Mask | None = None,
     flat: Array | None = None,
+    guesses: Array | None = None,
 ) -> list[ParameterReport]:
     """Every value of a fit, in the order of its terms; ``left`` is what stands out of its residual. ``tried``:
     how many effects were in question, of which one in twenty is told from neutral for nothing (0: those of the fit). ``either``
     (P,): values of which the other sign does as well (signs.py); ``flat`` (P,): how far values may go together with others
-    (together.py)."""
+    (together.py); ``guesses`` (P,): half intervals with what was guessed free as well (left_as_guessed.py)."""
     half_u = half_widths(problem, fit)
     along = np.zeros(len(fit.u)) if flat is None else flat
+    beside = np.zeros(len(fit.u)) if guesses is None else guesses
     by_luck = math.sqrt(least_energy(tried)) / scipy.special.ndtri(0.5 + LEVEL / 2) if tried else 1.0
     wider = np.maximum(half_u, half_widths_by_rest(problem, fit, left))
     out, at = [], 0
@@ -87,7 +92,9 @@ def parameters(
         rooms = c.rooms(u)
         for k, (name, value) in enumerate(term.values):
             room = abs(float(rooms[k]))
-            half = max(float(w[k]), float(along[at + k])) * room if np.isfinite(w[k]) else math.inf
+            half = (
+                max(float(w[k]), float(along[at + k]), float(beside[at + k])) * room if np.isfinite(w[k]) else math.inf
+            )
             # By the data alone: what earned its place is told, though something else may have gone into its value. At a bound the
             # slope is of one side, and may say next to nothing of a value that the other side would tell.
             flag = at_bound(c, k, float(u[k]), value, _described(problem.robot, c, k))
@@ -101,6 +108,8 @@ def parameters(
                 flag = EITHER
             if flag in ("", HARDLY, EITHER) and along[at + k] > s[k]:
                 flag = TOGETHER
+            if flag in ("", HARDLY, EITHER) and beside[at + k] > FARTHER * s[k]:
+                flag = BESIDE_GUESSES
             doubt = "" if w[k] <= s[k] else ALL_OF_IT if abs(u[k]) < w[k] else WIDER
             low, high = value - half, value + half
             if math.isfinite(half):  # no farther than physics allows

@@ -16,9 +16,6 @@ LIMIT = 5.0
 """Standard deviations beyond which a group of values (of some hundred) is not noise: one false alarm in 10^4 runs."""
 VARIES = 1.0
 """By how much of itself what calibration left may vary from one robot to the next, as one standard deviation."""
-EVENT = 170.0
-"""Energy of a few values that come a row early or late, at a contact or a reversal: a model good to the noise still misses
-some. It is granted where the scale of a channel is wider than its noise."""
 SETTLED = 1.3
 """Error over the noise floor up to which no more than noise is left where no curve stands out."""
 MANY = 1000
@@ -61,6 +58,7 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
     f = np.bincount(cell, weights=problem.floor, minlength=size).reshape(shape)
     s = np.bincount(cell, weights=residual, minlength=size).reshape(shape)
     b = np.bincount(cell, weights=problem.layout.known, minlength=size).reshape(shape)
+    granted = problem.events
     found = []
     for k, trial in enumerate(problem.trials):
         mine = problem.trial_of_segment == k
@@ -69,7 +67,8 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
         bias = b[mine].sum(0)
         mean_floor = np.divide(f[mine] - b[mine], n[mine], out=np.zeros_like(s[mine]), where=n[mine] > 0)
         for c in np.flatnonzero(count):
-            events = EVENT if floor[c] < 0.3 * count[c] else 0.0
+            # Granted where the scale of a channel is wider than its noise.
+            events = float(granted[k, c]) if floor[c] < 0.3 * count[c] else 0.0
             varies = VARIES * bias[c]
             if problem.layout.by_segment:
                 varies = math.sqrt(2.0 * float((b[mine][:, c] ** 2).sum()))

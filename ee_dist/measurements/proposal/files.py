@@ -16,7 +16,7 @@ from ee_dist.measurements.proposal.layouts import put_together
 from ee_dist.measurements.proposal.model import Hints, Proposal
 from ee_dist.measurements.proposal.stated import add_stated
 from ee_dist.measurements.proposal.time import TimeChoice, time_of
-from ee_dist.measurements.proposal.words import TIME, read_name, role_of
+from ee_dist.measurements.proposal.words import TIME, read_name, role_of, tokens
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.table import Recorded, Table
 from ee_dist.robots.model import Robot
@@ -77,7 +77,11 @@ def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Tabl
     that are called neither. Loggers write columns in whatever order, so that only which there are counts; a file with nothing
     but some of another's columns is of its kind."""
     kinds: dict[tuple[bool | None, frozenset[str]], list[tuple[Path, Table]]] = {}
-    roles = [role_of(f.stem) for f in files]
+    named = [tokens(f.stem) for f in files]
+    everywhere = set.intersection(
+        *map(set, named)
+    )  # joint_states of joint_states_cmd says nothing, where all are called so
+    roles = [role_of(" ".join(w for w in words if w not in everywhere)) for words in named]
     sent = roles.count(True)
     told = sent > 0 and (False in roles or 2 * sent == len(roles))
     for k, file in enumerate(files):

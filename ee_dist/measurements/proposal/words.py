@@ -76,6 +76,7 @@ _MEASURED = frozenset(
     ]
 )
 _ROLES = _COMMAND | _MEASURED
+_STATES = frozenset(["state", "states"])
 _PRESENT = frozenset(["current", "curr", "cur"])
 """Before a position or a speed these say that it was measured, and name no motor's current."""
 _OF_NOW = frozenset(
@@ -195,9 +196,11 @@ def _amperes(name: str, texts: list[str]) -> bool:
 
 
 def role_of(name: str) -> bool | None:
-    """Whether a file or topic is called commands (True) or measurements (False); None where it is called neither, or both."""
+    """Whether a file or topic is called commands (True) or measurements (False); None where it is called neither, or both.
+    Commands for joint_states are commands."""
     words = tokens(name)
-    asked, seen = any(w in _COMMAND for w in words), any(w in _MEASURED for w in words)
+    asked = any(w in _COMMAND for w in words)
+    seen = any(w in _MEASURED and not (asked and w in _STATES) for w in words)
     return asked if asked != seen else None
 
 

@@ -7,6 +7,7 @@ sensors and what its sensors would report is computed afterwards: hypotheses abo
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
@@ -21,8 +22,9 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands, Controllers, Network, command_scaling
 from ee_dist.engines.sensing import SensingPath
 from ee_dist.evaluation.jobs import Evaluator, Job
+from ee_dist.robots.limbs import Limb, limbs, whole
 from ee_dist.robots.model import Robot, Sensor, Wiring
-from ee_dist.trials.log import Array, SensorLog
+from ee_dist.trials.log import Array, SensorLog, State
 
 _SENSOR_FAULTS: dict[str, Any] = {
     f.name: f.default for f in fields(Sensor) if f.name not in ("name", "kind", "target", "unit")
@@ -180,22 +182,27 @@ class Predictor:
         self.block, self.window = block, window
         self.rows = [rows_read(t.log) for t in trials]
         self._obeyed: dict[tuple[int, tuple[int, ...]], Obeyed] = {}
+        self._told: dict[tuple[int, tuple[int, ...]], tuple[Commands, Commands]] = {}
+        """What drives of a limb obey, by what those of all of the robot do."""
         self._only_noisy = [replace(s, noise=0.0) == _faultless(s) for s in base.sensors]
 
     def digests(self, pairs: Sequence[tuple[int, Robot]]) -> list[Digest]:
         """Digests for (trial, model) pairs, simulated in one call."""
         changed = {id(m): self._changed(m) for _, m in pairs}
-        jobs = []
-        bare: dict[tuple[int, bool | None], Robot] = {}
+        bare: dict[tuple[int, bool | None], tuple[Robot, tuple[Limb, ...]]] = {}
         for k, model in pairs:
             which = id(model), self.trials[k].commands_held
             if which not in bare:
-                bare[which] = self.trials[k].simulated(clean(model))
-            early = self.trials[k].early(self.base)
-            whole = bool(changed[id(model)])
-            reduction = ToSensors(early) if whole else ToDigest(self.block, self.window, self.rows[k], early)
-            jobs.append(Job(rollout_of(self.trials[k], model, bare[which], self._given(k, model)), reduction))
-        found = self.evaluator.evaluate(jobs)
+                robot = self.trials[k].simulated(clean(model))
+                bare[which] = robot, limbs(robot)
+        split = shared([(k, *bare[id(m), self.trials[k].commands_held]) for k, m in pairs])
+        jobs = [
+            job
+            for (k, model), some in zip(pairs, split, strict=True)
+            for job in self._jobs(k, model, some, bool(changed[id(model)]))
+        ]
+        each = iter(self.evaluator.evaluate(jobs))
+        found = [joined(some, [next(each) for _ in some]) for some in split]
         out: list[Digest] = list(found)
         alike: dict[tuple[int, ...], list[int]] = {}
         for i, (k, model) in enumerate(pairs):
@@ -211,6 +218,31 @@ class Predictor:
                 for i, seen in zip(some, self._reported(k, faulty), strict=True):
                     out[i] = seen
         return out
+
+    def _jobs(self, trial: int, model: Robot, parts: Sequence[Limb], channels: bool) -> list[Job]:
+        """One of each limb, for its ``channels`` or for their digest."""
+        early = self.trials[trial].early(self.base)
+        all_of_it = rollout_of(self.trials[trial], model, parts[0].robot, self._given(trial, model))
+        jobs = []
+        for limb in parts:
+            own = tuple(i for i, c in enumerate(limb.sensors) if c in early)
+            reduction = ToSensors(own) if channels else ToDigest(self.block, self.window, self.rows[trial], own)
+            jobs.append(Job(all_of_it if len(parts) == 1 else self._alone(limb, all_of_it), reduction))
+        return jobs
+
+    def _alone(self, limb: Limb, of: Rollout) -> Rollout:
+        """The same of one limb."""
+        motors, start = list(limb.motors), of.start
+        assert isinstance(of.driver, Commands)
+        key = id(of.driver), limb.motors
+        if key not in self._told:
+            # The commands of the whole are kept as well, so that their identity cannot become another's.
+            self._told[key] = of.driver, Commands(np.ascontiguousarray(of.driver.values[:, motors]))
+        if start is not None:
+            goals = None if start.goals is None else start.goals[:, motors]
+            start = State(start.joints[motors], start.speeds[motors], goals=goals)
+        external = None if of.external is None else np.ascontiguousarray(of.external[:, motors])
+        return replace(of, model=limb.robot, driver=self._told[key][1], start=start, external=external)
 
     def _given(self, trial: int, model: Robot) -> Obeyed:
         """Models of one wiring share the very array, which so goes to a worker once."""
@@ -267,6 +299,29 @@ class Predictor:
             repeated[:, channels] = grain.repeated.reshape(-1, DRAWS, len(channels)).mean(axis=1)
             out.append(replace(shape, rough=rough, repeated=repeated))
         return out
+
+
+def shared(asked: Sequence[tuple[int, Robot, tuple[Limb, ...]]]) -> list[tuple[Limb, ...]]:
+    """Of robots with their limbs, each in a trial, what is simulated by itself: limbs where another one has one of them in the
+    same trial, and else all of it at once, which takes less than its limbs one after the other."""
+    have = Counter((trial, limb.robot.digest) for trial, _, some in asked if len(some) > 1 for limb in some)
+    return [
+        some if any(have[trial, limb.robot.digest] > 1 for limb in some) else (whole(robot),)
+        for trial, robot, some in asked
+    ]
+
+
+def joined(parts: Sequence[Limb], found: Sequence[Any]) -> Any:
+    """What was kept of limbs, digests or channels, as that of all of the robot."""
+    if len(parts) == 1:
+        return found[0]
+    order = np.argsort(np.concatenate([limb.sensors for limb in parts]))
+    if not isinstance(found[0], Digest):
+        return np.concatenate(found, axis=1)[:, order]
+    means, rough, repeated = (
+        np.concatenate([getattr(d, name) for d in found], axis=1)[:, order] for name in ("means", "rough", "repeated")
+    )
+    return Digest(means, rough, repeated, all(d.finite for d in found))
 
 
 Faulty = tuple[Robot, Array, Sequence[int]]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ee_dist.basics.names import counted
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
-from ee_dist.discrepancy.problem import Index, Layout, Problem, Series, joints_of
+from ee_dist.discrepancy.problem import EVENT, Index, Layout, Problem, Series, joints_of
 from ee_dist.discrepancy.ways.open_loop.falls import fallen
 from ee_dist.discrepancy.ways.open_loop.in_units import InUnits, farther_off, in_units, told_in_units
 from ee_dist.discrepancy.ways.open_loop.predictability import MEMBERS, ensemble
@@ -60,6 +60,8 @@ TOGETHER = 4_000_000
 """Residual values that are computed together: of long logs those of a few hypotheses."""
 SAVED = 0.6
 """Share of the rows that the beginning of trials may have, to be worth a look by itself."""
+AT_ONCE = 16
+"""Values that a contact or a reversal is in."""
 COMMAND_SHARE = 0.005
 """Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
 TINY = 0.25
@@ -167,6 +169,21 @@ class OpenLoop(Problem):
     @property
     def whole(self) -> OpenLoop:
         return self._whole or self
+
+    @cached_property
+    def events(self) -> Array:
+        """Of a real robot that touches nothing, what its sharpest turns make of a step."""
+        found = super().events.copy()
+        if self.robot.free_base or self.robot.world.has_floor or not all(t.real for t in self.measured):
+            return found
+        sensors = len(self.robot.sensors)
+        found[:, :sensors] = 0.0
+        for part, data, deviation in zip(self.parts, self._data, self.deviation, strict=True):
+            spacing = reading_s([part.run]) or self.robot.time_step_s
+            steps = self.block * spacing / self.robot.time_step_s
+            bent = np.diff(data.means.astype(float), n=2, axis=0) / deviation[1:-1] / steps
+            found[part.trial, :sensors] += np.sort(bent**2, axis=0)[-AT_ONCE:].sum(axis=0)
+        return np.minimum(found, EVENT)
 
     @cached_property
     def piece_of(self) -> Index:
