@@ -73,7 +73,8 @@ def improve_account(
     steps = [r for r in found.ladder if r.added]
     lines = []
     if len(steps) > 1:
-        lines.append("Added, in this order: " + "; ".join(phrase(r.added, robot) for r in steps) + ".")
+        in_turn = "; ".join(phrase(r.added, robot) for r in steps)
+        lines.append(f"Added, in this order, with the values that each had then: {in_turn}.")
     # Which way a joint counts is mended in a file, not carried along in a model.
     wrong = [t for t in found.terms if CATALOGUE[t.effect].mistake]
     lines += [f"{plain(placed(t.name)).capitalize()}: {CATALOGUE[t.effect].physics}" for t in wrong]
@@ -124,7 +125,7 @@ def improve_account(
         sure = f"How sure: {counted(tried, 'explanation')} {was_or_were(tried)} tried, and none earns its place"
         sure += f"{unsure_of(unsure)}."
     else:
-        what = _listed([s.text for s in parts]) if parts else "nothing; the model's own values were fitted anew"
+        what = _listed(found, parts) if parts else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {TRIALS_APART if more_there else last.held_out}"
         head += f" {BEYOND if unsure else NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
@@ -191,9 +192,15 @@ def doubt_text(doubted: Sequence[Share]) -> list[str]:
     ]
 
 
-def _listed(names: Sequence[str]) -> str:
-    more = f"; and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return "; ".join(names[:NAMED]) + more
+def _listed(found: Improvement, parts: Sequence[Share]) -> str:
+    """The first few of what is told; what may be nothing is counted, and named only where there is nothing else."""
+    told = [s.text for s in parts if not may_be_nothing(found, s.terms)]
+    names = told or [s.text for s in parts]
+    some = "; ".join(names[:NAMED])
+    more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
+    unsure = len(parts) - len(told)
+    more += [f"{unsure} that may be nothing"] if told and unsure else []
+    return f"{some}; and {' and '.join(more)}" if more else some
 
 
 def _told_from(ties: Mapping[str, Sequence[str]]) -> str:
