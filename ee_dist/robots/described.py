@@ -257,13 +257,18 @@ def _drive(name: str, entry: Mapping[str, Any], found: Mapping[str, float | str]
     )
 
 
+OF_JOINTS = "joints"
+"""In a list of sensors: position and velocity of every driven joint, as where no list is given."""
+
+
 def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Sensor, ...]:
+    usual = [
+        Sensor(f"{kind}_{j.name}", kind, j.name, UNITS[kind, j.kind])
+        for kind in ("position", "velocity")
+        for j in driven
+    ]
     if data is None:
-        return tuple(
-            Sensor(f"{kind}_{j.name}", kind, j.name, UNITS[kind, j.kind])
-            for kind in ("position", "velocity")
-            for j in driven
-        )
+        return tuple(usual)
     if not isinstance(data, list):
         raise RobotError(f"{where}: sensors: expected a list of {{name, kind, target}}, not {quoted(data)}")
     known = tuple(f.name for f in fields(Sensor))
@@ -272,8 +277,13 @@ def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Se
     sensors: list[Sensor] = []
     for i, entry in enumerate(data):
         here = f"{where}: sensors[{i}]"
+        if entry == OF_JOINTS:
+            sensors += usual
+            continue
         if not isinstance(entry, Mapping) or not {"name", "kind"} <= set(entry):
-            raise RobotError(f"{here}: expected {{name, kind, target}}, not {quoted(entry)}")
+            raise RobotError(
+                f"{here}: expected {{name, kind, target}}, or {OF_JOINTS} for those of every joint, not {quoted(entry)}"
+            )
         for key in entry:
             if key not in known:
                 raise RobotError(f"{here}: unknown key {quoted(key)}; {near(str(key), known)}")
@@ -284,8 +294,8 @@ def _sensors(data: Any, driven: list[Joint], body: Body, where: str) -> tuple[Se
         if allowed is not None and target not in allowed:
             what = "part" if kind == "touch" else "driven joint"
             raise RobotError(f"{here}: no {what} named {quoted(target)}; {near(target, allowed)}")
-        usual = OF_BASE.get(kind) or UNITS.get((kind, joints[target].kind if target in joints else ""), "1")
-        unit = str(entry.get("unit", usual))
+        common = OF_BASE.get(kind) or UNITS.get((kind, joints[target].kind if target in joints else ""), "1")
+        unit = str(entry.get("unit", common))
         numbers = {
             str(k): number(v, f"{here}: {k}") for k, v in entry.items() if k not in ("name", "kind", "target", "unit")
         }

@@ -129,6 +129,22 @@ def test_commands_and_what_is_called_nothing_in_one_folder(tmp_path: Path, other
     assert np.abs(away).max() < 0.01
 
 
+@pytest.mark.parametrize("seen", ["read", "measured"])
+def test_columns_that_name_each_joint_as_the_robot_does_need_no_question(tmp_path: Path, seen: str) -> None:
+    """In whatever order: nobody is asked which of two names that are the same is which."""
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    m = samples.motion()
+    columns = {"time": m["t"]}
+    for k, j in reversed(list(enumerate(samples.JOINTS))):
+        columns |= {f"goal_{j}": m["g"][:, k], f"{seen}_{j}": m["q"][:, k], f"{seen}_{j}_velocity": m["w"][:, k]}
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    proposal = proposal_for([tmp_path / "log.csv"], robot, Hints())
+    assert not proposal.questions
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(tmp_path / "chain.yaml"), "log.csv"))
+    ((record, _),) = import_files([tmp_path / "log.csv"], read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert np.array_equal(record.log.sensors[:, :2], m["q"]) and np.array_equal(record.log.commands, m["g"])
+
+
 SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 
 

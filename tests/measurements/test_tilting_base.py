@@ -72,6 +72,21 @@ def test_a_base_that_tilts_is_not_bolted_down(tmp_path: Path, roll: np.ndarray, 
     assert any("imu_roll says that the base tilts" in n for n in proposal.notes) == said
 
 
+def test_a_tilt_that_a_free_base_has_no_sensor_of_is_told_with_what_to_write(tmp_path: Path) -> None:
+    file, _, _ = tilting(tmp_path, "imu_roll", swing(0.2), free=False)
+    described = tmp_path / "chain.yaml"
+    content = yaml.safe_load(described.read_text()) | {"free_base": True}
+    content.pop("sensors", None)
+    wanted = "sensors: [joints, {name: roll, kind: roll}, {name: pitch, kind: pitch}]"
+    said = []
+    for sensors in ({}, yaml.safe_load(wanted)):
+        described.write_text(yaml.safe_dump(content | sensors))
+        robot, _ = load_robot(described)
+        said.append([n for n in proposal_for([file], robot, Hints()).notes if "how the base is tilted" in n])
+    assert len(said[0]) == 1 and said[0][0].startswith("imu_roll") and wanted in said[0][0]
+    assert not said[1]
+
+
 def test_what_is_said_of_the_base_is_no_position_of_a_joint() -> None:
     roll = Sensor("roll", "roll", "body", "rad")
     assert said_of_base("roll_rad", [roll], ["shoulder"]) and said_of_base("imu.roll", [roll], ["shoulder"])

@@ -398,6 +398,20 @@ def test_a_drive_without_a_speed_limit_has_the_speed_of_its_joint_as_scale() -> 
     assert math.isfinite(channel_range(robot.with_joint("shoulder", top_speed=math.inf), velocity))
 
 
+def test_sensors_of_the_base_may_stand_beside_the_usual_ones_of_all_joints() -> None:
+    body = read_urdf(ARM)
+    drives = {"shoulder": {"kp": 20}, "elbow": {"kp": 10}}
+    usual, more = (
+        robot_of_body(body, {"drives": drives, "free_base": True} | listed, "arm.yaml")[0].sensors
+        for listed in ({}, {"sensors": ["joints", {"name": "tilt", "kind": "roll"}]})
+    )
+    assert more[:-1] == usual and (more[-1].name, more[-1].kind) == ("tilt", "roll")
+    with pytest.raises(
+        RobotError, match=r"sensors\[0\]: expected \{name, kind, target\}, or joints for those of every"
+    ):
+        robot_of_body(body, {"drives": drives, "sensors": ["joint"]}, "arm.yaml")
+
+
 def test_controllers_may_keep_to_the_velocity_limits_of_the_file() -> None:
     body = read_urdf(ARM)
     drives = {"shoulder": {"kp": 20}, "elbow": {"kp": 10, "command_speed": 0.5}}

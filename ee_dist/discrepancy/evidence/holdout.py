@@ -15,7 +15,7 @@ import numpy as np
 
 from ee_dist.discrepancy.evidence.repeats import between_rows, near, near_later
 from ee_dist.discrepancy.problem import Index, Mask, Problem
-from ee_dist.discrepancy.search.fit import fit_all
+from ee_dist.discrepancy.search.fit import SHORT, fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, Leading
@@ -48,6 +48,8 @@ PRIOR = 1.0
 does not determine is neutral there, and not what the part held out would like it to be."""
 PIECES = 10
 """Pieces of a segment over which what is above the noise may average out."""
+AWAY = 3
+"""Iterations that take many values away from where all data had put them, in a turn that holds some of these out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,9 +230,10 @@ def cross_fit(
     cut: Cut,
     widths: Sequence[float] = WIDTHS[2:],
     leading: Leading = None,
+    short: int = SHORT,
 ) -> list[HeldOut]:
-    """Each (model, start) fitted in every turn on what is not held out, and judged on the rest. ``leading``: slopes that are
-    known (see slopes.py)."""
+    """Each (model, start) fitted in every turn on what is not held out, and judged on the rest. ``leading``, ``short``: slopes
+    that are known, and iterations of many values (see fit.py)."""
     problem = search.problem
     residuals = [np.zeros(len(problem.segment_of)) for _ in starts]
     seen, count = np.zeros(len(starts)), 0
@@ -241,7 +244,7 @@ def cross_fit(
         if mask.all():
             continue
         count += int(mask.sum())
-        for i, fit in enumerate(fit_all(search, starts, mask, widths, prior, leading)):
+        for i, fit in enumerate(fit_all(search, starts, mask, widths, prior, leading, short)):
             residuals[i][~mask] = fit.residual[~mask]
             seen[i] += fit.energy
             fits[i].append(fit)
@@ -251,7 +254,8 @@ def cross_fit(
 def held_by_slopes(search: Search, fits: Sequence[Fit], cut: Cut) -> list[HeldOut]:
     """Models that were fitted to all data, judged on what is held out: many values follow in each turn by the slopes that are
     known, few are fitted anew. What the values do is simulated all the same. Where these slopes lead nowhere in any turn, as in a
-    residual that is rugged far above the noise, values that have seen all data would be judged on them: those are fitted anew."""
+    residual that is rugged far above the noise, values that have seen all data would be judged on them: those are fitted anew,
+    as far as takes them away from there."""
     known = [i for i, f in enumerate(fits) if len(f.u) >= LARGE and f.mask.all()]
     others = [i for i in range(len(fits)) if i not in known]
     found: dict[int, HeldOut] = {}
@@ -261,7 +265,8 @@ def held_by_slopes(search: Search, fits: Sequence[Fit], cut: Cut) -> list[HeldOu
             found |= dict(zip(some, held, strict=True))
     still = [i for i in known if all(np.array_equal(f.u, fits[i].u) for f in found[i].fits)]
     if still:
-        found |= dict(zip(still, cross_fit(search, [(fits[i].model, fits[i].u) for i in still], cut), strict=True))
+        anew = cross_fit(search, [(fits[i].model, fits[i].u) for i in still], cut, short=AWAY)
+        found |= dict(zip(still, anew, strict=True))
     return [found[i] for i in range(len(fits))]
 
 

@@ -24,16 +24,17 @@ def fit_all(
     widths: Sequence[float] = WIDTHS,
     prior: float = 0.0,
     leading: Leading = None,
+    short: int = SHORT,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given. ``leading``: known
-    slopes (see slopes.py). Models of many values are fitted by valley.py."""
+    slopes (see slopes.py). Models of many values are fitted by valley.py, from a good start in ``short`` iterations."""
     chosen = search.everything if mask is None else mask
     large = [i for i, (_, u) in enumerate(starts) if leading is None and len(u) >= LARGE]
     if large:
         small = [i for i in range(len(starts)) if i not in large]
         found = dict(zip(small, fit_all(search, [starts[i] for i in small], mask, widths, prior), strict=True))
         far = len(widths) > 2
-        count = ITERATIONS if far else SHORT
+        count = ITERATIONS if far else short
         fits = follow_valley(search, [starts[i] for i in large], chosen, prior, count, widths[:1], settled=not far)
         found |= dict(zip(large, fits, strict=True))
         return [found[i] for i in range(len(starts))]

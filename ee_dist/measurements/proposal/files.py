@@ -12,6 +12,7 @@ import numpy as np
 
 from ee_dist.basics.names import listed
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.proposal.by_sensor import tilt_of
 from ee_dist.measurements.proposal.layouts import put_together
 from ee_dist.measurements.proposal.model import Hints, Proposal
 from ee_dist.measurements.proposal.stated import add_stated
@@ -22,6 +23,7 @@ from ee_dist.measurements.table import Recorded, Table
 from ee_dist.robots.model import Robot
 
 MOST_SHOWN = 12
+TILTS = ("roll", "pitch")
 _CUT = re.compile(r"[_\-. ]+")
 _TRIALS = frozenset(["episode", "episodes", "trial", "trials", "run", "runs", "demo", "traj", "trajectory", "rollout"])
 
@@ -170,6 +172,13 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
     if left:
         more = f" and {len(left) - MOST_SHOWN} more" if len(left) > MOST_SHOWN else ""
         proposal.notes.append(f"columns not used: {', '.join(left[:MOST_SHOWN])}{more}")
+    tilts = [name for name in left if tilt_of(name)]
+    if tilts and robot.free_base and not any(s.kind in TILTS for s in robot.sensors):
+        wanted = ", ".join(f"{{name: {kind}, kind: {kind}}}" for kind in TILTS)
+        proposal.notes.append(
+            f"{listed(tilts)} would say how the base is tilted, and the description has no sensors of it, so that each trial "
+            f"begins level: write 'sensors: [joints, {wanted}]' into it"
+        )
     for said in (proposal.notes, proposal.questions):  # names of columns may have line breaks
         said[:] = [" ".join(text.split()) for text in said]
     return proposal

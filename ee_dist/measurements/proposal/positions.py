@@ -156,7 +156,8 @@ def _other_joints(v: View) -> tuple[str, ...]:
             there = [a for a in series_of(table, filled=True) if a != v.times[table.name].column]
             names, columns = other_names(there, len(v.joints) + more)
             own = frozenset(w for name in names for w in tokens(name))
-            if names and any(read_name(c[0], own).kind == POSITION for c in columns):
+            same = {*names} == {"_".join(tokens(j)) for j in v.robot.motor_names}
+            if names and not same and any(read_name(c[0], own).kind == POSITION for c in columns):
                 return names
     return ()
 

@@ -73,6 +73,9 @@ _MEASURED = frozenset(
         "istwert",
         "msr",
         "sensed",
+        "read",
+        "reading",
+        "readings",
     ]
 )
 _ROLES = _COMMAND | _MEASURED
