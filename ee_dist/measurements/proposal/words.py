@@ -200,10 +200,12 @@ def _amperes(name: str, texts: list[str]) -> bool:
 
 def role_of(name: str) -> bool | None:
     """Whether a file or topic is called commands (True) or measurements (False); None where it is called neither, or both.
-    Commands for joint_states are commands."""
+    joint_states_cmd are commands; what /control/joint_states is nobody knows."""
     words = tokens(name)
-    asked = any(w in _COMMAND for w in words)
-    seen = any(w in _MEASURED and not (asked and w in _STATES) for w in words)
+    told = [w for w in words if w in _ROLES]
+    asked = any(w in _COMMAND for w in told)
+    of_states = bool(told) and told[-1] in _COMMAND
+    seen = any(w in _MEASURED and not (of_states and w in _STATES) for w in told)
     return asked if asked != seen else None
 
 
