@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from ee_dist.basics.altered import altered
-from ee_dist.effects.catalogue import EffectError, Hypothesis, Parameter, apply, find
+from ee_dist.effects.catalogue import EffectError, Hypothesis, Parameter, Term, apply, find
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Drive, Robot, RobotError
 from ee_dist.robots.numbers import checked
@@ -36,10 +38,32 @@ def check_written(robot: System, terms: Hypothesis) -> None:
         raise EffectError(str(error)) from None
 
 
+def as_far_as_there_is(robot: Robot, terms: Hypothesis) -> Hypothesis:
+    """The same terms, which take no more off a joint than it is described with where nothing that several joints share is left of
+    it: what else a search took off does nothing, and a model file that says so could not be read."""
+    out = list(terms)
+    for k, name, joint in _too_much(robot, terms):
+        has = float(getattr(drive_of(robot, joint), find(terms[k].effect).parameter(name).on_top))
+        values = dict(out[k].values)
+        values[name] = max(values[name], 0.0 - has)
+        out[k] = Term(terms[k].effect, terms[k].target, tuple(values.items()))
+    return tuple(out)
+
+
 def _not_too_much(robot: Robot, terms: Hypothesis) -> None:
     """What a joint has less of than all of them share may be more than a fit left of it; the joint has none of it then."""
+    for k, name, joint in _too_much(robot, terms):
+        t, p = terms[k], find(terms[k].effect).parameter(name)
+        has = getattr(drive_of(robot, joint), p.on_top)
+        raise EffectError(
+            f"{t}: {joint} is described with {has:g} {p.unit} of it; {-dict(t.values)[name]:g} cannot be taken off"
+        )
+
+
+def _too_much(robot: Robot, terms: Hypothesis) -> Iterator[tuple[int, str, str]]:
+    """(number of the term, parameter, joint) of all that takes more off a joint than there is."""
     shared: set[tuple[str, str]] = set()
-    for t in terms:
+    for k, t in enumerate(terms):
         entry, values = find(t.effect), dict(t.values)
         places = entry.targets(robot)  # of a place that is none of them others say so
         joints = members_of(robot, t.target, places) or tuple({t.target} & set(places))
@@ -48,11 +72,9 @@ def _not_too_much(robot: Robot, terms: Hypothesis) -> None:
                 continue
             for joint in [j for j in joints if (t.effect, j) not in shared]:
                 if takes_more_than_described(robot, joint, p, values[p.name]):
-                    has = getattr(drive_of(robot, joint), p.on_top)
-                    raise EffectError(
-                        f"{t}: {joint} is described with {has:g} {p.unit} of it; {-values[p.name]:g} cannot be taken off"
-                    )
-        shared |= {(t.effect, j) for j in joints if len(joints) > 1}
+                    yield k, p.name, joint
+        if len(joints) > 1:
+            shared.update((t.effect, j) for j in joints)
 
 
 def takes_more_than_described(robot: Robot, joint: str, parameter: Parameter, value: float) -> bool:

@@ -16,7 +16,7 @@ from ee_dist.discrepancy.search.candidates import candidates
 from ee_dist.discrepancy.sharing import shared as widest
 from ee_dist.effects import CATALOGUE, EffectError, Parameter, Term, apply, effect, term
 from ee_dist.effects.catalogue import applied, find, from_dict
-from ee_dist.effects.described import check_written
+from ee_dist.effects.described import as_far_as_there_is, check_written
 from ee_dist.effects.groups import groups
 from ee_dist.effects.targets import motors
 from ee_dist.robots.model import Robot
@@ -133,6 +133,24 @@ def test_a_joint_may_have_less_of_what_all_of_them_share() -> None:
     assert drives["hip_front_right"] == 0.2
     with pytest.raises(EffectError, match="cannot be taken off"):
         check_written(QUADRUPED, (less, shared))
+
+
+def test_what_a_search_leaves_can_be_written_and_read_and_is_the_same_robot() -> None:
+    """Where what joints shared went in the end, what one of them had less of it is less of nothing."""
+    rough = QUADRUPED.map_drive("knee_front_left", lambda d: replace(d, coulomb=0.1))
+    left = (
+        term("coulomb_friction", "hip_front_left", torque_nm=-0.3),
+        term("coulomb_friction", "knee_front_left", torque_nm=-0.3),
+        term("coulomb_friction", "hip_front_right", torque_nm=0.4),
+    )
+    with pytest.raises(EffectError, match="cannot be taken off"):
+        check_written(rough, left)
+    told = as_far_as_there_is(rough, left)
+    check_written(rough, told)
+    assert [dict(t.values)["torque_nm"] for t in told] == [0.0, -0.1, 0.4]
+    assert apply(rough, told) == apply(rough, left)
+    shared = (term("coulomb_friction", "all_joints", torque_nm=0.2), *left)
+    assert as_far_as_there_is(rough, shared) == shared, "of what all share a joint may have less"
 
 
 def test_joints_share_what_is_of_motors_where_one_of_them_has_none() -> None:
