@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from ee_dist.discrepancy.accounts.of_improve import _listed
-from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL
+from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.effects.catalogue import term
 
 TERMS = (
@@ -14,6 +14,14 @@ TERMS = (
     term("sensor_stuck", "position_wrist", share=0.01, from_s=0.0),
     term("backlash", "wrist", gap_rad=0.01),
 )
+
+
+def of(flags: list[str]) -> tuple[Any, Any]:
+    """A finding of as many effects, called a, b, c."""
+    terms = [term("coulomb_friction", f"joint_{k}", torque_nm=0.1) for k in range(len(flags))]
+    parameters = [SimpleNamespace(term=k, flag=flag) for k, flag in enumerate(flags)]
+    shares = [SimpleNamespace(terms=(t,), text="abcde"[k]) for k, t in enumerate(terms)]
+    return SimpleNamespace(terms=terms, parameters=parameters), shares
 
 
 def headline(flags: list[str]) -> str:
@@ -27,6 +35,15 @@ def headline(flags: list[str]) -> str:
 def test_what_may_be_nothing_is_counted_and_not_named() -> None:
     assert headline(["", NEUTRAL, HARDLY]) == "coulomb_friction; and 2 that may be nothing"
     assert headline(["", NEUTRAL, ""]) == "coulomb_friction; backlash; and 1 that may be nothing"
+
+
+def test_what_is_not_determined_may_be_nothing_too() -> None:
+    assert headline(["", f"{BOUND}; {NOT_DETERMINED}", NOT_DETERMINED]) == "coulomb_friction; and 2 that may be nothing"
+    assert headline(["", BOUND, ""]) == "coulomb_friction; sensor_stuck; backlash"
+
+
+def test_more_than_a_headline_holds_is_counted() -> None:
+    assert _listed(*of(["", "", "", "", NEUTRAL])) == "a; b; c; and 1 more, and 1 that may be nothing"
 
 
 def test_where_all_may_be_nothing_it_is_named() -> None:

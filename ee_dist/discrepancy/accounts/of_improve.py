@@ -29,7 +29,7 @@ from ee_dist.discrepancy.accounts.account import (
 )
 from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, flag_texts, ranges, rest_text, scale_text, weight_text
 from ee_dist.discrepancy.calibrated_away import OddOne
-from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL
+from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
@@ -150,9 +150,9 @@ def improve_account(
 
 
 def may_be_nothing(found: Improvement, terms: Sequence[Term]) -> bool:
-    """Whether none of the values of some terms of the model is told from neutral, or farther than luck may tell one."""
+    """Whether no value of some terms of the model is determined, told from neutral, and farther from it than luck may tell one."""
     flags = [p.flag for p in found.parameters if found.terms[p.term] in terms]
-    return bool(flags) and all(flag in (NEUTRAL, HARDLY) for flag in flags)
+    return bool(flags) and all(flag in (NEUTRAL, HARDLY) or flag.endswith(NOT_DETERMINED) for flag in flags)
 
 
 def twin_text(twin: Twin, found: Improvement, robot: Robot) -> str:
@@ -200,7 +200,7 @@ def _listed(found: Improvement, parts: Sequence[Share]) -> str:
     more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
     unsure = len(parts) - len(told)
     more += [f"{unsure} that may be nothing"] if told and unsure else []
-    return f"{some}; and {' and '.join(more)}" if more else some
+    return f"{some}; and {', and '.join(more)}" if more else some
 
 
 def _told_from(ties: Mapping[str, Sequence[str]]) -> str:
