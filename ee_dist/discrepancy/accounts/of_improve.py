@@ -150,7 +150,7 @@ def improve_account(
 
 
 def may_be_nothing(found: Improvement, terms: Sequence[Term]) -> bool:
-    """Whether no value of some terms of the model is determined, told from neutral, and farther from it than luck may tell one."""
+    """Whether no value of some terms of the model is determined, told from neutral, and farther off than luck may tell one."""
     flags = [p.flag for p in found.parameters if found.terms[p.term] in terms]
     return bool(flags) and all(flag in (NEUTRAL, HARDLY) or flag.endswith(NOT_DETERMINED) for flag in flags)
 
