@@ -15,7 +15,7 @@ import numpy as np
 
 from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.evidence.intervals import BOUND, at_bound
-from ee_dist.discrepancy.evidence.judge import does_nothing
+from ee_dist.discrepancy.evidence.judge import at_work
 from ee_dist.discrepancy.evidence.rule import NEAR
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, values_of
 from ee_dist.discrepancy.search.fitted import Model
@@ -106,14 +106,10 @@ def assumed_drives(
     if late and _lag(robot, joints):
         other = _farther(search, *_fitted(search, joints, (*best, *late)))
         alone = other if other[2] - noise < LESS * (alone[2] - noise) else alone
-    return _of_use(alone[0], alone[1])
-
-
-def _of_use(parts: tuple[Candidate, ...], u: Array) -> tuple[Proposal, Array]:
-    """Without what ended at neutral: nobody is told that no torque is missing."""
-    places = Model(parts).places
-    keep = [k for k, c in enumerate(parts) if c.effect.name == TOGETHER[0] or not does_nothing(u[places[k]])]
-    return Proposal(tuple(parts[k] for k in keep), LABEL), np.concatenate([u[places[k]] for k in keep])
+    model, u = Model(alone[0]), alone[1]
+    # The gain stays; nobody is told that no torque is missing.
+    keep = at_work(model, u, 1)
+    return Proposal(tuple(model.parts[k] for k in keep), LABEL), np.concatenate([u[model.places[k]] for k in keep])
 
 
 def _farther(

@@ -98,7 +98,7 @@ def improve(
     ladder = [_start("the model as it was", before, as_it_is, problem)]
 
     def climb(rung: Rung) -> None:
-        rung.terms = _written(problem.robot, rung.terms)
+        rung.terms = as_far_as_there_is(problem.robot, rung.terms)
         ladder.append(rung)
         if climbed is not None:
             climbed(rung)
@@ -308,7 +308,7 @@ def _finish(
         # Where only noise is left values are what the measurements say.
         prior = prior_of(search, [(model, current.u)]) - PRIOR
         fit = fit_one(search, model, [current.u], None, (*WIDTHS[2:], 0.006), prior)
-        terms = _written(problem.robot, (*search.fixed, *fit.hypothesis))
+        terms = as_far_as_there_is(problem.robot, (*search.fixed, *fit.hypothesis))
         fit = replace(fit, u=values_of(model.parts, terms[len(search.fixed) :]))
         residual = fit.residual
         left = leftovers(problem, residual)
@@ -337,11 +337,6 @@ def _finish(
         unsure=may_be_noise(problem, residual),
         twins=twins,
     )
-
-
-def _written(robot: Robot, terms: Hypothesis) -> Hypothesis:
-    """As a model file says them: what takes more off a joint than there is does no more than what takes all of it."""
-    return as_far_as_there_is(robot, terms)
 
 
 def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor: float) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ee_dist.discrepancy.assumed import of_one_guess
 from ee_dist.discrepancy.evidence.holdout import PIECES, PRIOR, WINDOWS, Cut, HeldOut, cross_fit, held_by_slopes
-from ee_dist.discrepancy.evidence.judge import does_nothing
+from ee_dist.discrepancy.evidence.judge import at_work
 from ee_dist.discrepancy.evidence.rule import WORTH, least_energy
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
@@ -232,8 +232,8 @@ def without_these(fit: Fit, gone: Sequence[int]) -> Fit:
 def without_neutral(current: Current, own: int) -> tuple[Current, tuple[str, ...]]:
     """The model without the terms that ended at neutral, and their names: it is the same model, and nobody is told that no
     friction was added. The first ``own`` parts stay."""
-    places = Model(current.parts).places
-    none = [k for k, p in enumerate(places) if k >= own and current.parts[k].size and does_nothing(current.u[p])]
-    keep = [k for k in range(len(places)) if k not in none]
+    model = Model(current.parts)
+    places, keep = model.places, at_work(model, current.u, own)
+    none = [k for k in range(len(places)) if k not in keep]
     values = np.concatenate([current.u[places[k]] for k in keep] or [np.zeros(0)])
     return Current(tuple(current.parts[k] for k in keep), values), tuple(current.parts[k].name for k in none)

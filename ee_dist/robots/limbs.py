@@ -27,8 +27,10 @@ def limbs(robot: Robot) -> tuple[Limb, ...]:
     touches a floor, where all drives share a supply that sags, and where no more than one limb has sensors."""
     if robot.free_base or robot.world.has_floor or robot.world.supply_sag:
         return (whole(robot),)
-    carried = {j.child: j for j in robot.joints}
     tops = _tops(robot)
+    if len(tops) < 2:
+        return (whole(robot),)
+    carried = {j.child: j for j in robot.joints}
     owner = {name: k for k, top in enumerate(tops) for name in robot.subtree(top)}
     moved = {j.name: j.child for j in robot.joints}
     # What stands with the base reads the same whatever moves: it goes with the first limb.

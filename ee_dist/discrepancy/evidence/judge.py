@@ -46,6 +46,12 @@ def does_nothing(values: Array) -> bool:
     return not np.abs(values).max() > NONE
 
 
+def at_work(model: Model, u: Array, first: int) -> list[int]:
+    """Numbers of the parts that are not at neutral with these values (P,), and of the ``first`` few and those without values."""
+    places = model.places
+    return [k for k, c in enumerate(model.parts) if k < first or not c.size or not does_nothing(u[places[k]])]
+
+
 @dataclass(eq=False)
 class Judged:
     """One proposal on top of a model, both fitted together. Errors are root mean squares of residual values; ``gain`` and

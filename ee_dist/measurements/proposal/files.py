@@ -80,9 +80,8 @@ def _spread(files: Sequence[Path], first: Recorded) -> dict[str, tuple[str, Tabl
     but some of another's columns is of its kind."""
     kinds: dict[tuple[bool | None, frozenset[str]], list[tuple[Path, Table]]] = {}
     named = [tokens(f.stem) for f in files]
-    everywhere = set.intersection(
-        *map(set, named)
-    )  # joint_states of joint_states_cmd says nothing, where all are called so
+    # joint_states of joint_states_cmd says nothing, where all are called so.
+    everywhere = set.intersection(*map(set, named))
     roles = [role_of(" ".join(w for w in words if w not in everywhere)) for words in named]
     sent = roles.count(True)
     told = sent > 0 and (False in roles or 2 * sent == len(roles))
