@@ -46,7 +46,7 @@ TWINS = 2
 """Twins of effects that are tried in their place."""
 TRIED = 20
 """Effects that are tried one by one beside all that may be a little wrong,"""
-HEATS = ((3, 5), (4, 2))
+HEATS = ((1, 10), (1, 5), (3, 2))
 """in a race: how many of them go on after how many steps."""
 BEGINNING_S, BUSY = 8.0, 0.5
 """How much of each trial all values are fitted to first, and what it must have to explain for its length, as a share of what
@@ -305,7 +305,7 @@ class _Look:
         brief = self.brief
         problem, own = brief.problem, brief.everything
         heats = telling_values(problem, brief.on(alone.hypothesis).base(), own)
-        best, *ended = race(brief, starts, own, HEATS, PRIOR, heats_on=heats)
+        best, *ended = race(brief, starts, own, HEATS, PRIOR, heats_on=heats, same=len(start))
         best = over_ridges(brief, best, PRIOR)
         noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))
         ties = [f.model.parts[-1].name for f in ended if f.energy - best.energy < TIE_ENERGY * noise]

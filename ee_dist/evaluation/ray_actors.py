@@ -15,6 +15,7 @@ from typing import Any
 import ray
 from ray.exceptions import ActorDiedError, RayError, RayTaskError
 
+from ee_dist.basics.cores import usable
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.installed import installed
 from ee_dist.evaluation.jobs import Counts, Job
@@ -49,6 +50,8 @@ class _Worker:
 WORTH_A_CALL = 48
 """Jobs below which a step costs nearly as much for the batch as for its robots: no call carries fewer unless there are
 too few for all workers."""
+AT_ONCE = 256
+"""Jobs of one worker up to which it gets them in one call: each further batch costs in each of its steps as much as some ten robots."""
 LOOK_S = 1.0
 """How long to wait for results before looking whether Ray is still there."""
 LOST_S = 5.0
@@ -66,7 +69,7 @@ def helping(left: int, total: int, share: float, of_idle: float) -> int:
     A large lot goes out in ever smaller helpings, so that all finish together; a small one in one helping each, since
     a batch of half the size is nearly as slow as a whole one.
     """
-    if total * share <= 2 * WORTH_A_CALL:
+    if total * share <= AT_ONCE:
         return min(left, max(1, round(left * of_idle)))
     return min(left, max(WORTH_A_CALL, math.ceil(left * share / 2)))
 
@@ -108,7 +111,7 @@ class RayEvaluator:
     ) -> None:
         if workers < 0 or chunk < 0:
             raise ValueError("evaluator: workers and chunk must be 0 (automatic) or more")
-        self.workers = workers or (os.cpu_count() or 1)
+        self.workers = workers or usable()
         self.chunk = chunk
         self.counts = Counts()
         self.shares = Shares(self.workers)

@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from ee_dist.basics.arithmetic import SETTINGS
+from ee_dist.basics.cores import usable
 from ee_dist.evaluation.ray_folder import Guard
 from ee_dist.evaluation.ray_watch import Heads
 
@@ -56,7 +57,7 @@ def start_ray(address: str | None, workers: int, folder: str | None = None) -> N
     from ray._private import auto_init_hook, ray_constants
 
     global _guard, _address, _started, _heads
-    cores = os.cpu_count() or 1
+    cores = usable()
     if not address:
         # Before anything else: a Ray that is there already would begin to start them all, and take all memory.
         _check(workers, cores, "this machine")

@@ -7,6 +7,7 @@ import gc
 import os
 from dataclasses import dataclass, replace
 
+from ee_dist.basics.cores import usable
 from ee_dist.effects.plugins import load_plugin, text_of_plugin
 from ee_dist.engines.contract import Engine
 from ee_dist.evaluation.cache import CachedEvaluator
@@ -63,7 +64,7 @@ class EngineMaker:
 def engine_maker(config: Config, alone: bool, name: str = "") -> EngineMaker:
     """``alone``: whether the engine has the machine for itself, or shares its cores with other workers. ``name``: another
     engine than the one of the settings."""
-    threads = config.engine.threads or ((os.cpu_count() or 1) if alone else 1)
+    threads = config.engine.threads or (usable() if alone else 1)
     plugins = tuple((os.path.abspath(p), text_of_plugin(p)) for p in config.plugins)
     return EngineMaker(name or config.engine.name, threads, plugins)
 

@@ -93,7 +93,7 @@ def test_what_a_robot_without_a_floor_leaves_out_moves_no_bit(fixed: bool) -> No
 @pytest.mark.parametrize("threads", [2, 3])
 def test_threads_change_no_bit(threads: int) -> None:
     rollouts = [Rollout(m, network(i), 200, pose=True) for i, m in enumerate(mixed_models() * 3)]
-    one, many = MuJoCoEngine(threads=1), MuJoCoEngine(threads=threads)
+    one, many = MuJoCoEngine(threads=1), MuJoCoEngine(threads=threads, least=1)
     for a, b in zip(one.rollout(rollouts), many.rollout(rollouts), strict=True):
         assert a.sensors.tobytes() == b.sensors.tobytes()
         assert a.base_pose is not None
@@ -126,7 +126,7 @@ def test_a_robot_that_blows_up_says_so_and_harms_no_other(
     for drive in wild.drives:
         wild = wild.with_drive(drive.joint, kp=1e7, torque_limit=1e9, speed_limit=float("inf"), rotor_inertia=0.0)
     calm = Commands(calm_commands(0, 200))
-    engine = MuJoCoEngine(threads=2)
+    engine = MuJoCoEngine(threads=2, least=1)
     first, second, third = engine.rollout([Rollout(m, calm, 200, pose=True) for m in (quadruped(), wild, quadruped())])
     assert not second.finite
     assert first.finite

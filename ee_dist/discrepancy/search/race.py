@@ -28,15 +28,16 @@ def race(
     prior: float = 0.0,
     width: float = WIDEST,
     heats_on: Mask | None = None,
+    same: int = 0,
 ) -> list[Fit]:
     """Fits to the residual values of ``mask`` (n,) of the last that are left of the (model, start), the best first; each heat
-    ends with those of the least energy, on fewer values (``heats_on``) where these tell enough."""
+    ends with those of the least energy, on fewer values (``heats_on``) where these tell enough. ``same`` as in valley.py."""
     fits: list[Fit] = []
     for iterations, left in heats:
         if len(starts) > left:
-            fits = follow_valley(
-                search, starts, mask if heats_on is None else heats_on, prior, iterations, widths=(width,)
-            )
+            own = mask if heats_on is None else heats_on
+            fits = follow_valley(search, starts, own, prior, iterations, (width,), same=same, values_only=True)
+            same = 0
             best = np.argsort([f.energy for f in fits], kind="stable")[:left]
             starts = [(fits[k].model, fits[k].u) for k in best]
     fits = follow_valley(search, starts, mask, prior, ITERATIONS, widths=(width,), rivals=True)

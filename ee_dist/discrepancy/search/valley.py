@@ -90,11 +90,15 @@ def follow_valley(
     widths: Sequence[float] = (WIDEST,),
     settled: bool = False,
     rivals: bool = False,
+    same: int = 0,
+    values_only: bool = False,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given, all in step: the best
     of a descent from each of ``widths``, of which the last steps follow ever narrower slopes, unless the start is ``settled``
-    in a valley already. ``rivals``: only the best of all starts is wanted, and what comes near it. ``prior`` as in slopes.py;
-    ``slopes`` of the results are those of the smooth residual, weighed."""
+    in a valley already. ``rivals``: only the best of all starts is wanted, and what comes near it. ``same``: so many values come
+    first in all starts, and are alike there: slopes by these are taken once to begin with, beside nothing else. ``values_only``:
+    slopes are not, and steps by corrected ones may be the last. ``prior`` as in slopes.py; ``slopes`` of the results are those of
+    the smooth residual, weighed."""
     whole, search = search, search.within(mask)
     points = [np.clip(np.asarray(u, float), m.lower, m.upper) for m, u in starts]
     rows = search.residuals([m.hypothesis(u) for (m, _), u in zip(starts, points, strict=True)])
@@ -104,16 +108,18 @@ def follow_valley(
         for width in widths
     ]
     far = NEAR * float(search.problem.floor[mask].sum())
+    known = _alike(search, starts[0][0], points[0], mask, same, widths[0]) if same else None
     while moving := [run for run in runs if not run.done and (run.followed or run.rounds < iterations)]:
         _from_nowhere([run for run in moving if not np.isfinite(run.energy)], search, mask, prior)
         anew = [run for run in moving if not (run.followed or run.again)]
-        _slopes([run for run in anew if np.isfinite(run.energy)], search, mask)
+        _slopes([run for run in anew if np.isfinite(run.energy)], search, mask, known)
+        known = None
         for run in anew:
             run.rounds += 1
         going = [run for run in moving if np.isfinite(run.energy)]
         _steps(going, search, mask, prior, far)
         for run in going:
-            _next(run, far, settled, run.rounds < iterations)
+            _next(run, far, settled, values_only or run.rounds < iterations)
             if run.followed:
                 _correct(run, search, mask)
         together = len(runs) if rivals else len(widths)
@@ -139,11 +145,25 @@ def _from_nowhere(runs: Sequence[_Run], search: Search, mask: Mask, prior: float
         run.residual, run.energy = r, _cost(r, run.u, mask, prior)
 
 
-def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
-    """Derivatives (n, P) of the smooth residual where the mask is, taken anew."""
+def _alike(search: Search, model: Model, u: Array, mask: Mask, count: int, width: float) -> Array | None:
+    """(n, count) derivatives by the first values of a model, of a model that has no others; None where it cannot be simulated."""
+    parts = tuple(c for c, place in zip(model.parts, model.places, strict=True) if place.stop <= count)
+    first = Model(parts)
+    (row,) = search.residuals([first.hypothesis(u[:count])])
+    if not np.isfinite(row).all():
+        return None
+    run = _Run(first, u[:count], width, row)
+    _slopes([run], search, mask)
+    return run.slopes
+
+
+def _slopes(runs: Sequence[_Run], search: Search, mask: Mask, known: Array | None = None) -> None:
+    """Derivatives (n, P) of the smooth residual where the mask is, taken anew; but those by the first values, where they are
+    ``known`` (n, K)."""
+    have = 0 if known is None else known.shape[1]
     points = []
     for run in runs:
-        for k in range(len(run.u)):
+        for k in range(have, len(run.u)):
             h = min(run.width, 0.3 * abs(run.u[k]) + 0.2 * run.width)
             h = h if run.reach is None else min(h, float(run.reach[k]))
             v = run.u.copy()
@@ -153,12 +173,13 @@ def _slopes(runs: Sequence[_Run], search: Search, mask: Mask) -> None:
     smooth_of, at = search.problem.smooth, 0
     for run in runs:
         smooth, columns = _here(run, search, mask), []
-        for k in range(len(run.u)):
+        for k in range(have, len(run.u)):
             row, gap = next(rows), points[at][1][k] - run.u[k]
             at += 1
             usable = np.isfinite(row).all()
             columns.append((smooth_of(row)[mask] - smooth) / gap if usable else np.zeros(len(smooth)))
-        run.slopes = np.stack(columns, axis=1)
+        found = np.stack(columns, axis=1)
+        run.slopes = found if known is None else np.concatenate([known, found], axis=1)
 
 
 def _here(run: _Run, search: Search, mask: Mask) -> Array:

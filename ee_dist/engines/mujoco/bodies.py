@@ -48,7 +48,7 @@ class Group:
         model = self.model
         own = per_robot([r.model for r in members], model.numbers)
         model.fill(own[0])
-        batch = native.Batch(model.compiled, len(members), min(threads, len(members)))
+        batch = native.Batch(model.compiled, len(members), threads)
         derived = False
         for k, name in enumerate(OWN):
             values = np.array([numbers[k] for numbers in own])

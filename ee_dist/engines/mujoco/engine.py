@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections import OrderedDict
 from collections.abc import Hashable, Sequence
 
+from ee_dist.basics.cores import usable
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.loop import in_batches, up_to
 from ee_dist.engines.mujoco.bodies import Group, MuJoCoBodies
@@ -18,16 +18,22 @@ MODELS = 256
 """Compiled structures kept for reuse (about 0.15 MB each), beyond which the longest unused are dropped."""
 
 
+WORTH_A_THREAD = 32
+"""Robots of a batch for each of its threads: these wait for one another in every step, which takes as long as some thirty robots do
+where something else is at work on their processors, and not much less than a few of them where nothing is."""
+
+
 class MuJoCoEngine:
     """Implements ``ee_dist.engines.contract.Engine``.
 
-    ``threads`` (default: all cores) changes the speed and no bit of the result; a process a core wants 1.
+    ``threads`` (at most; default: all cores) changes the speed and no bit of the result; a process a core wants 1. ``least``:
+    robots of a batch below which no further thread helps.
     """
 
     name = "mujoco"
 
-    def __init__(self, threads: int | None = None, largest_batch: int = 256) -> None:
-        self.threads = threads or os.cpu_count() or 1
+    def __init__(self, threads: int | None = None, largest_batch: int = 256, least: int = WORTH_A_THREAD) -> None:
+        self.threads, self.least = threads or usable(), least
         self.largest_batch = largest_batch
         self._models: OrderedDict[Hashable, Model] = OrderedDict()
         no_file_of_warnings()
@@ -45,8 +51,11 @@ class MuJoCoEngine:
         placed = []
         for key, rows in groups.items():
             model = self._model(key, batch[rows[0]])
-            placed.append((rows, Group(model, [batch[i] for i in rows], self.threads)))
+            placed.append((rows, Group(model, [batch[i] for i in rows], self._threads(len(rows)))))
         return MuJoCoBodies(placed, batch)
+
+    def _threads(self, robots: int) -> int:
+        return max(1, min(self.threads, robots // self.least))
 
     def _model(self, key: Hashable, rollout: Rollout) -> Model:
         if key not in self._models:
