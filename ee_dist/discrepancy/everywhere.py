@@ -108,13 +108,16 @@ def everywhere(
     robot, places = search.problem.robot, Model(current.parts).places
     begun = list(instead(robot, current, own))
     # From neutral, which the model as it is may be, small values take in least of what is not theirs.
-    found = None if again else look.kept(current, beside_all=not begun)
+    than = look.fitted(current)
+    found = None if again else look.kept(current, than, beside_all=not begun)
     # Of what was added last the most is not yet decided.
     alike = [t for t in reversed(twins) if again and stands_out(robot, current.parts[t[0]])][:TWINS]
     for keep in begun:
         bare = not keep[own:]
         for base in _with_twins(current, places, keep, alike):
-            other = look.kept(base, more=bare, beside_all=bare and not again)
+            if found is not None:
+                than = min(than, look.fitted(found.model))
+            other = look.kept(base, than, more=bare, beside_all=bare and not again)
             if other is not None and (
                 found is None or other.held < found.held + (look.luck(other.held) if bare else 0.0)
             ):
@@ -194,27 +197,34 @@ class _Look:
         problem = self.search.problem
         return least_energy(len(self.pool)) * max(float(problem.floor.mean()), energy / len(problem.floor))
 
-    def kept(self, base: Current, more: bool = True, beside_all: bool = False) -> _Kept | None:
+    def fitted(self, model: Current) -> float:
+        """Energy that a model leaves of what is fitted."""
+        (row,) = self.calm.residuals([model.hypothesis])
+        own = row[self.calm.everything]
+        return float(own @ own) if np.isfinite(own).all() else np.inf
+
+    def kept(self, base: Current, than: float, more: bool = True, beside_all: bool = False) -> _Kept | None:
         """The base with all that is worth keeping, and (``more``), if need be, one effect beside; None where that is not worth
-        more than the current model. ``beside_all``: the one effect is looked for also where much is left at one joint: small
-        values that had to stand in for it are worth something too."""
+        more than the current model, or leaves more of what is fitted ``than`` a model that is there. ``beside_all``: the one
+        effect is looked for also where much is left at one joint: small values that had to stand in for it are worth something
+        too."""
         problem = self.search.problem
         single = apart(problem, base, self.own)
         fit = self._fit(single, singles(problem.robot, self._everywhere(single)))
         if fit is None:
             return None
-        alone = self._worth(fit, {})
+        alone = self._worth(fit, {}, than)
         if alone is None or alone.held > FAR**2 * float(problem.floor.sum()):
             # Of a hundred values each may be worth no more than luck, where one number for all joints is worth much.
             few = shared(problem.robot, self._everywhere(base))
             other = self._fit(base, few, None if alone is None else (fit, alone.held))
-            together = self._worth(other, {}) if other is not None else None
+            together = self._worth(other, {}, than) if other is not None else None
             if other is not None and together is not None and (alone is None or together.held < alone.held):
                 alone, fit, single = together, other, base
         if not more or (alone is not None and not (beside_all and self._one_sided(fit))):
             return alone
         # What stands out may show only where all the rest may move, and the rest be of use only beside it.
-        beside_it = self._beside(fit, np.concatenate([single.u, np.zeros(len(fit.u) - len(single.u))]))
+        beside_it = self._beside(fit, np.concatenate([single.u, np.zeros(len(fit.u) - len(single.u))]), than)
         if alone is None or beside_it is None:
             return beside_it or alone
         return beside_it if beside_it.held + self.luck(beside_it.held) < alone.held else alone
@@ -259,8 +269,12 @@ class _Look:
         at = np.bincount(np.array(joints)[problem.channel_of[own]], weights=above)
         return bool(at.max() > MOST_OF_IT * above.sum())
 
-    def _worth(self, fit: Fit, ties: Mapping[str, list[str]]) -> _Kept | None:
-        """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data."""
+    def _worth(self, fit: Fit, ties: Mapping[str, list[str]], than: float) -> _Kept | None:
+        """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data. These
+        are not asked where all its values leave more of what was fitted ``than`` the fewer of a model that is there: that descent
+        ended in another valley, which is no lower without some of them."""
+        if fit.energy > than + self.luck(than):
+            return None
         kept = pruned(self.calm, fit, self.own, len(self.pool), self.cuts[0][0])
         names = {c.name for c in self.current.parts}
         added = tuple(c for c in kept.parts if c.name not in names)
@@ -283,7 +297,7 @@ class _Look:
                 worst, energy = cut, float(judged.held.sum())
         return _Kept(kept, energy, worst, ties)
 
-    def _beside(self, alone: Fit, start: Array) -> _Kept | None:
+    def _beside(self, alone: Fit, start: Array, than: float) -> _Kept | None:
         """The model of a fit with one more effect, of those that promise most on top of it; all values from ``start`` (P,)."""
         search, model = self.calm, alone.model
         refit = Refit(slopes_at(search, alone.model, alone.u))
@@ -309,7 +323,7 @@ class _Look:
         best = over_ridges(brief, best, PRIOR)
         noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))
         ties = [f.model.parts[-1].name for f in ended if f.energy - best.energy < TIE_ENERGY * noise]
-        return self._worth(self._on_all_of_it(best), {best.model.parts[-1].name: ties})
+        return self._worth(self._on_all_of_it(best), {best.model.parts[-1].name: ties}, than)
 
     def _others(self, model: Model) -> list[Candidate]:
         return not_said(self.search.problem.robot, model.parts, self.pool)

@@ -51,7 +51,7 @@ WORTH_A_CALL = 48
 """Jobs below which a step costs nearly as much for the batch as for its robots: no call carries fewer unless there are
 too few for all workers."""
 AT_ONCE = 256
-"""Jobs of one worker up to which it gets them in one call: each further batch costs in each of its steps as much as some ten robots."""
+"""Jobs of one worker up to which it gets them in one call: each further batch costs as much, step by step, as some ten robots."""
 LOOK_S = 1.0
 """How long to wait for results before looking whether Ray is still there."""
 LOST_S = 5.0

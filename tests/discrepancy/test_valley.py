@@ -9,7 +9,7 @@ import pytest
 from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy.search import valley
-from ee_dist.discrepancy.search.candidates import candidate
+from ee_dist.discrepancy.search.candidates import candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.trials import telling_values
@@ -154,6 +154,45 @@ def test_one_evaluation_serves_all_dampings() -> None:
     search = Search(problem)
     follow_valley(search, [(MODEL, np.zeros(P))], search.everything, iterations=1)
     assert problem.asked == 1 + P + len(DAMPINGS) + 3
+
+
+def test_first_slopes_by_values_that_all_starts_share_are_taken_once() -> None:
+    """Descents that differ in their last effect alone, each at a value of its own, step as if each asked for itself,
+    where slopes by the others do not change with it."""
+    problem = Bent(())
+    problem.data += problem.shift(MODEL.hypothesis(np.full(P, 0.2)))
+    starts = [(MODEL, np.concatenate([np.full(P - 1, 0.1), [last]])) for last in (0.0, 0.02, 0.05)]
+    asked, found = [], []
+    for same in (0, P - 1):
+        problem.asked = 0
+        search = Search(problem)
+        found.append(follow_valley(search, starts, search.everything, iterations=1, same=same))
+        asked.append(problem.asked)
+    steps = 3 * (1 + len(DAMPINGS))
+    assert asked == [3 * P + steps, (1 + P - 1) + 3 + steps]
+    before = [float((problem.residuals([MODEL.hypothesis(u)])[0] ** 2).sum()) for _, u in starts]
+    for anew, once, was in zip(*found, before, strict=True):
+        assert once.energy < was
+        assert once.energy == pytest.approx(anew.energy, rel=0.05)
+
+
+def test_what_has_no_values_of_its_own_may_be_beside_those_that_are_shared() -> None:
+    lost = next(c for c in candidates(ROBOT) if not c.size)
+    search = Search(bent(np.full(P, 0.5)))
+    starts = [
+        (Model((*MODEL.parts, c)), np.zeros(P + c.size)) for c in (lost, candidate(ROBOT, "zero_offset", JOINTS[0]))
+    ]
+    one, other = follow_valley(search, starts, search.everything, iterations=1, same=P)
+    assert one.slopes.shape[1] == P and other.slopes.shape[1] == P + 1
+
+
+def test_steps_by_corrected_slopes_may_be_the_last_where_only_values_are_wanted() -> None:
+    truth, energies = np.random.default_rng(1).uniform(0.5, 0.9, P), []
+    for only in (False, True):
+        search = Search(bent(truth))
+        (fit,) = follow_valley(search, [(MODEL, np.zeros(P))], search.everything, iterations=1, values_only=only)
+        energies.append(fit.energy)
+    assert energies[1] < energies[0]
 
 
 def test_slopes_go_finer_in_the_end_where_the_narrowest_step_changes_more_than_is_left() -> None:

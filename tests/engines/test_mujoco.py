@@ -101,6 +101,13 @@ def test_threads_change_no_bit(threads: int) -> None:
         assert a.base_pose.tobytes() == b.base_pose.tobytes()
 
 
+def test_threads_are_for_batches_that_are_worth_them() -> None:
+    """They wait for one another in every step: of few robots one thread is faster, and much so beside another program."""
+    engine = MuJoCoEngine(threads=4)
+    assert [engine.threads_for(n) for n in (1, 25, 63, 64, 128, 1000)] == [1, 1, 1, 2, 4, 4]
+    assert [MuJoCoEngine(threads=1).threads_for(n) for n in (1, 1000)] == [1, 1]
+
+
 def test_a_rollout_is_what_mj_step_makes_of_its_torques() -> None:
     for robot in (quadruped(), quadruped().with_part("body", mass_kg=2.0).with_world(friction=0.4, tilt_x_rad=0.1)):
         (log,) = MuJoCoEngine(threads=1).rollout([Rollout(robot, network(4), 150, pose=True)])

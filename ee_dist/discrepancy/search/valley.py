@@ -178,8 +178,9 @@ def _slopes(runs: Sequence[_Run], search: Search, mask: Mask, known: Array | Non
             at += 1
             usable = np.isfinite(row).all()
             columns.append((smooth_of(row)[mask] - smooth) / gap if usable else np.zeros(len(smooth)))
-        found = np.stack(columns, axis=1)
-        run.slopes = found if known is None else np.concatenate([known, found], axis=1)
+        # An effect may have no values of its own.
+        first = np.zeros((len(smooth), 0)) if known is None else known
+        run.slopes = np.column_stack([first, *columns])
 
 
 def _here(run: _Run, search: Search, mask: Mask) -> Array:

@@ -19,8 +19,8 @@ MODELS = 256
 
 
 WORTH_A_THREAD = 32
-"""Robots of a batch for each of its threads: these wait for one another in every step, which takes as long as some thirty robots do
-where something else is at work on their processors, and not much less than a few of them where nothing is."""
+"""Robots of a batch for each of its threads: these wait for one another in every step, as long as some thirty robots take where
+something else is at work on their processors, and a few of them where nothing is."""
 
 
 class MuJoCoEngine:
@@ -51,10 +51,11 @@ class MuJoCoEngine:
         placed = []
         for key, rows in groups.items():
             model = self._model(key, batch[rows[0]])
-            placed.append((rows, Group(model, [batch[i] for i in rows], self._threads(len(rows)))))
+            placed.append((rows, Group(model, [batch[i] for i in rows], self.threads_for(len(rows)))))
         return MuJoCoBodies(placed, batch)
 
-    def _threads(self, robots: int) -> int:
+    def threads_for(self, robots: int) -> int:
+        """Threads that a batch is worth."""
         return max(1, min(self.threads, robots // self.least))
 
     def _model(self, key: Hashable, rollout: Rollout) -> Model:
