@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.evaluation.jobs import Evaluator, Job
+from ee_dist.evaluation.side_by_side import ask
 
 MOST_BYTES = 512 * 2**20
 """Bytes of results that are kept. Numbers take none to speak of; what is kept of logs of minutes does, and the oldest goes."""
@@ -17,7 +18,8 @@ MOST_BYTES = 512 * 2**20
 
 class CachedEvaluator:
     """Simulates each key once, as long as its result is kept. Equal jobs within one call are one simulation always. ``most``:
-    bytes of arrays that are kept; what went is simulated again, with the same result."""
+    bytes of arrays that are kept; what went is simulated again, with the same result. Searches that go side by side ask in one
+    call."""
 
     def __init__(self, inner: Evaluator, most: int = MOST_BYTES) -> None:
         self.inner, self.most = inner, most
@@ -28,6 +30,9 @@ class CachedEvaluator:
         self._held = 0
 
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
+        return ask(self._evaluate, jobs)
+
+    def _evaluate(self, jobs: Sequence[Job]) -> list[Any]:
         keys = [job.key for job in jobs]
         fresh: dict[str, Job] = {}
         for key, job in zip(keys, jobs, strict=True):

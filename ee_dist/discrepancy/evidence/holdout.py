@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, Leading
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.fixture import STAND
+from ee_dist.evaluation.side_by_side import side_by_side
 from ee_dist.robots.ranges import travel
 from ee_dist.trials.log import Array, SensorLog
 
@@ -239,12 +240,11 @@ def cross_fit(
     seen, count = np.zeros(len(starts)), 0
     prior = prior_of(search, starts)
     fits: list[list[Fit]] = [[] for _ in starts]
-    for fold in range(cut.folds):
-        mask = cut.seen(problem, fold)
-        if mask.all():
-            continue
+    masks = [mask for fold in range(cut.folds) if not (mask := cut.seen(problem, fold)).all()]
+    turns = [partial(fit_all, search, starts, mask, widths, prior, leading, short) for mask in masks]
+    for mask, turn in zip(masks, side_by_side(turns), strict=True):
         count += int(mask.sum())
-        for i, fit in enumerate(fit_all(search, starts, mask, widths, prior, leading, short)):
+        for i, fit in enumerate(turn):
             residuals[i][~mask] = fit.residual[~mask]
             seen[i] += fit.energy
             fits[i].append(fit)
