@@ -116,7 +116,7 @@ def everywhere(
         bare = not keep[own:]
         for base in _with_twins(current, places, keep, alike):
             if found is not None:
-                than = min(than, look.fitted(found.model))
+                than = min(than, found.fitted)
             other = look.kept(base, than, more=bare, beside_all=bare and not again)
             if other is not None and (
                 found is None or other.held < found.held + (look.luck(other.held) if bare else 0.0)
@@ -170,12 +170,13 @@ def _brief(search: Search, residual: Array, current: Current) -> Search:
 @dataclass(frozen=True, eq=False)
 class _Kept:
     """A model that is worth its terms. ``held``: its energy on held-out data, under the cut that is the hardest for it;
-    ``ties``: what is as good as one of its effects."""
+    ``ties``: what is as good as one of its effects; ``fitted``: energy that was left of what is fitted before any term left."""
 
     model: Current
     held: float
     cut: Cut
     ties: Mapping[str, list[str]]
+    fitted: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +206,7 @@ class _Look:
 
     def kept(self, base: Current, than: float, more: bool = True, beside_all: bool = False) -> _Kept | None:
         """The base with all that is worth keeping, and (``more``), if need be, one effect beside; None where that is not worth
-        more than the current model, or leaves more of what is fitted ``than`` a model that is there. ``beside_all``: the one
+        more than the current model, or leaves more of what is fitted ``than`` another fit. ``beside_all``: the one
         effect is looked for also where much is left at one joint: small values that had to stand in for it are worth something
         too."""
         problem = self.search.problem
@@ -271,8 +272,8 @@ class _Look:
 
     def _worth(self, fit: Fit, ties: Mapping[str, list[str]], than: float) -> _Kept | None:
         """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data. These
-        are not asked where all its values leave more of what was fitted ``than`` the fewer of a model that is there: that descent
-        ended in another valley, which is no lower without some of them."""
+        are not asked where all its values leave more of what was fitted ``than`` those of another fit: that descent ended in
+        another valley, which is no lower without some of them."""
         if fit.energy > than + self.luck(than):
             return None
         kept = pruned(self.calm, fit, self.own, len(self.pool), self.cuts[0][0])
@@ -295,7 +296,7 @@ class _Look:
                 return None
             if float(judged.held.sum()) > energy:
                 worst, energy = cut, float(judged.held.sum())
-        return _Kept(kept, energy, worst, ties)
+        return _Kept(kept, energy, worst, ties, fit.energy)
 
     def _beside(self, alone: Fit, start: Array, than: float) -> _Kept | None:
         """The model of a fit with one more effect, of those that promise most on top of it; all values from ``start`` (P,)."""
