@@ -39,8 +39,9 @@ from ee_dist.robots.agree import SOURCES, sources_text
 from ee_dist.robots.describe import BUILT_IN, load_robot, robot_of
 from ee_dist.robots.listing import listings
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.config import Config, ConfigError, one_of
+from ee_dist.tasks.config import Config, ConfigError, EngineConfig, one_of
 from ee_dist.tasks.folder import check_file_name
+from ee_dist.tasks.results.commands import asked, command
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
 
@@ -119,6 +120,14 @@ def run(config: Config, options: Options, out: Path) -> None:
         highlight=False,
         soft_wrap=True,
     )
+    console.print(f"Next: {following(config, out / options.output)}", highlight=False, markup=False, soft_wrap=True)
+
+
+def following(config: Config, measured: Path) -> str:
+    """The command that compares what was imported. Nothing was simulated so far, so that no engine has been chosen: the one that
+    knows rotors and needs less time."""
+    engine = EngineConfig(name="mujoco") if config.engine == EngineConfig() else config.engine
+    return command(asked("compare", replace(config, measured=str(measured), engine=engine)))
 
 
 def at_rate(robot: Robot, mapping: Mapping) -> tuple[Robot, tuple[str, ...]]:

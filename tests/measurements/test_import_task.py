@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,9 @@ def test_a_file_without_a_mapping_becomes_a_recording(tmp_path: Path, command: C
     status, said, _ = command(f"measured={log}", "robot=urdf", f"robot.drives={robot}", f"hydra.run.dir={out}")
     assert status == 0
     assert "Proposed mapping" in said
+    *_, following = said.strip().splitlines()
+    there = os.path.relpath(out / "measured.mcap", ROOT)
+    assert following == f"Next: python -m ee_dist task=compare measured={there} engine=mujoco"
     first: dict[str, Any] = json.loads((out / "summary.json").read_text())
     assert first["mapping"] == "mapping.yaml"
     assert {p["sure"] for p in first["proposed"]} <= {"sure", "likely"}
