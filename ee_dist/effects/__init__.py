@@ -32,6 +32,9 @@ from ee_dist.effects.plugins import load_plugin, loaded_plugins
 # Last: the order of registration is that of the catalogue, and of what is drawn from it.
 from ee_dist.effects import stops  # noqa: F401
 
+# isort: split
+from ee_dist.effects import feed_forward  # noqa: F401
+
 __all__ = [
     "CATALOGUE",
     "Effect",

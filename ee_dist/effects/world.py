@@ -47,7 +47,6 @@ def floor_tilt(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     signature="Residual torque at rest that changes with the pose, at all joints that carry weight at once, and of one "
     "direction in space.",
     worth_proposing=is_arm,
-    everywhere=True,
 )
 def mounting_tilt(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     world = robot.world

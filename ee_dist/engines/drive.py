@@ -70,6 +70,9 @@ class DrivePath:
         self.integral = np.zeros(shape)
         self.goal: Array | None = None
         """Where a controller with limits of its own has let its commands (B, M) go so far,"""
+        self.before: Array | None = None
+        """Commands (B, M) in the step before, by which a controller that goes along with their speed knows it."""
+        self.still = np.zeros(shape)
         self.pace = np.zeros(shape)
         """and how fast these go, where their acceleration is limited, rad/s."""
         self.led = np.isfinite(p["command_speed"]) & (self.kind <= SPEED)
@@ -167,7 +170,8 @@ class DrivePath:
             context.position, context.speed = position[rows, columns], speed[rows, columns]
             speed = speed.copy()
             speed[rows, columns] = _given(function, context)
-        active, stiffness, damping = self._motor(wanted, position, speed, supply_v, enabled)
+        ahead = self._ahead(wanted)
+        active, stiffness, damping = self._motor(wanted, position, speed, ahead, supply_v, enabled)
         if self.transmission is not None:
             active = self.transmission(active, stiffness, damping, q, qd)
         self.give = None
@@ -202,6 +206,14 @@ class DrivePath:
             command = command * self.p["command_gain"]
         return command
 
+    def _ahead(self, wanted: Array) -> Array:
+        """(B, M) speeds at which controllers of positions take their joints to be wanted."""
+        if not self.uses["feed_forward"]:
+            return self.still
+        before = wanted if self.before is None else self.before
+        self.before = wanted.copy()
+        return self.p["feed_forward"] * (wanted - before) / self.dt
+
     def _limited(self, wanted: Array, q: Array, enabled: Array | None) -> Array:
         """Commands under the limits of their controllers. A goal sets out from where the joint stands, and stays with it while
         the drive is released."""
@@ -226,7 +238,13 @@ class DrivePath:
         return np.where(self.led | self.eased, there, wanted)
 
     def _motor(
-        self, wanted: Array, position: Array, speed: Array, supply_v: Array | None, enabled: Array | None
+        self,
+        wanted: Array,
+        position: Array,
+        speed: Array,
+        ahead: Array,
+        supply_v: Array | None,
+        enabled: Array | None,
     ) -> tuple[Array, Array, Array]:
         """Torque of the motor, and how it falls with its position and speed: (B, M) each, the last two for an elastic
         transmission or a stiff controller only."""
@@ -246,7 +264,7 @@ class DrivePath:
         sloped = self.transmission is not None or self.stiff is not None
         stiffness, damping = (np.empty(shape), np.empty(shape)) if sloped else (active, active)
         _drive(
-            self.kind, self.motor, wanted, position, speed, scale, closed, left, self.dt, sloped,
+            self.kind, self.motor, wanted, position, speed, ahead, scale, closed, left, self.dt, sloped,
             self.integral, self.last_active, self.current, active, stiffness, damping,
         )  # fmt: skip
         if self.uses_governor:
@@ -286,6 +304,7 @@ def _drive(
     wanted: Array,
     position: Array,
     speed: Array,
+    ahead: Array,
     scale: Array,
     closed: Array,
     left: Array,
@@ -301,7 +320,8 @@ def _drive(
     """Controller and motor of every joint. ``kind`` (B, M) is the place in COMMANDS, ``motor`` (len(MOTOR), B, M); the
     others (B, M), of which those from ``integral`` on are written.
 
-    ``scale`` is the supply over the nominal one, ``closed`` whether the circuit is, ``left`` what the sag leaves.
+    ``ahead`` is the speed that a controller of positions goes along with, ``scale`` the supply over the nominal one, ``closed``
+    whether the circuit is, ``left`` what the sag leaves.
     """
     kp, ki, kd, zero_offset, deadband = motor[0], motor[1], motor[2], motor[3], motor[4]
     torque_limit, strength, own_emf, integral_limit = motor[5], motor[6], motor[7], motor[8]
@@ -313,7 +333,7 @@ def _drive(
                 error = wanted[i, j] - position[i, j] - zero_offset[i, j]
                 if deadband[i, j] > 0.0:
                     error = error - _within(error, deadband[i, j])
-                asked = kp[i, j] * error - kd[i, j] * speed[i, j]
+                asked = kp[i, j] * error - kd[i, j] * (speed[i, j] - ahead[i, j])
             elif how == SPEED:
                 error = wanted[i, j] - speed[i, j]
                 asked = kp[i, j] * error

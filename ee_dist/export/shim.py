@@ -69,6 +69,7 @@ class Shim:
         self.motor_at: Any = None
         self.goal: Any = None
         self.pace: Any = 0.0
+        self.before: Any = None
         self.side, self.carried, self.motor_speed = zero.copy(), zero.copy(), zero.copy()
         self.delay = Delay(d["delay_s"], self.dt) if d["delay_s"].any() else None
         self.late = Delay(self.s["delay_s"], self.dt) if self.s["delay_s"].any() else None
@@ -90,7 +91,9 @@ class Shim:
         wanted = self._limited(wanted * d["command_gain"], q, enabled)
         elastic = (d["backlash"] > 0) | (d["compliance"] > 0)
         at, turning = self._motor_side(q, qd, elastic)
-        active, stiffness, damping = self._motor(wanted, at, turning, supply_v, enabled)
+        ahead = d["feed_forward"] * (wanted - (wanted if self.before is None else self.before)) / self.dt
+        self.before = wanted
+        active, stiffness, damping = self._motor(wanted, at, turning, ahead, supply_v, enabled)
         torque = np.where(elastic, self._through(active, stiffness, damping, q, qd), active)
         self.carried = np.where(d["compliance"] > 0, torque, 0.0)
         torque = torque - d["spring"] * (q - d["spring_rest"]) + d["offset_torque"]
@@ -115,13 +118,15 @@ class Shim:
         limited = eased | (np.isfinite(top) & (by_position | (self.kinds == "speed")))
         return np.where(limited, self.goal, wanted)
 
-    def _motor(self, wanted: Array, at: Array, turning: Array, supply_v: float | None, enabled: float) -> Any:
+    def _motor(
+        self, wanted: Array, at: Array, turning: Array, ahead: Array, supply_v: float | None, enabled: float
+    ) -> Any:
         d = self.d
         by_position, by_speed, by_torque = (self.kinds == k for k in ("position", "speed", "torque"))
         error = np.where(by_position, wanted - at - d["zero_offset"], np.where(by_speed, wanted - turning, 0.0))
         band = np.where(by_position, d["deadband"], 0.0)
         error = np.where(band > 0, error - np.clip(error, -band, band), error)
-        asked = d["kp"] * error - np.where(by_position, d["kd"], 0.0) * turning
+        asked = d["kp"] * error - np.where(by_position, d["kd"], 0.0) * (turning - ahead)
         asked = np.where(by_position | by_speed, asked, np.where(by_torque, wanted, 0.0))
         has = (d["ki"] != 0) & (by_position | by_speed)
         most = np.where(has, 0.25 * d["torque_limit"] / np.where(has, d["ki"], 1.0), 0.0)

@@ -116,8 +116,9 @@ COMMANDS = ("position", "speed", "torque", "none")
 class Drive:
     """Motor, gear and controller of one joint; the fields below the line say what may be wrong with it.
 
-    Active torque = clip(kp*error + ki*integral(error) - kd*speed, +-torque_limit); a brushed motor driven by voltage
-    then loses ``torque_limit/speed_limit`` times its speed to back-EMF, so ``speed_limit`` is the speed at no load.
+    Active torque = clip(kp*error + ki*integral(error) - kd*(speed - feed_forward*commanded speed), +-torque_limit); a
+    brushed motor driven by voltage then loses ``torque_limit/speed_limit`` times its speed to back-EMF, so ``speed_limit`` is
+    the speed at no load.
     The error is that of the position; of the speed where ``command`` is speed (``kp`` in N.m.s/rad, ``kd`` without use). Where
     it is torque, the command itself takes the place of the sum, and a current controller makes up for back-EMF.
     All neutral values leave the arithmetic bit for bit as if the field did not exist.
@@ -167,6 +168,7 @@ class Drive:
     spring: float = 0.0  # N.m/rad towards spring_rest (rad)
     spring_rest: float = 0.0
     brake: float = 0.0  # N.m of dry friction of a brake
+    feed_forward: float = 0.0  # of a controller of positions: share of the commanded speed that kd leaves undamped
 
     def __post_init__(self) -> None:
         # Descriptions from when there was one speed for both keep their meaning.

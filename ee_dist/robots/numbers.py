@@ -35,6 +35,7 @@ DRIVE: dict[str, Bounds] = dict.fromkeys(DRIVE_NUMBERS, AT_LEAST_0) | {
     "viscous_asymmetry": ANY,
     "offset_torque": ANY,
     "spring_rest": ANY,
+    "feed_forward": (0.0, 10.0),
 }
 SENSOR: dict[str, Bounds] = {
     "gain": (-1e6, 1e6),

@@ -290,6 +290,21 @@ def test_guessed_rotors_are_off_by_one_number_before_any_sound_motor_is_blamed()
     assert "The description only assumed rotor_inertia of 2 drives: explain and improve look there first." in said
 
 
+def test_what_does_better_and_does_not_go_first_is_told() -> None:
+    """A dozen numbers at sound parts that leave less than a few guesses, which go before them."""
+    problem = rotors()
+    found = explain(problem, candidates(problem.robot, only=["rotor_inertia", "rotor_factor", "command_delay"]))
+    best = found.best
+    assert best is not None
+    account = explain_account(problem, found, None)
+    assert "does better" not in account.how_sure
+    each = next(c for c in found.candidates if c.earned and c is not best and c.proposal.size > best.proposal.size)
+    best.tied_with, each.held = [], 0.5 * best.held
+    account = explain_account(problem, found, None)
+    assert "1 other does better, by more numbers where nothing was guessed (" in account.how_sure
+    assert "no other does as well" not in account.how_sure
+
+
 def test_a_factor_on_rotors_is_proposed_only_where_unequal_ones_were_guessed() -> None:
     names = {c.effect.name for c in candidates(rotors(marked=False).robot)}
     assert "rotor_inertia" in names and "rotor_factor" not in names

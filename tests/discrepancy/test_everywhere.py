@@ -260,7 +260,9 @@ def test_of_a_single_motion_what_driven_joints_have_is_fitted_at_once_and_nothin
         {c.effect.name for c in looked_for_at_once(p, candidates_of(p)) if c.effect.everywhere} for p in problems
     )
     assert one == {"coulomb_friction", "viscous_friction", "rotor_inertia"}
-    assert one < two and {"part_mass", "mounting_tilt"} <= two
+    assert one < two and "part_mass" in two
+    # A base that is tilted by as much as a search may think of is no small wrong that every robot has.
+    assert "mounting_tilt" not in two and "mounting_tilt" in {c.effect.name for c in candidates_of(problems[1])}
     # What stands out by itself is tried beside them either way.
     assert "backdrive_friction" in {c.effect.name for c in looked_for_at_once(problems[0], candidates_of(problems[0]))}
 
