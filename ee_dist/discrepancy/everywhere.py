@@ -53,6 +53,8 @@ BEGINNING_S, BUSY = 8.0, 0.5
 the whole has."""
 OF_DRIVES = ("coulomb", "viscous", "rotor_inertia")
 """What every drive has, and a description of it."""
+STEPS = 4
+"""Steps by which they come into the ladder at most: kinds that matter less come with the last."""
 MOST_OF_IT = 0.5
 """Share of what is above the noise that must be left at one joint for an effect to stand out there."""
 
@@ -345,6 +347,8 @@ class _Look:
         for kind in order:
             chosen = sorted({*chosen, *(k for k, c in enumerate(kept.parts) if c.effect.name == kind)})
             taken.append(chosen)
+        # Each is fitted anew in every turn, for nothing but to be shown.
+        taken = [*taken[: STEPS - 1], *taken[-1:]] if len(taken) > STEPS else taken
         starts = [(Model(tuple(kept.parts[k] for k in some)), _values(kept.u, places, some)) for some in taken]
         # Shown is how far each step comes, and most have many values. Where slopes that are known lead nowhere values that have
         # seen all data would be told as held out, so that far from the noise each turn is fitted anew.

@@ -394,7 +394,9 @@ def test_a_controller_that_knows_the_speed_of_its_goal_does_not_lag_by_its_dampi
     times = 0.001 * np.arange(4001)
     lags = []
     for share in (0.0, 0.6, 1.0):
-        log = bench.run(slider(**SERVO), term("speed_feed_forward", "joint", share=share), steps=4001, command=speed * times)
+        log = bench.run(
+            slider(**SERVO), term("speed_feed_forward", "joint", share=share), steps=4001, command=speed * times
+        )
         lags.append(float((speed * times - log.channel("position"))[-1]) / speed)
         assert lags[-1] == pytest.approx((1.0 - share) * late, abs=0.0015)
     assert lags[0] > 0.004, "there is a lag to be less"
@@ -406,5 +408,7 @@ def test_feed_forward_adds_to_what_is_described_and_does_nothing_at_rest(bench: 
     less = apply(slider(**SERVO, feed_forward=0.5), [term("speed_feed_forward", "joint", share=-0.7)])
     assert less.drives[0].feed_forward == 0.0
     plain, told = (bench.run(slider(**SERVO, feed_forward=f), steps=400, command=0.1) for f in (0.0, 1.0))
-    assert plain.channel("position").tobytes() == told.channel("position").tobytes(), "a step at the beginning has no speed"
+    assert plain.channel("position").tobytes() == told.channel("position").tobytes(), (
+        "a step at the beginning has no speed"
+    )
     assert CATALOGUE["speed_feed_forward"].targets(slider(**{**SERVO, "kd": 0.0})) == ()

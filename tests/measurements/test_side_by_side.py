@@ -49,6 +49,14 @@ def by_quantity(folder: Path, m: Motion) -> None:
         table(folder / f"{stem}.csv", np.c_[m["t"], values], ["time", *JOINTS])
 
 
+def with_a_common_word(folder: Path, m: Motion) -> None:
+    """As a laboratory published them: one more file of the speeds, and accelerations of another length."""
+    speeds = np.gradient(m["q"], m["t"], axis=0)
+    quantities = {"Q": m["q"], "Qref": m["g"], "TimeStamp": m["t"][:, None], "DotQ": speeds, "DotQ_NF": 1.01 * speeds}
+    for name, values in (quantities | {"DDotQ": speeds[1:]}).items():
+        table(folder / f"data{name}.csv", values, None)
+
+
 def by_joint(folder: Path, m: Motion) -> None:
     for k, joint in enumerate(JOINTS):
         values = np.stack([m["t"], m["q"][:, k], m["g"][:, k]], axis=1)
@@ -106,6 +114,24 @@ def test_a_folder_for_each_trial_or_a_name_for_each(tmp_path: Path) -> None:
     files = recordings_in(tmp_path / "flat")[0]
     first, second = taken_in(tmp_path, files)
     assert abs(len(first) - 300) < 5 and abs(len(second) - (len(m["t"]) - 300)) < 5
+
+
+def test_a_word_that_all_of_them_begin_with_says_nothing(tmp_path: Path) -> None:
+    """dataQ is q; what is there twice, or of other rows and nothing that a model asks for, is left out and named."""
+    m = samples.motion()
+    with_a_common_word(tmp_path, m)
+    files = recordings_in(tmp_path)[0]
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    (note,) = [n for n in proposal_for(files, robot, Hints()).notes if "left out, since" in n]
+    assert "dataDDotQ.csv" in note and "dataDotQ_NF.csv" in note and "dataDotQ.csv" not in note
+    (log,) = taken_in(tmp_path, files)
+    plain = tmp_path / "plain"
+    plain.mkdir()
+    without_names(plain, m)
+    (wanted,) = taken_in(plain, recordings_in(plain)[0])
+    assert np.allclose(log.commands, wanted.commands, atol=1e-9)
+    for joint in JOINTS:
+        assert np.allclose(log.channel(f"position_{joint}"), wanted.channel(f"position_{joint}"), atol=1e-9)
 
 
 def test_what_lies_beside_them_and_says_nothing_of_itself_is_left_out(tmp_path: Path) -> None:

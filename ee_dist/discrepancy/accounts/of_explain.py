@@ -218,14 +218,14 @@ def _told_to_move(commands: Array) -> bool:
 
 def _rivals(tried: int, tied: Sequence[str], more: str, better: Sequence[str] = ()) -> str:
     """``better``: what leaves less of what was held out, and does not go first for all that it says."""
-    if better and not tied:
-        does = "others do" if len(better) > 1 else "other does"
-        many = f"{len(better)} {does} better, by more numbers where nothing was guessed ({listed_few(better)})"
-        return f"Of {counted(tried, 'explanation')} {many}"
-    if not tied:
-        return f"Of {counted(tried, 'explanation')} no other does as well"
+    of = f"Of {counted(tried, 'explanation')}"
     told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
-    return f"Of {counted(tried, 'explanation')} {more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+    as_well = f"{more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+    if better:
+        do = "do" if len(better) > 1 else "does"
+        said = f"{of} {len(better)} {do} better, by more numbers where nothing was guessed ({listed_few(better)})"
+        return f"{said}, and {as_well}" if tied else said
+    return f"{of} {as_well}" if tied else f"{of} no other does as well"
 
 
 def _counted_right(confidence: float | None, way: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from ee_dist.measurements.side_by_side import side_by_side
 from ee_dist.measurements.table import Table
 
 _WORD = re.compile(r"[^\W\d_]+|\d+")
+_BEGINS = re.compile(r"[a-z]+(?=[A-Z])")
 _BETWEEN = frozenset(["dot", "ddot", "joint", "joints", "motor", "of", "the", "all"])
 """Words that may stand among those of a quantity and say nothing by themselves."""
 _NUMBERED = re.compile(r"(?<![^\W_])(?:joint|motor|axis|servo|link|drive|dxl|actuator|j|m)[ _.\-]?\d+", re.IGNORECASE)
@@ -23,7 +25,7 @@ _NUMBERED = re.compile(r"(?<![^\W_])(?:joint|motor|axis|servo|link|drive|dxl|act
 @dataclass(frozen=True)
 class Layout:
     """``patterns``: the name of each kind of file, with {trial} for what tells trials apart; ``first``: those of the first;
-    ``others``: files beside them that do not say what they hold."""
+    ``others``: files beside them that do not say what they hold, or nothing that is asked for."""
 
     patterns: Mapping[str, str]
     first: Mapping[str, Path]
@@ -34,7 +36,7 @@ def put_together(files: Sequence[Path], joints: Sequence[str]) -> tuple[Layout, 
     """How the files are one trial each few, and the first of them; what is in the way where they could be; None for files that
     are nothing of the kind."""
     layouts = (
-        ([_quantity(f.stem) for f in files], _of_one_quantity),
+        (_quantities([f.stem for f in files]), _of_one_quantity),
         (_joints([f.stem for f in files], joints), _of_one_joint),
     )
     for spans, holds in layouts:
@@ -42,11 +44,22 @@ def put_together(files: Sequence[Path], joints: Sequence[str]) -> tuple[Layout, 
         tables = None if found is None else _tables(found)
         if found is None or tables is None or not holds(tables, joints):
             continue
+        found, tables = _without_idle(found, tables)
         try:
             return found, side_by_side(tables)
         except MeasurementError as error:
             return error
     return None
+
+
+def _quantities(stems: Sequence[str]) -> list[tuple[int, int] | None]:
+    """Where in each name the quantity stands, behind a word that all of them begin with: dataQ, dataQref, dataTimeStamp."""
+    begins = _BEGINS.match(stems[0]) if stems else None
+    head = (
+        begins[0] if begins and all(s.startswith(begins[0]) and s[begins.end() :][:1].isupper() for s in stems) else ""
+    )
+    spans = [_quantity(s[len(head) :]) for s in stems]
+    return [None if span is None else (span[0] + len(head), span[1] + len(head)) for span in spans]
 
 
 def _quantity(stem: str) -> tuple[int, int] | None:
@@ -106,6 +119,10 @@ def _layout(files: Sequence[Path], spans: Sequence[tuple[int, int] | None]) -> L
         if what in group:
             return None
         group[what] = file
+    # One more file of a quantity that the others have already, of each trial: filtered, or not.
+    if max(len(g) for g in groups.values()) > 2:
+        others += [file for g in groups.values() if len(g) == 1 for file in g.values()]
+        groups = {key: g for key, g in groups.items() if len(g) > 1}
     first = next(iter(groups.values()))
     if len(first) < 2 or any(g.keys() != first.keys() for g in groups.values()):
         return None
@@ -125,6 +142,19 @@ def _tables(found: Layout) -> dict[str, Table] | None:
             return None
         tables[what] = trials[0].tables[0]
     return tables
+
+
+def _without_idle(found: Layout, tables: dict[str, Table]) -> tuple[Layout, dict[str, Table]]:
+    """Without files of other rows than the rest whose quantity no model asks for, as an acceleration worked out later."""
+    usual, _ = Counter(len(t) for t in tables.values()).most_common(1)[0]
+    idle = [what for what, t in tables.items() if read_name(what).kind == OTHER and len(t) != usual]
+    stay = [what for what in tables if what not in idle]
+    layout = Layout(
+        {what: found.patterns[what] for what in stay},
+        {what: found.first[what] for what in stay},
+        (*found.others, *(found.first[what] for what in idle)),
+    )
+    return layout, {what: tables[what] for what in stay}
 
 
 def _of_one_quantity(tables: Mapping[str, Table], joints: Sequence[str]) -> bool:

@@ -11,11 +11,11 @@ _QUANTITY = {
     POSITION: "q pos position positions angle angles ang theta th phi qpos jpos enc encoder winkel pose lage stroke angular "
     "rotation configuration",
     SPEED: "dq qvel vel velocity velocities speed speeds omega qdot dtheta thetadot jvel spd rate geschwindigkeit drehzahl "
-    "qp thetap dphi",
+    "qp thetap dphi dotq",
     TORQUE: "tau tor torque torques effort efforts trq moment drehmoment force kraft jtau frc",
     CURRENT: "cur curr current currents amps ampere strom iq amperage",
-    OTHER: "acc accel acceleration qdd ddq qddot volt voltage volts temp temperature pwm err error fric friction duty status "
-    "flag mode supply battery load enable enabled counter seq id ticks cycle wrench imu tcp cartesian eef",
+    OTHER: "acc accel acceleration qdd ddq qddot ddotq volt voltage volts temp temperature pwm err error fric friction duty "
+    "status flag mode supply battery load enable enabled counter seq id ticks cycle wrench imu tcp cartesian eef",
     TIME: "t time times timestamp timestamps stamp stamps zeit clock sec secs seconds elapsed uptime tstamp date datetime",
 }
 VOLTAGES = frozenset(["pwm", "duty", "volt", "volts", "voltage"])
