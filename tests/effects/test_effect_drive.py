@@ -388,7 +388,7 @@ def test_delays_worth_trying_do_not_shrink_with_the_step_of_a_simulation() -> No
         assert dict(find(effect).bounds(robot, target))["delay_s"][1] == 20.0 * robot.time_step_s > 0.1
 
 
-def test_a_controller_that_knows_the_speed_of_its_goal_does_not_lag_by_its_damping(bench: Bench) -> None:
+def test_speed_feed_forward_takes_off_what_a_joint_lags_by_its_damping(bench: Bench) -> None:
     """A ramp of speed v is followed kd*v/kp late; with a share of the speed known, late by what that leaves."""
     speed, late = 0.05, SERVO["kd"] / SERVO["kp"]
     times = 0.001 * np.arange(4001)
@@ -402,7 +402,7 @@ def test_a_controller_that_knows_the_speed_of_its_goal_does_not_lag_by_its_dampi
     assert lags[0] > 0.004, "there is a lag to be less"
 
 
-def test_feed_forward_adds_to_what_is_described_and_does_nothing_at_rest(bench: Bench) -> None:
+def test_speed_feed_forward_adds_to_what_is_described_and_does_nothing_at_rest(bench: Bench) -> None:
     half = apply(slider(**SERVO, feed_forward=0.5), [term("speed_feed_forward", "joint", share=0.25)])
     assert half.drives[0].feed_forward == pytest.approx(0.75)
     less = apply(slider(**SERVO, feed_forward=0.5), [term("speed_feed_forward", "joint", share=-0.7)])

@@ -77,7 +77,8 @@ def test_a_drive_and_its_stops(robots: int, motors: int, elastic: bool, seed: in
     switched = [rng.uniform(0, 1, shape) for _ in range(3)]
     written = [rng.normal(0, 1, shape) for _ in range(6)]
     kinds = rng.integers(0, len(COMMANDS), shape)
-    assert_same_bits(drive._drive, [kinds, table, *state, *switched, 0.01, elastic, *written])
+    ahead = rng.normal(0, 2, shape)
+    assert_same_bits(drive._drive, [kinds, table, *state, ahead, *switched, 0.01, elastic, *written])
     lower = rng.uniform(-2, 0, shape)
     present = rng.random(shape) < 0.8
     upper, inertia = lower + rng.uniform(0, 2, shape), rng.uniform(0.001, 0.1, shape)
