@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.evaluation.gathered import ask
 from ee_dist.evaluation.jobs import Evaluator, Job
-from ee_dist.evaluation.side_by_side import ask
 
 MOST_BYTES = 512 * 2**20
 """Bytes of results that are kept. Numbers take none to speak of; what is kept of logs of minutes does, and the oldest goes."""

@@ -21,7 +21,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, Leading
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.effects.fixture import STAND
-from ee_dist.evaluation.side_by_side import side_by_side
+from ee_dist.evaluation.gathered import side_by_side
 from ee_dist.robots.ranges import travel
 from ee_dist.trials.log import Array, SensorLog
 

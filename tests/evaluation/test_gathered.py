@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ee_dist.evaluation.side_by_side import ask, side_by_side
+from ee_dist.evaluation.gathered import ask, side_by_side
 
 
 class Doubles:
