@@ -13,6 +13,8 @@ from ee_dist.discrepancy.accounts.account import curves_of
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import EVENT, Layout
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop, soften
+from ee_dist.effects.catalogue import term
 
 TRIALS, CHANNELS, PER = 6, 20, 15
 
@@ -96,3 +98,22 @@ def test_what_walks_about_may_touch_down_a_step_early() -> None:
     sample = samples()["quadruped"]
     trials = tuple(replace(t, hardware=True, commands_held=True) for t in measure(sample, ()))
     assert (problem_by("open_loop", trials, sample.robot).events == EVENT).all()
+
+
+@pytest.mark.parametrize(("name", "real", "soft"), [("arm", True, 60.0), ("arm", False, 6.0), ("quadruped", True, 6.0)])
+def test_what_a_real_arm_leaves_is_softened_far_beyond_what_a_missed_contact_would_be(
+    name: str, real: bool, soft: float
+) -> None:
+    """It counts by its square, nearly, where that of others counts by its logarithm; and comes back as it was."""
+    sample = samples()[name]
+    trials = tuple(replace(t, hardware=real, commands_held=real) for t in measure(sample, ()))
+    p = problem_by("open_loop", trials, sample.robot)
+    assert isinstance(p, OpenLoop) and f"softened beyond {soft:g})" in p.error_definition
+    off = (term("zero_offset", sample.robot.motor_names[0], offset_rad=0.1),)
+    (row,) = p.residuals([off])
+    read = p.layout.reading
+    bare = p.smooth(row)
+    assert np.allclose(soften(bare, soft), row)
+    far = read & (np.abs(bare) > 12.0) & (np.abs(bare) < 30.0)
+    assert far.any()
+    assert ((np.abs(row) > 0.95 * np.abs(bare))[far].all()) == (soft > 6.0)

@@ -2,7 +2,8 @@
 
 A residual value is the mean over a block of rows of (measured - predicted), in units of what that difference would be
 from noise and from the spread of equally good models (see predictability.py), softened beyond six of them so that one
-missed contact does not outweigh a minute of agreement. Two values a window and channel
+missed contact does not outweigh a minute of agreement; of a real robot that touches nothing beyond sixty.
+Two values a window and channel
 compare how noisy and how frozen the channel is, which is all that a noisy or dropping sensor changes.
 """
 
@@ -55,7 +56,11 @@ from ee_dist.trials.log import Array, SensorLog
 BLOCK_S = 0.04
 """Time that readings are averaged over, where they are taken more seldom than rows are simulated."""
 SOFT = 6.0
-"""Residuals beyond this many standard deviations count by their logarithm."""
+"""Residuals beyond this many standard deviations count by their logarithm;"""
+FIRM = 60.0
+"""those of a real robot that touches nothing beyond so many. It misses no contact, and differs from its model in every joint:
+where nearly all that is compared is softened, what is right in few rows and far off in the others looks as good as what is
+near in all."""
 TOGETHER = 4_000_000
 """Residual values that are computed together: of long logs those of a few hypotheses."""
 SAVED = 0.6
@@ -66,15 +71,15 @@ COMMAND_SHARE = 0.005
 """Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
 TINY = 0.25
 """Share of a channel's scale whose roughness is too small to count."""
-_SOFT_FLOOR = 0.974
-"""Mean square of SOFT * asinh(x / SOFT) for standard normal x."""
+_SOFT_FLOOR = {SOFT: 0.974, FIRM: 0.9997}
+"""Mean square of soft * asinh(x / soft) for standard normal x."""
 _ROUGH_FLOOR = 0.93
 """Mean square of the comparison of roughness, for white noise."""
 
 
-def soften(values: Array) -> Array:
-    """Nearly the identity up to SOFT, logarithmic beyond."""
-    return SOFT * np.arcsinh(values / SOFT)
+def soften(values: Array, soft: float = SOFT) -> Array:
+    """Nearly the identity up to ``soft``, logarithmic beyond."""
+    return np.asarray(soft * np.arcsinh(values / soft))
 
 
 def _held_up(spread: Array) -> Array:
@@ -113,6 +118,7 @@ class OpenLoop(Problem):
         parts: Sequence[Stretch] = (),
     ) -> None:
         self.robot, self.measured, self.evaluator = robot, tuple(trials), evaluator
+        self.soft = FIRM if self._touches_nothing else SOFT
         spacing = reading_s(trials)
         self.block = block if not spacing else min(block, max(1, round(BLOCK_S / spacing)))
         self._whole: OpenLoop | None = None
@@ -146,7 +152,8 @@ class OpenLoop(Problem):
         self._lay_out()
         self.error_definition = (
             "root mean square over channels and time of the residual in standard deviations of its noise "
-            f"and of equally good models (means over {block * (spacing or robot.time_step_s):.3g} s, softened beyond {SOFT:g})"
+            f"and of equally good models (means over {block * (spacing or robot.time_step_s):.3g} s, softened beyond "
+            f"{self.soft:g})"
         )
 
     @property
@@ -170,11 +177,16 @@ class OpenLoop(Problem):
     def whole(self) -> OpenLoop:
         return self._whole or self
 
+    @property
+    def _touches_nothing(self) -> bool:
+        """Whether these are logs of a real robot that is bolted down, without a floor."""
+        return not (self.robot.free_base or self.robot.world.has_floor) and all(t.real for t in self.measured)
+
     @cached_property
     def events(self) -> Array:
         """Of a real robot that touches nothing, what its sharpest turns make of a step."""
         found = super().events.copy()
-        if self.robot.free_base or self.robot.world.has_floor or not all(t.real for t in self.measured):
+        if not self._touches_nothing:
             return found
         sensors = len(self.robot.sensors)
         found[:, :sensors] = 0.0
@@ -331,8 +343,8 @@ class OpenLoop(Problem):
             rough = _ROUGH_FLOOR * self._known(k)[1] / self.grain_deviation[k] ** 2
             grain = _ROUGH_FLOOR * noisy * pure / self.grain_deviation[k] ** 2 + rough
             texture = np.stack([grain, np.zeros_like(grain)], axis=1)
-            floor += [share.ravel() * _SOFT_FLOOR, texture.ravel()]
-            known += [left.ravel() * _SOFT_FLOOR, np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
+            floor += [share.ravel() * _SOFT_FLOOR[self.soft], texture.ravel()]
+            known += [left.ravel() * _SOFT_FLOOR[self.soft], np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
             if isinstance(trial.driver, Network):
                 m = len(self.robot.drives)
                 seg.append(np.repeat(of_block, m))
@@ -428,14 +440,14 @@ class OpenLoop(Problem):
         grain = np.log((measured.rough + self._tiny) / self._rough(predicted)) / self.grain_deviation[part]
         compared = np.array([x.kind not in self.repeating for x in self.robot.sensors])
         texture = np.stack([grain, frozen(measured, predicted, self.window) * compared * self._moving[part]], axis=1)
-        return np.concatenate([soften(shape).ravel(), soften(texture).ravel()])
+        return np.concatenate([soften(shape, self.soft).ravel(), soften(texture, self.soft).ravel()])
 
     def _command_residuals(self, trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
         spans = _spans(self.robot)
         sent = predicted_commands(trial, models)
         rows = len(trial.log) // self.block * self.block
         gap = (trial.log.commands[:, None] - sent)[:rows].reshape(-1, self.block, *sent.shape[1:]).mean(axis=1)
-        values = soften(gap / (COMMAND_SHARE * spans))
+        values = soften(gap / (COMMAND_SHARE * spans), self.soft)
         return np.ascontiguousarray(np.moveaxis(values, 1, 0)).reshape(len(models), -1)
 
     def noise_floor(self) -> tuple[float, str]:
@@ -444,7 +456,7 @@ class OpenLoop(Problem):
 
     def smooth(self, residual: Array) -> Array:
         """Before softening."""
-        return np.asarray(SOFT * np.sinh(residual / SOFT))
+        return np.asarray(self.soft * np.sinh(residual / self.soft))
 
     # -- views of a residual -----------------------------------------------------------------------------------------
 
@@ -455,14 +467,14 @@ class OpenLoop(Problem):
 
     def raw_blocks(self, part: int, residual: Array) -> Array:
         """The same before softening, in the units of the channels."""
-        return np.asarray(SOFT * np.sinh(self.blocks(part, residual) / SOFT) * self.deviation[part])
+        return np.asarray(self.smooth(self.blocks(part, residual)) * self.deviation[part])
 
     def raw_grain(self, part: int, residual: Array) -> Array:
         """(R // window, S): differences of the log of roughness, before softening."""
         rows, s = self._rows[part], len(self.robot.sensors)
         first, windows = rows // self.block * s, rows // self.window
         texture = residual[self.slices[part]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
-        return np.asarray(SOFT * np.sinh(texture / SOFT) * self.grain_deviation[part])
+        return np.asarray(self.smooth(texture) * self.grain_deviation[part])
 
     def raw(self, residual: Array) -> Array:
         """(n,) in the units of the channels; NaN where the texture of a channel is compared."""
@@ -473,7 +485,7 @@ class OpenLoop(Problem):
             if isinstance(self.parts[k].run.driver, Network):
                 spans = COMMAND_SHARE * _spans(self.robot)
                 sent = residual[part][-len(self._data[k].means) * len(spans) :].reshape(-1, len(spans))
-                out[part.stop - sent.size : part.stop] = (SOFT * np.sinh(sent / SOFT) * spans).ravel()
+                out[part.stop - sent.size : part.stop] = (self.smooth(sent) * spans).ravel()
         return out
 
     def series(self, hypothesis: Hypothesis) -> list[Series]:
