@@ -118,6 +118,31 @@ def test_all_that_is_a_little_wrong_is_found_and_nothing_else(robot):
     assert {t.effect for r in found.rungs for t in r.added} == set(truth)
 
 
+def test_many_kinds_come_in_few_steps_those_that_matter_most_first(robot, monkeypatch):
+    truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2, "zero_offset": -0.15, "part_mass": 0.12}
+    each = look(Curved(robot, truth), pool_of(robot))
+    monkeypatch.setattr("ee_dist.discrepancy.everywhere.STEPS", 2)
+    few = look(Curved(robot, truth), pool_of(robot))
+    assert names(few) == names(each) == set(truth)
+    assert len(few.rungs) == 2 < len(each.rungs)
+    assert few.rungs[0].name == each.rungs[0].name and few.rungs[1].error_heldout == each.rungs[-1].error_heldout
+    assert {t.effect for r in few.rungs for t in r.added} == set(truth)
+
+
+def test_a_descent_that_ended_above_another_is_not_asked_what_may_leave_it(robot, monkeypatch):
+    problem, pool = Curved(robot, {"coulomb_friction": 0.1, "viscous_friction": 0.2}), pool_of(robot)[:3]
+    search, cut = Search(problem), travelling(problem)[0]
+    (fit,) = follow_valley(search, [(Model(tuple(pool)), np.zeros(3))], search.everything, 1.0)
+    looked = _Look(search, search, search, 0, tuple(pool), Current(), ((cut, search.base()),), ())
+    asked = []
+    monkeypatch.setattr(
+        "ee_dist.discrepancy.everywhere.pruned", lambda *a: asked.append(a) or Current(fit.model.parts, fit.u)
+    )
+    kept = looked._worth(fit, {}, 0.99 * fit.energy + looked.luck(fit.energy))
+    assert kept is not None and kept.fitted == fit.energy and len(asked) == 1, "luck may make so much of a difference"
+    assert looked._worth(fit, {}, 0.5 * fit.energy) is None and len(asked) == 1
+
+
 @pytest.mark.parametrize("rests", [False, True])
 def test_of_long_trials_the_beginning_tells_where_to_look_unless_nothing_moves_there(robot, rests):
     truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2, "zero_offset": -0.15, "part_mass": 0.12}
