@@ -84,6 +84,17 @@ def test_a_joint_with_more_or_less_than_all_share_says_how_much_that_is():
     assert [place for place, _ in zero.at] == ["hip front left"]
 
 
+def test_a_factor_beside_one_that_all_share_says_what_both_come_to():
+    robot = quadruped()
+    terms = (
+        term("position_gain", "all_joints", factor=0.5),
+        term("position_gain", "knee_front_left", factor=1.6),
+    )
+    reports = [ParameterReport(k, "factor", t.values[0][1], 0.1, 2.0, "") for k, t in enumerate(terms)]
+    (gains,) = kinds_of(terms, reports, robot)
+    assert [place for place, _ in gains.at] == ["all joints", "knee front left, 0.8 in all, beside what is shared"]
+
+
 def test_a_doubt_stands_beside_a_value_in_a_word_and_below_in_full():
     told = [
         ParameterReport(0, "torque_nm", 0.1, -0.2, 0.4, HARDLY),

@@ -53,17 +53,19 @@ def kinds_of(terms: Hypothesis, reports: Sequence[ParameterReport], robot: Robot
 
 
 def _in_all(term: Term, name: str, terms: Hypothesis, robot: Robot) -> str:
-    """How much there is at a joint that has more or less beside what all share: nobody adds that up, and less of it is no
-    friction that drives."""
+    """How much there is at a joint that has more or less beside what all share: nobody adds that up, or multiplies it, and less
+    of it is no friction that drives."""
     effect = CATALOGUE[term.effect]
     others = [
         t
         for t in terms
         if t.effect == term.effect and term.target in members_of(robot, t.target, effect.targets(robot))
     ]
-    if not others or not effect.parameter(name).on_top:
+    parameter, values = effect.parameter(name), [dict(t.values)[name] for t in (term, *others)]
+    if not others or not (parameter.on_top or parameter.by_ratio):
         return ""
-    return f", {sum(dict(t.values)[name] for t in (term, *others)):.3g} in all, beside what is shared"
+    whole = math.prod(values) if parameter.by_ratio else sum(values)
+    return f", {whole:.3g} in all, beside what is shared"
 
 
 UNEVEN = 0.1
