@@ -23,8 +23,6 @@ PLACEHOLDER = 50.0
 ALIKE, AT_ALL = 4, 12.0
 """Joints that all have one number, and times what the most loaded of them needs from which it is none: motors that hold an arm
 are not those that turn its hand."""
-ROUND, AT_ONE = 1000.0, 4.0
-"""Power of ten from which such a number is what tools write where nobody knew, and times what is needed that it must be then."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +51,8 @@ def placeholders(body: Body, inertia: Mapping[str, float]) -> dict[str, Placehol
         stated.append(Placeholder(joint, float(limit), hold + TORQUE_PER_INERTIA * inertia[joint.name]))
     hinges = [p for p in stated if p.joint.kind == "hinge"]
     most = max((p.needed for p in hinges), default=0.0)
-    one = len(hinges) >= ALIKE and len({p.limit for p in hinges}) == 1
-    one = one and hinges[0].limit > (AT_ONE if _is_round(hinges[0].limit) else AT_ALL) * most
+    one = len(hinges) >= ALIKE and len({p.limit for p in hinges}) == 1 and hinges[0].limit > AT_ALL * most
     return {p.joint.name: p for p in stated if p.limit > PLACEHOLDER * p.needed or (one and p.joint.kind == "hinge")}
-
-
-def _is_round(limit: float) -> bool:
-    return limit >= ROUND and float(np.log10(limit)).is_integer()
 
 
 def told(found: Mapping[str, Placeholder], body: Body, swinging: Collection[str] = ()) -> list[str]:

@@ -99,14 +99,6 @@ def test_one_large_number_at_all_joints_is_none(tmp_path: Path, efforts: list[fl
         assert all(d.torque_limit < 0.2 * efforts[0] for d in found.robot.drives)
 
 
-def test_a_thousand_at_all_joints_is_what_nobody_knew(tmp_path: Path) -> None:
-    """As an arm of 15 kg had it: eight times what its shoulder needs, which motors of one kind may have, and a round number."""
-    for effort, none in ((1000.0, True), (900.0, False)):
-        said = chain(tmp_path, [effort] * 5, 5.0).assumed
-        assert any("no real limit" in line for line in said) is none
-    assert not any("no real limit" in line for line in chain(tmp_path, [1000.0] * 5, 20.0).assumed), "it may need that"
-
-
 def test_a_joint_that_turns_without_end_and_states_no_effort_is_taken_to_swing_freely(tmp_path: Path) -> None:
     def pendulum(first: str, second: str) -> Starter:
         begun(tmp_path, first, second)
