@@ -40,7 +40,8 @@ def gathered(
             proposal_head["side_by_side"] = dict(together[0].patterns)
             left = sorted({f.name for f in together[0].others})
             if left:
-                notes.append(f"left out, since their names say nothing that is asked for: {listed(left[:MOST_SHOWN])}")
+                why = "since their names say nothing that is asked for, or the rest of their trial is missing"
+                notes.append(f"left out, {why}: {listed(left[:MOST_SHOWN])}")
             return Recorded("", (together[1],))
         spread = _spread(files, first)
         if spread is not None:
