@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import tempfile
 from pathlib import Path
@@ -29,6 +28,7 @@ from benchmarks.together import at_once
 from benchmarks.whole_run import RunSetting, finished_run, run_scenario
 from rich.console import Console
 
+from ee_dist.basics.cores import usable
 from ee_dist.robots.quadruped import quadruped
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -73,7 +73,7 @@ class Benchmark:
 
     def __init__(self, options: argparse.Namespace, folder: Path, console: Console) -> None:
         self.options, self.folder, self.console = options, folder, console
-        self.cores = os.cpu_count() or 1
+        self.cores = usable()
         self.rows: list[Row] = []
         self.notes: list[str] = []
         self.data: dict[str, Any] = {"machine": machine(), "runs": [], "bare": {}, "peers": {}, "costs": {}}

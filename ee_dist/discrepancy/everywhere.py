@@ -110,7 +110,8 @@ def everywhere(
     robot, places = search.problem.robot, Model(current.parts).places
     begun = list(instead(robot, current, own))
     # From neutral, which the model as it is may be, small values take in least of what is not theirs.
-    than = look.fitted(current)
+    fitted = as_it_is[calm.everything]
+    than = float(fitted @ fitted)
     found = None if again else look.kept(current, than, beside_all=not begun)
     # Of what was added last the most is not yet decided.
     alike = [t for t in reversed(twins) if again and stands_out(robot, current.parts[t[0]])][:TWINS]
@@ -199,12 +200,6 @@ class _Look:
         """By how much held-out energy of about this size may differ for no reason."""
         problem = self.search.problem
         return least_energy(len(self.pool)) * max(float(problem.floor.mean()), energy / len(problem.floor))
-
-    def fitted(self, model: Current) -> float:
-        """Energy that a model leaves of what is fitted."""
-        (row,) = self.calm.residuals([model.hypothesis])
-        own = row[self.calm.everything]
-        return float(own @ own) if np.isfinite(own).all() else np.inf
 
     def kept(self, base: Current, than: float, more: bool = True, beside_all: bool = False) -> _Kept | None:
         """The base with all that is worth keeping, and (``more``), if need be, one effect beside; None where that is not worth

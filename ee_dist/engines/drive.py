@@ -70,11 +70,11 @@ class DrivePath:
         self.integral = np.zeros(shape)
         self.goal: Array | None = None
         """Where a controller with limits of its own has let its commands (B, M) go so far,"""
+        self.pace = np.zeros(shape)
+        """and how fast these go, where their acceleration is limited, rad/s."""
         self.before: Array | None = None
         """Commands (B, M) in the step before, by which a controller that goes along with their speed knows it."""
         self.still = np.zeros(shape)
-        self.pace = np.zeros(shape)
-        """and how fast these go, where their acceleration is limited, rad/s."""
         self.led = np.isfinite(p["command_speed"]) & (self.kind <= SPEED)
         self.governed = np.isfinite(p["command_speed"]) & (self.kind == TORQUE)
         self.uses_governor = bool(self.governed.any())

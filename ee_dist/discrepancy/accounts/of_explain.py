@@ -123,8 +123,8 @@ def explain_account(
         sure = f"How sure: it explains {taken_off(best)}{unexplained_rest(best.explained, not found.left)}. "
         some = best.terms if len(best.terms) <= NAMED else ()  # of more the table tells
         values = ranges(found.after, found.parameters, some, robot, len(best.terms) > 1)
-        better = [c.name for c in looked_at if c.earned and float(c.held.sum()) < float(best.held.sum())]
-        better = [name for name in better if name not in best.tied_with]
+        others = [c for c in looked_at if c.earned and c.name not in best.tied_with]
+        better = [c.name for c in others if float(c.held.sum()) < float(best.held.sum())]
         sure += f"{_rivals(found.tried, best.tied_with, more, better)}{unsure_of(unsure)}{values}."
         advice = slower(unsure) if unsure else MEND if entry.mistake else ""
         lines.append(f"{guessed_text(best.terms)}{_still(problem)}" if guessed else entry.physics)
@@ -216,7 +216,7 @@ def _told_to_move(commands: Array) -> bool:
     return len(known) > 0 and float(np.ptp(known)) > 0
 
 
-def _rivals(tried: int, tied: Sequence[str], more: str, better: Sequence[str] = ()) -> str:
+def _rivals(tried: int, tied: Sequence[str], more: str, better: Sequence[str]) -> str:
     """``better``: what leaves less of what was held out, and does not go first for all that it says."""
     of = f"Of {counted(tried, 'explanation')}"
     told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
