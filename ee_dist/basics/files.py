@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -28,3 +29,10 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def real(path: str | Path) -> Path:
     """Where a path leads; of a link that leads to itself the link, so that whoever opens it says what is wrong."""
     return Path(os.path.realpath(path))
+
+
+def named(path: str | Path) -> list[Path]:
+    """The file or folder of that name, or all that match it as a pattern (``runs/sine_*.csv``), by name. What matches nothing
+    is left as it is, so that whoever opens it says what is wrong."""
+    found = [] if os.path.lexists(path) else sorted(glob.glob(str(path), recursive=True))
+    return [Path(f) for f in found] or [Path(path)]

@@ -21,7 +21,8 @@ from ee_dist.discrepancy.evidence.holdout import bootstrap
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, read_every, setup_of
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.prediction import clean
-from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop, soften
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.discrepancy.ways.open_loop.weights import soften
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands

@@ -19,7 +19,7 @@ from ee_dist.trials.log import Array, State
 def goes_halfway(robot: Robot) -> bool:
     """Whether the robot is one for such steps: it stands fast, has nothing to fall on, and none of its joints is led by position
     or speed: controllers are steep, and know nothing of half steps."""
-    if robot.free_base or robot.world.has_floor:
+    if not robot.touches_nothing:
         return False
     led = {d.joint: d.command for d in robot.drives}
     return all(led.get(j.name) in ("torque", "none") for j in robot.joints if j.kind != "fixed")

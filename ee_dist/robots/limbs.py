@@ -25,7 +25,7 @@ class Limb:
 def limbs(robot: Robot) -> tuple[Limb, ...]:
     """The limbs of a robot that have sensors, each channel in one of them; one alone, the robot itself, where it walks about or
     touches a floor, where all drives share a supply that sags, and where no more than one limb has sensors."""
-    if robot.free_base or robot.world.has_floor or robot.world.supply_sag:
+    if not robot.touches_nothing or robot.world.supply_sag:
         return (whole(robot),)
     tops = _tops(robot)
     if len(tops) < 2:

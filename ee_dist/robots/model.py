@@ -273,6 +273,11 @@ class Robot:
     def sensor_names(self) -> tuple[str, ...]:
         return tuple(s.name for s in self.sensors)
 
+    @property
+    def touches_nothing(self) -> bool:
+        """Whether it stands fast and there is no floor: nothing that it could touch is simulated."""
+        return not (self.free_base or self.world.has_floor)
+
     def assumed_joints(self, name: str) -> tuple[str, ...]:
         """Joints of whose drive the field of that name was assumed, in the order of the robot."""
         return tuple(j for j in self.motor_names if (j, name) in self.assumed)

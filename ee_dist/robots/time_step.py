@@ -25,7 +25,7 @@ def default_step_s(robot: Robot) -> float:
     obeys = {d.joint: d.command for d in robot.drives}
     moving = {j.name: obeys.get(j.name, "none") for j in robot.joints if j.kind != "fixed"}
     swings = any(moving.get(j.name) == "none" for j in robot.joints if j.kind == "hinge")
-    if robot.free_base or robot.world.has_floor or swings or "torque" in moving.values():
+    if not robot.touches_nothing or swings or "torque" in moving.values():
         return FINE_S
     coarsest = coarsest_step_s(_with_light_rotors(robot))
     return next((s for s in STEPS_S if s <= coarsest), FINE_S)

@@ -18,7 +18,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from ee_dist.basics.files import real, write_whole
+from ee_dist.basics.files import named, real, write_whole
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
@@ -228,7 +228,8 @@ def sources_of(mapping: Mapping, config: Config) -> str:
 
 
 def files_of(measured: Any, kind: str | None = None) -> tuple[list[Path], list[str]]:
-    """The files that ``measured`` names: one, several, or all of a readable format in a folder, by name. And notes.
+    """The files that ``measured`` names: one, several, all that match a pattern, or all of a readable format in a folder, by
+    name. And notes.
 
     Raises MeasurementError where there are none.
     """
@@ -237,8 +238,7 @@ def files_of(measured: Any, kind: str | None = None) -> tuple[list[Path], list[s
     names = measured if isinstance(measured, (list, tuple)) else [measured]
     files: list[Path] = []
     notes: list[str] = []
-    for name in names:
-        path = Path(str(name))
+    for path in (p for name in names for p in named(str(name))):
         if path.is_dir() and kind_of(path) is None:
             inside, remarks = recordings_in(path, kind)
             if not inside:

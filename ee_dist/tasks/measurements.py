@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ee_dist.basics.files import real
+from ee_dist.basics.files import named, real
 from ee_dist.basics.names import listed, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.lags import with_lags
@@ -210,12 +210,12 @@ def _held(file: Path, run: RunRecord) -> list[Any]:
 
 
 def files_of(measured: Any) -> list[Path]:
-    """The recordings that ``measured`` names: one, several, or all in a folder. Raises ConfigError."""
+    """The recordings that ``measured`` names: one, several, all that match a pattern, or all in a folder. Raises ConfigError."""
     if not measured:
         raise ConfigError("measured=: which log? name an .mcap, several as [a.mcap,b.mcap], or the folder of a trial")
     found: list[Path] = []
-    for name in measured if isinstance(measured, (list, tuple)) else [measured]:
-        path = Path(str(name))
+    names = measured if isinstance(measured, (list, tuple)) else [measured]
+    for path in (p for name in names for p in named(str(name))):
         if path.is_dir():
             inside = sorted(path.glob("*.mcap"))
             if not inside:

@@ -34,7 +34,7 @@ def test_positions_of_a_servo_without_ends_weigh_as_much_as_those_of_one_with_a_
     turn = replace(sample.robot, joints=tuple(replace(j, lower=-math.pi, upper=math.pi) for j in sample.robot.joints))
     with_ends, without = (OpenLoop(trials, r, evaluator_for(r)) for r in (turn, endless(sample.robot)))
     column = [s.kind for s in turn.sensors].index("position")
-    known, found = (np.concatenate([d[:, column] for d in p.deviation]) for p in (with_ends, without))
+    known, found = (np.concatenate([d[:, column] for d in p.weights.deviation]) for p in (with_ends, without))
     assert found == pytest.approx(known, rel=0.05)
 
 

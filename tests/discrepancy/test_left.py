@@ -13,7 +13,8 @@ from ee_dist.discrepancy.accounts.account import curves_of
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import EVENT, Layout
-from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop, soften
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.discrepancy.ways.open_loop.weights import soften
 from ee_dist.effects.catalogue import term
 
 TRIALS, CHANNELS, PER = 6, 20, 15

@@ -17,15 +17,15 @@ import numpy as np
 
 from ee_dist.basics.names import counted
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
-from ee_dist.discrepancy.problem import EVENT, Index, Layout, Problem, Series, joints_of
+from ee_dist.discrepancy.problem import EVENT, Index, Problem, Series
 from ee_dist.discrepancy.ways.open_loop.falls import fallen
 from ee_dist.discrepancy.ways.open_loop.in_units import InUnits, farther_off, in_units, told_in_units
+from ee_dist.discrepancy.ways.open_loop.layout import lay_out
 from ee_dist.discrepancy.ways.open_loop.predictability import MEMBERS, ensemble
 from ee_dist.discrepancy.ways.open_loop.prediction import (
     Digest,
     Predictor,
     ToSensors,
-    block_sums,
     digest,
     of_rows,
     predicted_commands,
@@ -43,8 +43,9 @@ from ee_dist.discrepancy.ways.open_loop.stretches import (
     stretches,
     too_long,
 )
-from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving, repeating
+from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
+from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, Weights, soften, weigh
 from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
 from ee_dist.effects.groups import members_of
 from ee_dist.engines.drivers import Network
@@ -55,12 +56,6 @@ from ee_dist.trials.log import Array, SensorLog
 
 BLOCK_S = 0.04
 """Time that readings are averaged over, where they are taken more seldom than rows are simulated."""
-SOFT = 6.0
-"""Residuals beyond this many standard deviations count by their logarithm;"""
-FIRM = 60.0
-"""those of a real robot that touches nothing beyond so many. It misses no contact, and differs from its model in every joint:
-where nearly all that is compared is softened, what is right in few rows and far off in the others looks as good as what is
-near in all."""
 TOGETHER = 4_000_000
 """Residual values that are computed together: of long logs those of a few hypotheses."""
 SAVED = 0.6
@@ -69,25 +64,6 @@ AT_ONCE = 16
 """Values that a contact or a reversal is in."""
 COMMAND_SHARE = 0.005
 """Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
-TINY = 0.25
-"""Share of a channel's scale whose roughness is too small to count."""
-_SOFT_FLOOR = {SOFT: 0.974, FIRM: 0.9997}
-"""Mean square of soft * asinh(x / soft) for standard normal x."""
-_ROUGH_FLOOR = 0.93
-"""Mean square of the comparison of roughness, for white noise."""
-
-
-def soften(values: Array, soft: float = SOFT) -> Array:
-    """Nearly the identity up to ``soft``, logarithmic beyond."""
-    return np.asarray(soft * np.arcsinh(values / soft))
-
-
-def _held_up(spread: Array) -> Array:
-    """(T, C): mean squares that vary from row to row by luck, each at least the mean of its neighbours."""
-    if not len(spread):
-        return spread  # fewer readings than a window
-    padded = np.pad(spread, ((1, 1), (0, 0)), mode="edge")
-    return np.asarray(np.maximum(spread, (padded[:-2] + spread + padded[2:]) / 3.0))
 
 
 class OpenLoop(Problem):
@@ -148,8 +124,9 @@ class OpenLoop(Problem):
             moving(values, window) if t.commands_held else np.ones_like(d.repeated, dtype=bool)
             for t, values, d in zip(trials, read, self._data, strict=True)
         ]
-        self._weigh(before)
-        self._lay_out()
+        self.weights = self._weighed(before)
+        imported = [self.measured[p.trial].log.filled is not None for p in self.parts]
+        self.layout, self.slices = lay_out(robot, self.parts, imported, self.weights, self.soft)
         self.error_definition = (
             "root mean square over channels and time of the residual in standard deviations of its noise "
             f"and of equally good models (means over {block * (spacing or robot.time_step_s):.3g} s, softened beyond "
@@ -159,10 +136,6 @@ class OpenLoop(Problem):
     @property
     def looped(self) -> tuple[int, ...]:
         return self._looped
-
-    @property
-    def trust(self) -> tuple[float, ...]:
-        return self._trust
 
     @cached_property
     def searched(self) -> OpenLoop:
@@ -180,7 +153,7 @@ class OpenLoop(Problem):
     @property
     def _touches_nothing(self) -> bool:
         """Whether these are logs of a real robot that is bolted down, without a floor."""
-        return not (self.robot.free_base or self.robot.world.has_floor) and all(t.real for t in self.measured)
+        return self.robot.touches_nothing and all(t.real for t in self.measured)
 
     @cached_property
     def events(self) -> Array:
@@ -190,7 +163,7 @@ class OpenLoop(Problem):
             return found
         sensors = len(self.robot.sensors)
         found[:, :sensors] = 0.0
-        for part, data, deviation in zip(self.parts, self._data, self.deviation, strict=True):
+        for part, data, deviation in zip(self.parts, self._data, self.weights.deviation, strict=True):
             spacing = reading_s([part.run]) or self.robot.time_step_s
             steps = self.block * spacing / self.robot.time_step_s
             bent = np.diff(data.means.astype(float), n=2, axis=0) / deviation[1:-1] / steps
@@ -230,71 +203,35 @@ class OpenLoop(Problem):
             found._whole = self.whole
         return found
 
-    def _weigh(self, before: Hypothesis) -> None:
-        """Standard deviations of block means (blocks, S) and of the log of roughness (windows, S), trial by trial."""
+    def _weighed(self, before: Hypothesis) -> Weights:
         models = [apply(self.robot, before)]
         models += ensemble(models[0], self._members)
-        pairs = [(k, m) for k in range(len(self.parts)) for m in self._held(models, k)]
-        found = self.predictor.digests(pairs)
-        seen = zip(self._data, found[:: len(models)], self._moving, strict=True)
-        self.repeating = repeating(self.robot, seen, self.window)
-        self._undeclared = self._rougher(found[:: len(models)])
-        self._begun = [self.predictor.by_start(k, held) for k, held in pairs[:: len(models)]]
-        self.deviation: list[Array] = []
-        self.grain_deviation: list[Array] = []
-        for k in range(len(self.parts)):
-            mine = found[k * len(models) : (k + 1) * len(models)]
-            base, others = mine[0], [d for d in mine[1:] if d.finite]
-            noise = self.scale.scale**2 / self.block + self._begun[k] + self._known(k)[0]
-            spread = np.zeros_like(base.means, dtype=float)
-            grain = np.zeros_like(base.rough, dtype=float)
-            if others and base.finite:
-                spread = np.mean([(d.means.astype(float) - base.means) ** 2 for d in others], axis=0)
-                grain = np.mean([np.log(self._rough(d) / self._rough(base)) ** 2 for d in others], axis=0)
-            self.deviation.append(np.sqrt(noise + _held_up(spread)))
-            self.grain_deviation.append(np.sqrt(2 * 1.95 / self.window + 0.01 + self._known(k)[1] + _held_up(grain)))
+        parts = range(len(self.parts))
+        known = [of_trial(self._unmodelled, p.run.name, len(self.robot.sensors)) ** 2 for p in self.parts]
+        held = [self._held(models, k) for k in parts]
+        return weigh(self.predictor, self._data, self._moving, self.scale, known, held)
 
+    @cached_property
+    def trust(self) -> tuple[float, ...]:
         quiet = np.array([s.kind != "touch" for s in self.robot.sensors])
         alone = self.scale.scale**2 / self.block
-        widened = np.array([float(np.mean((d**2 / alone)[:, quiet])) for d in self.deviation])
+        widened = np.array([float(np.mean((d**2 / alone)[:, quiet])) for d in self.weights.deviation])
         of = np.array([p.trial for p in self.parts])
-        self._trust = tuple(float(1.0 / np.mean(widened[of == k])) for k in range(len(self.measured)))
-
-    @property
-    def _tiny(self) -> Array:
-        return (TINY * self.scale.scale) ** 2
-
-    def _rough(self, predicted: Digest) -> Array:
-        """(windows, S) of a prediction, with the noise that no description declares."""
-        return np.asarray(predicted.rough + self._undeclared + self._tiny)
-
-    def _rougher(self, predicted: Sequence[Digest]) -> Array:
-        """(S,) variance of noise where none is declared: by how much channels are rougher than the model's, and no more than
-        others of their kind, so that a sensor that is noisier than they are stands out."""
-        kinds = np.array([s.kind for s in self.robot.sensors])
-        if any(s.noise for s in self.robot.sensors) or not all(p.finite for p in predicted):
-            return np.zeros(len(kinds))
-        more = np.concatenate([d.rough.astype(float) - p.rough for d, p in zip(self._data, predicted, strict=True)])
-        own = np.clip(np.median(more, axis=0), 0.0, self.scale.noise**2) if len(more) else np.zeros(len(kinds))
-        usual = {
-            kind: np.median(own[kinds == kind]) if (kinds == kind).sum() > 2 else own[kinds == kind].min()
-            for kind in kinds
-        }
-        return np.minimum(own, [usual[kind] for kind in kinds])
+        return tuple(float(1.0 / np.mean(widened[of == k])) for k in range(len(self.measured)))
 
     def shows(self, effect: str, target: str) -> bool:
         """Where most sensors repeat readings, that one does so too says nothing."""
         if effect not in REPEATING:
             return super().shows(effect, target)
         members = members_of(self.robot, target, self.robot.sensor_names) or (target,)
-        return not any(x.kind in self.repeating for x in self.robot.sensors if x.name in members)
+        return not any(x.kind in self.weights.repeating for x in self.robot.sensors if x.name in members)
 
     @property
     def notes(self) -> list[str]:
         lines = super().notes + [
             f"Most {kind} sensors repeat readings more often than the model's (coarse steps, rows that were filled "
             "in): how often they do is not compared."
-            for kind in sorted(self.repeating)
+            for kind in sorted(self.weights.repeating)
         ]
         if self._whole is not None:
             compared = sum(self._rows) * (reading_s(self.measured) or self.robot.time_step_s)
@@ -304,87 +241,6 @@ class OpenLoop(Problem):
                 f"{compared:.0f} s together, each begun from the measured positions; compare takes all of it."
             )
         return lines
-
-    def _known(self, part: int) -> Array:
-        """(2, S) mean squares that calibration left in the trial of a part: of block means, and of the log of roughness."""
-        return of_trial(self._unmodelled, self.parts[part].run.name, len(self.robot.sensors)) ** 2
-
-    def _lay_out(self) -> None:
-        """Segments, channels and floors of all residual values, trial after trial."""
-        names: list[str] = []
-        seg: list[Array] = []
-        chan: list[Array] = []
-        floor: list[Array] = []
-        known: list[Array] = []
-        time: list[Array] = []
-        reading: list[Array] = []
-        trial_of_segment: list[int] = []
-        self.slices: list[slice] = []
-        s, per = len(self.robot.sensors), self.window // self.block
-        at = 0
-        # How far noise moves the log of roughness beside what is too small to count, as a share of what it does alone.
-        noise = self.scale.noise**2
-        noisy = (noise / (noise + self._tiny) * (1.0 + TINY**2)) ** 2
-        pure = 2 * 1.95 / self.window + 0.01
-        for k, (number, trial) in enumerate((p.trial, p.run) for p in self.parts):
-            blocks, windows = self._rows[k] // self.block, self._rows[k] // self.window
-            first = len(names)
-            count = max(1, windows)
-            names += [f"{trial.name}@{self._begins(k, w):.1f}s" for w in range(count)]
-            trial_of_segment += [number] * count
-            of_block = first + np.minimum(np.arange(blocks) // per, count - 1)
-            seg += [np.repeat(of_block, s), np.repeat(first + np.arange(windows), 2 * s)]
-            chan += [np.tile(np.arange(s), blocks), np.tile(np.arange(s), 2 * windows)]
-            middle = self._middles(k, self.block)
-            time += [np.repeat(middle, s), np.repeat(self._middles(k, self.window), 2 * s)]
-            reading += [np.ones(blocks * s, dtype=bool), np.zeros(2 * windows * s, dtype=bool)]
-            left = self._known(k)[0] / self.deviation[k] ** 2
-            share = (self.scale.noise**2 / self.block + self._begun[k]) / self.deviation[k] ** 2 + left
-            rough = _ROUGH_FLOOR * self._known(k)[1] / self.grain_deviation[k] ** 2
-            grain = _ROUGH_FLOOR * noisy * pure / self.grain_deviation[k] ** 2 + rough
-            texture = np.stack([grain, np.zeros_like(grain)], axis=1)
-            floor += [share.ravel() * _SOFT_FLOOR[self.soft], texture.ravel()]
-            known += [left.ravel() * _SOFT_FLOOR[self.soft], np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
-            if isinstance(trial.driver, Network):
-                m = len(self.robot.drives)
-                seg.append(np.repeat(of_block, m))
-                chan.append(np.tile(s + np.arange(m), blocks))
-                time.append(np.repeat(middle, m))
-                reading.append(np.zeros(m * blocks, dtype=bool))
-                floor.append(np.zeros(m * blocks))
-                known.append(np.zeros(m * blocks))
-            size = sum(map(len, seg)) - at
-            self.slices.append(slice(at, at + size))
-            at += size
-        robot, computed = self.robot, self.robot.motor_names if self.looped else ()
-        self.layout = Layout(
-            segments=tuple(names),
-            trial_of_segment=np.array(trial_of_segment),
-            segment_of=np.concatenate(seg).astype(np.int64),
-            channel_of=np.concatenate(chan).astype(np.int64),
-            time_s=np.concatenate(time),
-            reading=np.concatenate(reading).astype(bool),
-            floor=np.concatenate(floor),
-            known=np.concatenate(known),
-            channels=(*robot.sensor_names, *(f"command_{m}" for m in computed)),
-            units=(*(x.unit for x in robot.sensors), *(joint_unit(robot, m) for m in computed)),
-            joint_of_channel=joints_of(robot, [*(x.target for x in robot.sensors), *computed]),
-        )
-
-    def _begins(self, part: int, window: int) -> float:
-        """When a window begins, s."""
-        log, row = self.parts[part].run.log, window * self.window
-        return row * self.robot.time_step_s if log.filled is None else float(log.times_s[log.readings[row]])
-
-    def _middles(self, part: int, size: int) -> Array:
-        """(R // size,) middles of so many readings in a row, s."""
-        own, count = self.parts[part], self._rows[part] // size
-        log, step = own.run.log, self.robot.time_step_s
-        if log.filled is None:
-            return (np.arange(count) + 0.5) * size * step
-        # What is read in every row stands for a step, of which its time is the beginning.
-        half = step / 2 if self.measured[own.trial].log.filled is None else 0.0
-        return block_sums(log.times_s[log.readings][:, None], size)[:, 0] / size + half
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
         """(H, n), as the contract says. Raises EffectError for a hypothesis that does not fit the robot."""
@@ -436,9 +292,12 @@ class OpenLoop(Problem):
         measured = self._data[part]
         if not predicted.finite:
             return np.full(measured.means.size + 2 * measured.rough.size, np.inf)
-        shape = (measured.means.astype(float) - predicted.means) / self.deviation[part]
-        grain = np.log((measured.rough + self._tiny) / self._rough(predicted)) / self.grain_deviation[part]
-        compared = np.array([x.kind not in self.repeating for x in self.robot.sensors])
+        shape = (measured.means.astype(float) - predicted.means) / self.weights.deviation[part]
+        grain = (
+            np.log((measured.rough + self.weights.tiny) / self.weights.rough(predicted))
+            / self.weights.grain_deviation[part]
+        )
+        compared = np.array([x.kind not in self.weights.repeating for x in self.robot.sensors])
         texture = np.stack([grain, frozen(measured, predicted, self.window) * compared * self._moving[part]], axis=1)
         return np.concatenate([soften(shape, self.soft).ravel(), soften(texture, self.soft).ravel()])
 
@@ -467,14 +326,14 @@ class OpenLoop(Problem):
 
     def raw_blocks(self, part: int, residual: Array) -> Array:
         """The same before softening, in the units of the channels."""
-        return np.asarray(self.smooth(self.blocks(part, residual)) * self.deviation[part])
+        return np.asarray(self.smooth(self.blocks(part, residual)) * self.weights.deviation[part])
 
     def raw_grain(self, part: int, residual: Array) -> Array:
         """(R // window, S): differences of the log of roughness, before softening."""
         rows, s = self._rows[part], len(self.robot.sensors)
         first, windows = rows // self.block * s, rows // self.window
         texture = residual[self.slices[part]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
-        return np.asarray(self.smooth(texture) * self.grain_deviation[part])
+        return np.asarray(self.smooth(texture) * self.weights.grain_deviation[part])
 
     def raw(self, residual: Array) -> Array:
         """(n,) in the units of the channels; NaN where the texture of a channel is compared."""
@@ -543,7 +402,3 @@ def _without_steps(found: Digest, values: Array, window: int) -> Digest:
 def _spans(robot: Robot) -> Array:
     """(M,) ranges of the driven joints."""
     return np.array([high - low for low, high in (span(robot.joint(d.joint)) for d in robot.drives)])
-
-
-def joint_unit(robot: Robot, joint: str) -> str:
-    return "m" if robot.joint(joint).kind == "slide" else "rad"

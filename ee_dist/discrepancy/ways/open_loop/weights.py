@@ -1,0 +1,143 @@
+"""How far a value may be off and say nothing: by noise, by what equally good models differ in, by what calibration left.
+
+A contact that comes a row early moves all that follows. Neighbours of the believed model, which are as good as it is, show where
+that is so: what they differ in counts for less (see predictability.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ee_dist.discrepancy.ways.open_loop.prediction import Digest, Predictor
+from ee_dist.discrepancy.ways.open_loop.scale import Scale
+from ee_dist.discrepancy.ways.open_loop.texture import repeating
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+SOFT = 6.0
+"""Residuals beyond this many standard deviations count by their logarithm;"""
+FIRM = 60.0
+"""those of a real robot that touches nothing beyond so many. It misses no contact, and differs from its model in every joint:
+where nearly all that is compared is softened, what is right in few rows and far off in the others looks as good as what is
+near in all."""
+TINY = 0.25
+"""Share of a channel's scale whose roughness is too small to count."""
+_SOFT_FLOOR = {SOFT: 0.974, FIRM: 0.9997}
+"""Mean square of soft * asinh(x / soft) for standard normal x."""
+_ROUGH_FLOOR = 0.93
+"""Mean square of the comparison of roughness, for white noise."""
+
+
+def soften(values: Array, soft: float = SOFT) -> Array:
+    """Nearly the identity up to ``soft``, logarithmic beyond."""
+    return np.asarray(soft * np.arcsinh(values / soft))
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """Of each part of what is compared: ``deviation`` (blocks, S) of block means, in the units of the channels,
+    ``grain_deviation`` (windows, S) of the log of roughness, ``begun`` (blocks, S) mean squares by which the noise of a start
+    moves block means, ``known`` (2, S) mean squares that calibration left of both.
+
+    ``undeclared`` (S,) is the variance of noise that no description declares; most sensors of the kinds in ``repeating``
+    repeat readings more often than the model's.
+    """
+
+    scale: Scale
+    block: int
+    window: int
+    deviation: tuple[Array, ...]
+    grain_deviation: tuple[Array, ...]
+    begun: tuple[Array, ...]
+    known: tuple[Array, ...]
+    undeclared: Array
+    repeating: frozenset[str]
+
+    @property
+    def tiny(self) -> Array:
+        """(S,) roughness that is too small to count."""
+        return (TINY * self.scale.scale) ** 2
+
+    def rough(self, predicted: Digest) -> Array:
+        """(windows, S) of a prediction, with the noise that no description declares."""
+        return np.asarray(predicted.rough + self.undeclared + self.tiny)
+
+    def floors(self, part: int, soft: float) -> tuple[list[Array], list[Array]]:
+        """Mean squares of a part's values under a perfect model, and what of them is no noise: of means (blocks * S,), then of
+        texture (windows * 2 * S,)."""
+        # How far noise moves the log of roughness beside what is too small to count, as a share of what it does alone.
+        noise = self.scale.noise**2
+        noisy = (noise / (noise + self.tiny) * (1.0 + TINY**2)) ** 2
+        pure = 2 * 1.95 / self.window + 0.01
+        (means, texture), off, grain_off = self.known[part], self.deviation[part] ** 2, self.grain_deviation[part] ** 2
+        left = means / off
+        share = (noise / self.block + self.begun[part]) / off + left
+        rough = _ROUGH_FLOOR * texture / grain_off
+        grain = _ROUGH_FLOOR * noisy * pure / grain_off + rough
+        floor = [share.ravel() * _SOFT_FLOOR[soft], np.stack([grain, np.zeros_like(grain)], axis=1).ravel()]
+        return floor, [left.ravel() * _SOFT_FLOOR[soft], np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
+
+
+def weigh(
+    predictor: Predictor,
+    data: Sequence[Digest],
+    moving: Sequence[Array],
+    scale: Scale,
+    known: Sequence[Array],
+    held: Sequence[Sequence[Robot]],
+) -> Weights:
+    """The weights of what was measured (``data``, and where it moved). ``held``: of each part, as they are held there, the model
+    that is believed and as many others that are as good."""
+    robot, block, window, count = predictor.base, predictor.block, predictor.window, len(held[0])
+    pairs = [(k, m) for k, models in enumerate(held) for m in models]
+    found = predictor.digests(pairs)
+    first = found[::count]
+    repeats = repeating(robot, zip(data, first, moving, strict=True), window)
+    weights = Weights(
+        scale,
+        block,
+        window,
+        (),
+        (),
+        tuple(predictor.by_start(k, m) for k, m in pairs[::count]),
+        tuple(known),
+        _rougher(robot, scale, data, first),
+        frozenset(repeats),
+    )
+    deviation, grain_deviation = [], []
+    for k in range(len(held)):
+        base, others = first[k], [d for d in found[k * count + 1 : (k + 1) * count] if d.finite]
+        noise = scale.scale**2 / block + weights.begun[k] + known[k][0]
+        spread = np.zeros_like(base.means, dtype=float)
+        grain = np.zeros_like(base.rough, dtype=float)
+        if others and base.finite:
+            spread = np.mean([(d.means.astype(float) - base.means) ** 2 for d in others], axis=0)
+            grain = np.mean([np.log(weights.rough(d) / weights.rough(base)) ** 2 for d in others], axis=0)
+        deviation.append(np.sqrt(noise + _held_up(spread)))
+        grain_deviation.append(np.sqrt(2 * 1.95 / window + 0.01 + known[k][1] + _held_up(grain)))
+    return replace(weights, deviation=tuple(deviation), grain_deviation=tuple(grain_deviation))
+
+
+def _held_up(spread: Array) -> Array:
+    """(T, C): mean squares that vary from row to row by luck, each at least the mean of its neighbours."""
+    if not len(spread):
+        return spread  # fewer readings than a window
+    padded = np.pad(spread, ((1, 1), (0, 0)), mode="edge")
+    return np.asarray(np.maximum(spread, (padded[:-2] + spread + padded[2:]) / 3.0))
+
+
+def _rougher(robot: Robot, scale: Scale, data: Sequence[Digest], predicted: Sequence[Digest]) -> Array:
+    """(S,) variance of noise where none is declared: by how much channels are rougher than the model's, and no more than
+    others of their kind, so that a sensor that is noisier than they are stands out."""
+    kinds = np.array([s.kind for s in robot.sensors])
+    if any(s.noise for s in robot.sensors) or not all(p.finite for p in predicted):
+        return np.zeros(len(kinds))
+    more = np.concatenate([d.rough.astype(float) - p.rough for d, p in zip(data, predicted, strict=True)])
+    own = np.clip(np.median(more, axis=0), 0.0, scale.noise**2) if len(more) else np.zeros(len(kinds))
+    usual = {
+        kind: np.median(own[kinds == kind]) if (kinds == kind).sum() > 2 else own[kinds == kind].min() for kind in kinds
+    }
+    return np.minimum(own, [usual[kind] for kind in kinds])
