@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.assumed import beside, puts_right
-from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, held_by_slopes, travelling
+from ee_dist.discrepancy.evidence.holdout import AWAY, PRIOR, Cut, cross_fit, held_by_slopes, travelling
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge
 from ee_dist.discrepancy.evidence.rule import least_energy
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
-from ee_dist.discrepancy.pruning import AGAIN, pruned
+from ee_dist.discrepancy.pruning import AGAIN, pruned, without_these
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, possible
 from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
@@ -31,7 +31,7 @@ from ee_dist.discrepancy.search.slopes import NEAR, slopes_at
 from ee_dist.discrepancy.search.slopes import WIDTHS as SLOPES
 from ee_dist.discrepancy.search.trials import calm_trials, telling, telling_values
 from ee_dist.discrepancy.search.valley import follow_valley
-from ee_dist.discrepancy.sharing import apart, distinct, shared, singles, taken_apart
+from ee_dist.discrepancy.sharing import apart, distinct, shared, singles
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -333,7 +333,7 @@ class _Look:
         places = Model(kept.parts).places
         names = {c.name for c in self.current.parts}
         stay = {p.name for p in kept.parts}
-        gone = tuple(c.name for c in self.current.parts[own:] if not {c.name, *taken_apart(problem.robot, c)} & stay)
+        gone = tuple(c.name for c in self.current.parts[own:] if c.name not in stay)
         # What the ladder has already is not shown as a step again.
         chosen = [k for k, c in enumerate(kept.parts) if k < own or c.name in names]
         shown, energy = set(chosen), next(float(r @ r) for cut, r in self.cuts if cut is found.cut)
@@ -347,9 +347,9 @@ class _Look:
         starts = [(Model(tuple(kept.parts[k] for k in some)), _values(kept.u, places, some)) for some in taken]
         # Shown is how far each step comes, and most have many values. Where slopes that are known lead nowhere values that have
         # seen all data would be told as held out, so that far from the noise each turn is fitted anew.
-        fits = fit_all(search, starts, None, SLOPES[2:], PRIOR)
+        fits = fit_all(search, self._better_starts(kept, starts, taken), None, SLOPES[2:], PRIOR, short=AWAY)
         if fits[-1].energy > NEAR * float(problem.floor.sum()):
-            fitted = cross_fit(search, [(f.model, f.u) for f in fits], found.cut)
+            fitted = cross_fit(search, [(f.model, f.u) for f in fits], found.cut, short=AWAY)
         else:
             fitted = held_by_slopes(search, fits, found.cut)
         energies = [held.energy for held in fitted]
@@ -375,6 +375,20 @@ class _Look:
             )
             shown, energy = set(chosen), energies[k]
         return Everywhere(model, rungs, held_energy)
+
+    def _better_starts(
+        self, kept: Current, starts: Sequence[tuple[Model, Array]], taken: Sequence[Sequence[int]]
+    ) -> list[tuple[Model, Array]]:
+        """Parts of a model (those ``taken``), each with the values that these have in all of it, or with what the others were
+        making up for, as far as slopes tell, whichever leaves less."""
+        search, count = self.search, len(kept.parts)
+        (whole,) = follow_valley(search, [(Model(kept.parts), kept.u)], search.everything, PRIOR, 1, (AGAIN,))
+        foretold = [without_these(whole, [k for k in range(count) if k not in some]) for some in taken]
+        both = [*starts, *((f.model, f.u) for f in foretold)]
+        rows = search.residuals([model.hypothesis(u) for model, u in both])
+        left = [float(r @ r) if np.isfinite(r).all() else np.inf for r in rows]
+        half = len(starts)
+        return [both[k + half] if left[k + half] < left[k] else both[k] for k in range(half)]
 
     def _as_far(
         self, found: _Kept, starts: Sequence[tuple[Model, Array]], energies: Sequence[float]

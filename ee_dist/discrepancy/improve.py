@@ -40,7 +40,7 @@ from ee_dist.discrepancy.last_steps import last_steps
 from ee_dist.discrepancy.left_as_guessed import beside_guesses
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import without_useless
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of, with_room_left
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.pool import as_long
@@ -304,6 +304,9 @@ def _finish(
     worth, left = None, leftovers(problem, base)
     residual = base
     if current.parts:
+        then = (*search.fixed, *current.hypothesis)
+        roomy = with_room_left(problem.robot, then, current.parts)
+        current = Current(roomy, values_of(roomy, current.hypothesis))
         model = Model(current.parts)
         # Where only noise is left values are what the measurements say.
         prior = prior_of(search, [(model, current.u)]) - PRIOR

@@ -79,31 +79,44 @@ def halves(count: int) -> list[int]:
     return [count >> k for k in range(count.bit_length())]
 
 
-def as_many(search: Search, whole: Fit, fewer: dict[int, Fit], cut: Cut, tried: int, each: bool = False) -> int:
+def as_many(
+    search: Search,
+    whole: Fit,
+    fewer: dict[int, Fit],
+    cut: Cut,
+    tried: int,
+    each: bool = False,
+    known: HeldOut | None = None,
+) -> int:
     """How many terms may go, of the numbers in ``fewer`` with the models that are left then, most first: without so many held-out
-    data are foretold as well as by the whole model, give or take luck once, or for ``each`` of them. Far from the noise a term
-    must be worth more than luck to come in; to stay, where nothing else tells it, no more than that. Slopes may mislead where
-    a joint sticks; and where much is left at one joint, luck is taken to be large at all that moves it. 0: none."""
+    data are foretold as well as by the whole model (``known``, where that was asked before), give or take luck once, or for
+    ``each`` of them. Far from the noise a term must be worth more than luck to come in; to stay, where nothing else tells it, no
+    more than that. Slopes may mislead where a joint sticks; and where much is left at one joint, luck is taken to be large at all
+    that moves it. 0: none."""
     if not fewer:
         return 0
-    most, *rest = fewer
-    known, first = held_by_slopes(search, [whole, fewer[most]], cut)
+    problem, known = search.problem, known or held_by_slopes(search, [whole], cut)[0]
     two = cut.name != WINDOWS and len(np.unique(cut.unit_of)) == 2
-
-    def may_go(n: int, without: HeldOut) -> bool:
-        if two and not _fits_as_well(whole, fewer[n]):
-            return False
-        return without.energy - known.energy <= _may_cost(search.problem, known.energy, cut, tried, n, each)
-
-    if may_go(most, first):
-        return most
+    most = {n: may_leave(problem, known, cut, tried, n, each) for n in fewer}
+    able = [n for n, fit in fewer.items() if not (two and not _fits_as_well(whole, fit)) and may_reach(fit, most[n])]
     # Far from the noise each may be fitted anew in every turn, which takes long; near it they cost little, and less together.
-    far = known.energy > NEAR * float(search.problem.floor.sum())
-    for some in [[n] for n in rest] if far else [rest]:
+    far = known.energy > NEAR * float(problem.floor.sum())
+    for some in [[n] for n in able] if far else [able[:1], able[1:]]:
         for n, without in zip(some, held_by_slopes(search, [fewer[n] for n in some], cut), strict=True):
-            if may_go(n, without):
+            if without.energy <= most[n]:
                 return n
     return 0
+
+
+def may_leave(problem: Problem, known: HeldOut, cut: Cut, tried: int, count: int, each: bool = False) -> float:
+    """Held-out energy that a model may leave without ``count`` terms of one that leaves what is ``known``."""
+    return known.energy + _may_cost(problem, known.energy, cut, tried, count, each)
+
+
+def may_reach(fit: Fit, most: float) -> bool:
+    """Whether a model that was fitted to all data may leave no more than so much energy of those held out: what is held out in a
+    turn is foretold no better by values that have not seen it than by those that have, or else these were no fit."""
+    return not fit.mask.all() or fit.energy <= most
 
 
 def _fits_as_well(whole: Fit, without: Fit) -> bool:

@@ -60,11 +60,6 @@ def apart(problem: Problem, current: Current, own: int) -> Current:
     return Current(tuple(parts), np.concatenate([*values, np.zeros(0)]))
 
 
-def taken_apart(robot: Robot, c: Candidate) -> list[str]:
-    """Names of a shared effect's members."""
-    return [f"{c.effect.name}@{m}" for m in c.members(robot)]
-
-
 def distinct(search: Search, base: Current, few: Iterable[Candidate]) -> list[Candidate]:
     """Those whose mark shows, and is not that of another."""
     few = list(few)

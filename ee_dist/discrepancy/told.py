@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.assumed import of_one_guess
-from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, prior_of
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, held_by_slopes, prior_of
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.pruning import AGAIN, as_many, halves, units_of, without_these
+from ee_dist.discrepancy.pruning import AGAIN, as_many, halves, may_leave, may_reach, units_of, without_these
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import NEAR, gauss_newton, weighed
@@ -85,16 +85,26 @@ def _left_out(
     gone: list[tuple[str, ...]] = []
     alike: dict[str, frozenset[str]] = {}
     fits: list[Fit] = []
+    known: HeldOut | None = None
+
+    def too_much(without: Fit) -> bool:
+        # Of values that only together leave much less too little is told: held-out data would take nearly all of them back.
+        return known is not None and not may_reach(without, may_leave(search.problem, known, cut, tried, len(gone) + 1))
+
     while True:
         start = [(Model(current.parts), current.u)]
         (fit,) = follow_valley(search, start, search.everything, prior_of(search, start), 2, (AGAIN,))
         fits, found = [*fits[:-1], fit], len(gone)
+        known = known or held_by_slopes(search, [fit], cut)[0]
         # As far as slopes tell what goes is made up for by the rest; then all that stays is fitted anew.
         while least := _least_told(search.problem, fit, own, open_only, units):
+            without = without_these(fit, least)
+            if too_much(without):
+                break
             gone.append(tuple(fit.model.parts[k].name for k in least))
-            fit = without_these(fit, least)
+            fit = without
             fits.append(fit)
-        while not open_only and (less := _not_missed(search, fit, own, units)) is not None:
+        while not open_only and (less := _not_missed(search, fit, own, units)) is not None and not too_much(less.fit):
             gone.append(less.names)
             alike |= dict.fromkeys(less.names, less.others)
             fit = less.fit
@@ -102,7 +112,7 @@ def _left_out(
         current = Current(fit.model.parts, fit.u)
         if len(gone) == found:
             break
-    gone = gone[: as_many(search, fits[0], {n: fits[n] for n in halves(len(gone))}, cut, tried)]
+    gone = gone[: as_many(search, fits[0], {n: fits[n] for n in halves(len(gone))}, cut, tried, known=known)]
     kept, names = fits[len(gone)], tuple(name for names in gone for name in names)
     stay = {c.name for c in kept.model.parts}
     instead = frozenset(n for n in names if alike.get(n, frozenset()) & stay)

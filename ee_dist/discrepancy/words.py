@@ -164,6 +164,11 @@ def phrase(terms: Hypothesis, robot: Robot | None = None) -> str:
     return "; ".join(text for text, _ in by_effect(terms, robot))
 
 
+def without_values(text: str) -> str:
+    """``coulomb friction at 3 joints`` of what ``by_effect`` says of it: where values are told elsewhere."""
+    return text.partition(" (")[0]
+
+
 def _range_of(terms: Hypothesis, robot: Robot | None) -> str:
     """``coulomb friction at 3 joints (torque 0.15 to 0.26 N.m)``."""
     joints = robot is not None and all(t.target in robot.motor_names for t in terms)

@@ -15,7 +15,7 @@ from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.reading import between_readings, paces_of, rows_read
 from ee_dist.measurements.report import TORQUE, Report
 from ee_dist.measurements.sampling import carried, grid, held, linear, smoothed
-from ee_dist.measurements.suspicious import clock_suspicion, rolled_over, suspicions, time_suspicion
+from ee_dist.measurements.suspicious import clock_suspicion, rolled_over, spike_suspicion, suspicions, time_suspicion
 from ee_dist.measurements.table import Recorded
 from ee_dist.measurements.trial_clocks import TrialClocks
 from ee_dist.measurements.units import TURN, UNITS, factor
@@ -121,7 +121,8 @@ class OnGrid:
             said = suspicions(title, raw[good], _turn(column))
             looked = reading and not (said or column.unwrap or column.rolls_over)
             over = rolled_over(title, raw[good], abs(column.scale) * size) if looked else None
-            self.report.suspicious += [*said, over] if over else said
+            spike = spike_suspicion(title, raw[good]) if step_like else None
+            self.report.suspicious += [*said, *filter(None, (over, spike))]
         if len(good) < len(raw):
             how = "in which the last value holds" if step_like else "filled by straight lines"
             self.report.done.append(f"{name}: {len(raw) - len(good)} empty cells {how}")

@@ -38,6 +38,12 @@ ROUNDED = 0.15
 """Of a step that is large, by how much a round may be off the plain number that it is taken for."""
 STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
+MANY, OFTEN, FEW_SPIKES = 10, 0.98, 10
+"""Different numbers that a goal which moves has, share of all steps that are usual, and rows at which it may be elsewhere by
+accident;"""
+SPIKE, SPIKE_SHARE, SAME_AGAIN = 8.0, 0.2, 0.25
+"""how far that is, times a usual step and as a share of where it usually is, and by what share of it the rows around it may
+differ."""
 LEAST_ROUND = 0.005
 """rad (m) that the round of an encoder has at least: of a motor's behind a gear of a thousand."""
 ROLLS, MOST_ROLLS = 0.85, 0.1
@@ -72,6 +78,25 @@ def suspicions(name: str, values: Array, turn: float = TURN) -> list[str]:
     if not any("counter" in f for f in found) and 0.9 * turn < jump < 1.1 * turn and spread < 1.2 * turn:
         found.append(f"{name}: jumps by a whole turn: an angle that wraps; set 'unwrap: true'")
     return found
+
+
+def spike_suspicion(name: str, commands: Array) -> str | None:
+    """Whether a goal (T,) is somewhere else for a single row, and back in the next: what is no step of any motion."""
+    steps = np.diff(commands)
+    if len(steps) < 20 or len(np.unique(commands)) < MANY:
+        return None
+    there, back = steps[:-1], steps[1:]
+    usual = float(np.quantile(np.abs(steps), OFTEN))
+    low, high = np.quantile(commands, [1 - OFTEN, OFTEN])
+    far = np.minimum(np.abs(there), np.abs(back)) > max(SPIKE * usual, SPIKE_SHARE * float(high - low))
+    rows = np.flatnonzero(far & (np.abs(there + back) < SAME_AGAIN * np.abs(there))) + 1
+    if not 0 < len(rows) <= FEW_SPIKES:
+        return None
+    first = int(rows[0])
+    return (
+        f"{name}: elsewhere for a single row at {len(rows)} of {len(commands)} rows (row {first}: {commands[first]:.4g} between "
+        f"{commands[first - 1]:.4g} and {commands[first + 1]:.4g}): was that sent, or only written? drop the row if not"
+    )
 
 
 def time_suspicion(median_s: float, length_s: float, declared: str) -> str | None:

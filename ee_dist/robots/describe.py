@@ -29,11 +29,13 @@ from pathlib import Path
 from typing import Any
 
 from ee_dist.basics.files import real
+from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.body import Body
 from ee_dist.robots.described import KEYS, near, robot_of_body
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.model import Robot, RobotError
+from ee_dist.robots.moments import spread_too_far
 from ee_dist.robots.numbers import checked, number
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.quadruped_lab import quadruped_lab
@@ -86,6 +88,11 @@ def read_body(kind: str, path: str | Path) -> Body:
     """What a file of a kind of READERS says. Raises RobotError."""
     module, _, function = READERS[kind].partition(":")
     body: Body = getattr(importlib.import_module(module), function)(path)
+    if odd := spread_too_far(body.parts, body.joints):
+        raise RobotError(
+            f"{path}: inertia of {listed(odd)}: no part of this robot has it; inertias are in kg.m^2 (1 kg.cm^2 is 1e-4, "
+            "1 kg.mm^2 is 1e-6), or is an exponent mistyped?"
+        )
     return body
 
 

@@ -6,6 +6,8 @@ robots miss it by some percent, which hardly moves anything; what is further off
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,11 +15,14 @@ from numpy.typing import NDArray
 
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
+from ee_dist.robots.model import Joint, Part
 
 EXACT = 0.001
 """Share of the largest moment by which the others may miss it and still be what the file says, in its digits."""
 LITTLE = 0.1
 """Share up to which the smaller ones are raised: beyond it the file says something else than it means."""
+FAR_OFF = 10.0
+"""Times its robot's length, and m, from which on the mass of a part cannot be spread so far."""
 RIGHT = (
     "moments are positive, and none is above the sum of the other two; take them from CAD, or from a box of the link's size "
     "(mass/12 x the sum of its other two sides squared)"
@@ -64,6 +69,28 @@ class Moments:
                 f"no rigid body has the inertia of {listed(self.idle)}: fixed to the base, which is bolted down, they need none"
             )
         return notes
+
+
+def spread_too_far(parts: Sequence[Part], joints: Sequence[Joint]) -> list[str]:
+    """Parts but the root, as texts, whose moments would have their mass many times farther from its centre than the robot is
+    long (their radius of gyration): of another unit, or a typing error."""
+    above = {j.child: j for j in joints}
+
+    def away(part: Part) -> float:
+        far, joint = math.hypot(*part.com_m), above.get(part.name)
+        while joint is not None:
+            far, joint = far + math.hypot(*joint.position_m), above.get(joint.parent)
+        return far
+
+    long_m = max((away(p) for p in parts), default=0.0)
+    found = []
+    for p in parts[1:]:
+        spread = sum(p.inertia_kg_m2[:3]) / 2
+        spread_m = math.sqrt(spread / p.mass_kg) if p.mass_kg > 0 else 0.0
+        if spread_m > FAR_OFF * max(long_m, 1.0):
+            stated = f"{max(p.inertia_kg_m2[:3]):.3g} kg.m^2 for {p.mass_kg:.3g} kg"
+            found.append(f"{quoted(p.name)} ({stated}, as if that were {spread_m:.3g} m away from its centre)")
+    return found
 
 
 def refused() -> str:

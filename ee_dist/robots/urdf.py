@@ -81,6 +81,7 @@ class _Reader:
         self.notes: list[str] = []
         self.assumed: list[str] = []
         self.meshes: dict[str, None] = {}
+        self.empty: dict[str, None] = {}
         self.moments = Moments()
 
     def fail(self, where: str, what: str) -> UrdfError:
@@ -133,6 +134,8 @@ class _Reader:
         if self.meshes:
             self.notes.insert(0, f"collision meshes of {len(self.meshes)} links left out: only boxes, spheres, cylinders "
                                  f"and capsules touch the floor ({listed(self.meshes)})")  # fmt: skip
+        if self.empty:
+            self.notes.append(f"collision shapes of size 0 left out: {listed(self.empty)}")
         self.hint_at_pivots(kept_parts, kept_joints)
         moving = [j.name for j in kept_joints if j.kind != "fixed"]
         return Body(
@@ -366,14 +369,19 @@ class _Reader:
             raise self.fail(where, "<collision> without a geometry")
         if found.tag == "box":
             x, y, z = self.vector(found, "size", where, (0.0, 0.0, 0.0))
+            if found.get("size") is not None and x == y == z == 0:
+                self.empty[link] = None
+                return None
             if min(x, y, z) <= 0:
                 raise self.fail(where, f"<box size='{x:g} {y:g} {z:g}'>: expected three positive numbers")
             return Shape("box", (x / 2, y / 2, z / 2), position, rotation)
-        if found.tag == "sphere":
-            return Shape("sphere", (self.positive(found, "radius", where),), position, rotation)
-        if found.tag in ("cylinder", "capsule"):
-            size = self.positive(found, "radius", where), self.positive(found, "length", where)
-            return Shape(found.tag, size, position, rotation)
+        keys = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}.get(found.tag)
+        if keys is not None:
+            if any(self.number(found, k, where) == 0 for k in keys):
+                # What tools write of a link that is only a frame.
+                self.empty[link] = None
+                return None
+            return Shape(found.tag, tuple(self.positive(found, k, where) for k in keys), position, rotation)
         self.meshes[link] = None
         return None
 

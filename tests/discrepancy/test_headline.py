@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from ee_dist.discrepancy.accounts.of_improve import _listed
-from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, NOT_DETERMINED
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, BOUND, HARDLY, NEUTRAL, NO_LIGHTER, NOT_DETERMINED, WIDER
 from ee_dist.effects.catalogue import term
 
 TERMS = (
@@ -19,14 +19,20 @@ TERMS = (
 def of(flags: list[str]) -> tuple[Any, Any]:
     """A finding of as many effects, called a, b, c."""
     terms = [term("coulomb_friction", f"joint_{k}", torque_nm=0.1) for k in range(len(flags))]
-    parameters = [SimpleNamespace(term=k, flag=flag) for k, flag in enumerate(flags)]
+    parameters = [SimpleNamespace(term=k, flag=flag, doubt="") for k, flag in enumerate(flags)]
     shares = [SimpleNamespace(terms=(t,), text="abcde"[k]) for k, t in enumerate(terms)]
     return SimpleNamespace(terms=terms, parameters=parameters), shares
 
 
-def headline(flags: list[str]) -> str:
-    parameters = [SimpleNamespace(term=0, flag=flags[0]), SimpleNamespace(term=1, flag=flags[1])]
-    parameters += [SimpleNamespace(term=1, flag=NEUTRAL), SimpleNamespace(term=2, flag=flags[2])]
+def headline(flags: list[str], doubt: str = "") -> str:
+    parameters = [
+        SimpleNamespace(term=0, flag=flags[0], doubt=doubt),
+        SimpleNamespace(term=1, flag=flags[1], doubt=doubt),
+    ]
+    parameters += [
+        SimpleNamespace(term=1, flag=NEUTRAL, doubt=doubt),
+        SimpleNamespace(term=2, flag=flags[2], doubt=doubt),
+    ]
     found: Any = SimpleNamespace(terms=TERMS, parameters=parameters)
     shares: Any = [SimpleNamespace(terms=(t,), text=t.effect) for t in TERMS]
     return _listed(found, shares)
@@ -40,6 +46,11 @@ def test_what_may_be_nothing_is_counted_and_not_named() -> None:
 def test_what_is_not_determined_may_be_nothing_too() -> None:
     assert headline(["", f"{BOUND}; {NOT_DETERMINED}", NOT_DETERMINED]) == "coulomb_friction; and 2 that may be nothing"
     assert headline(["", BOUND, ""]) == "coulomb_friction; sensor_stuck; backlash"
+
+
+def test_what_ended_at_a_bound_and_may_be_what_is_left_unexplained_may_be_nothing() -> None:
+    assert headline([BOUND, NEUTRAL, NO_LIGHTER], WIDER) == "coulomb_friction; backlash; and 1 that may be nothing"
+    assert headline(["", NEUTRAL, NO_LIGHTER], ALL_OF_IT) == "coulomb_friction; and 2 that may be nothing"
 
 
 def test_more_than_a_headline_holds_is_counted() -> None:

@@ -156,3 +156,21 @@ def test_improve_finds_a_stop_and_friction_beside_it() -> None:
     assert set(told) == {"upper_stop", "coulomb_friction"} and found.verdict == EXPLAINED
     assert joint.upper - told["upper_stop"]["nearer_rad"] == pytest.approx(0.25, abs=0.01)
     assert told["coulomb_friction"]["torque_nm"] == pytest.approx(0.2, rel=0.05)
+
+
+@pytest.mark.parametrize(("speed", "most"), [(0.0, 1.0), (1.0, 0.75)])
+def test_a_sensor_that_moves_is_not_dead(speed: float, most: float) -> None:
+    """Whatever the model does: between its stops the joint cannot have moved so far that a few per cent of it were read."""
+    problem = problem_of(())
+    at = problem.robot.sensor_names.index("position")
+
+    def read(trial: MeasuredTrial) -> MeasuredTrial:
+        sensors = trial.log.sensors * np.where(np.arange(len(problem.robot.sensors)) == at, speed, 1.0)
+        return replace(trial, log=replace(trial.log, sensors=sensors))
+
+    problem.measured = tuple(read(t) for t in problem.measured)
+    (failing,) = (c for c in pool_of(problem) if c.name == "sensor_failing@position")
+    (_, high), (lower, upper) = failing.bounds[0], problem.robot.joint(problem.robot.sensors[at].target).ends
+    values = np.concatenate([t.log.sensors[:, at] for t in problem.measured])
+    assert high <= most and (high == 1.0) == (speed == 0.0)
+    assert high >= 1.0 - np.ptp(values) / (upper - lower), "all that its stops allow"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
 
-from ee_dist.discrepancy.evidence.holdout import WINDOWS, travelling
+from ee_dist.discrepancy.evidence.holdout import WINDOWS, held_by_slopes, travelling
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.pruning import _luck, _may_cost, as_many, luck, pruned, without_these
@@ -131,6 +131,7 @@ def test_far_from_the_noise_each_term_that_goes_may_cost_luck(monkeypatch, rises
         lambda _search, fits, _cut: [SimpleNamespace(energy=held[f]) for f in fits],
     )
     monkeypatch.setattr("ee_dist.discrepancy.pruning._fits_as_well", lambda _whole, _without: True)
+    monkeypatch.setattr("ee_dist.discrepancy.pruning.may_reach", lambda _fit, _most: True)
     assert as_many(Search(problem), 0, {n: n for n in rises}, cut, 50) == go  # type: ignore[arg-type, dict-item]
 
 
@@ -151,7 +152,37 @@ def test_what_is_told_together_stays_though_nothing_held_out_speaks_for_it(monke
     monkeypatch.setattr(
         "ee_dist.discrepancy.pruning.held_by_slopes", lambda _s, fits, _c: [SimpleNamespace(energy=1.0) for _ in fits]
     )
-    whole, close, far = (SimpleNamespace(energy=e) for e in (100.0, 120.0, 290.0))
+    part = np.array([True, False])
+    whole, close, far = (SimpleNamespace(energy=e, mask=part) for e in (100.0, 120.0, 290.0))
     cut = travelling(problem)[0]
     assert as_many(Search(problem), whole, {6: far, 3: close, 1: whole}, cut, 50) == 3  # type: ignore[arg-type, dict-item]
     assert as_many(Search(problem), whole, {6: far}, cut, 50) == 0  # type: ignore[arg-type, dict-item]
+
+
+def test_what_leaves_more_of_all_data_than_may_be_left_of_those_held_out_is_not_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Values that have not seen a piece foretell it no better than those of a fit that has, so that such a model need not be
+    fitted in every turn."""
+    problem = Linear((term("coulomb_friction", JOINTS[0], torque_nm=0.3),), motions=4)
+    cut, asked = travelling(problem)[0], []
+    every = np.ones(3, dtype=bool)
+    whole, close, far = (SimpleNamespace(energy=e, mask=every) for e in (100.0, 105.0, 1e6))
+
+    def held(_search: Search, fits: list, _cut: object) -> list:
+        asked.extend(fits)
+        return [SimpleNamespace(energy=110.0) for _ in fits]
+
+    monkeypatch.setattr("ee_dist.discrepancy.pruning.held_by_slopes", held)
+    assert as_many(Search(problem), whole, {6: far, 3: close, 1: whole}, cut, 50) == 3  # type: ignore[arg-type, dict-item]
+    assert asked[0] is whole and close in asked and far not in asked
+    seldom = SimpleNamespace(energy=1e6, mask=np.array([True, False, True]))
+    assert as_many(Search(problem), whole, {6: seldom}, cut, 50) == 6, "of some of the data it says nothing"  # type: ignore[arg-type, dict-item]
+
+
+def test_what_is_held_out_is_foretold_no_better_than_by_a_fit_that_has_seen_it() -> None:
+    search = Search(Linear((term("coulomb_friction", JOINTS[0], torque_nm=0.3),), motions=4))
+    fit = fitted(search)
+    assert fit.mask.all()
+    (held,) = held_by_slopes(search, [fit], travelling(search.problem)[0])
+    assert held.energy >= fit.energy * (1 - 1e-9)

@@ -12,7 +12,7 @@ from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.search.candidates import candidate, candidates, on_top_of, parse
+from ee_dist.discrepancy.search.candidates import candidate, candidates, on_top_of, parse, with_room_left
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.words import phrase, told
 from ee_dist.effects.catalogue import term
@@ -42,6 +42,19 @@ def test_a_joint_may_have_less_than_joints_share_down_to_none_and_no_less_where_
     assert changed == {"coulomb_friction@shoulder", "coulomb_friction@elbow"}
     assert {after[name][0][0] for name in changed} == {-0.3}
     assert {before[name][0][0] for name in changed} == {0.0}
+
+
+def test_in_the_end_a_joint_has_as_much_to_lose_as_is_there_then() -> None:
+    """It came in beside 0.2 N.m that all share, which ended at 0.3, or was left out again."""
+    robot = the_problem().robot
+    at_first = on_top_of(
+        robot, (term("coulomb_friction", "all_joints", torque_nm=0.2),), [parse(robot, "coulomb_friction@elbow")]
+    )
+    assert at_first[0].bounds[0][0] == -0.2
+    shared = parse(robot, "coulomb_friction@all_joints")
+    (same, now), (alone,) = with_room_left(robot, (SHARED,), (shared, *at_first)), with_room_left(robot, (), at_first)
+    assert (same, now.bounds[0][0], alone.bounds[0][0]) == (shared, -0.3, 0.0)
+    assert now.bounds[0][1] == alone.bounds[0][1] == at_first[0].bounds[0][1]
 
 
 def test_the_joint_with_less_is_found_beside_what_all_share() -> None:

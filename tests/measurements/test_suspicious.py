@@ -18,6 +18,7 @@ from ee_dist.measurements.suspicious import (
     clock_suspicion,
     command_suspicion,
     repeat_suspicion,
+    spike_suspicion,
     suspicions,
     time_suspicion,
     torque_suspicion,
@@ -43,6 +44,17 @@ def test_good_signals_raise_no_suspicion() -> None:
     assert unit_suspicion("x", WAVE, -1.5, 1.5, "rad") is None
     assert speed_suspicion("w", 2 * np.cos(2 * T), WAVE, 0.01) is None
     assert command_suspicion("j", WAVE, np.sin(2 * T - 0.3), 0.01) is None
+
+
+def test_a_goal_that_is_elsewhere_for_one_row_is_told() -> None:
+    odd = WAVE.copy()
+    odd[[344, 900]] = 3.1
+    said = spike_suspicion("command", odd)
+    assert said is not None and "at 2 of 2000 rows (row 344: 3.1 between" in said
+    steps = np.sign(np.sin(T)) * (1 + np.arange(len(T)) // 400)
+    rng = np.random.default_rng(1)
+    for good in (WAVE, steps, rng.standard_normal(2000), np.repeat(rng.standard_normal(40), 50), np.zeros(2000)):
+        assert spike_suspicion("command", good) is None
 
 
 @pytest.mark.parametrize(

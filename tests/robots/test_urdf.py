@@ -14,7 +14,7 @@ from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.engines.pybullet.engine import PyBulletEngine
-from ee_dist.robots.describe import load_robot, robot_of
+from ee_dist.robots.describe import load_robot, read_body, robot_of
 from ee_dist.robots.described import robot_of_body
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.serial import robot_from_json, robot_to_json
@@ -476,3 +476,29 @@ def test_what_is_fixed_to_a_bolted_base_needs_no_inertia(tmp_path: Path) -> None
         assert engine.rollout(job)[0].finite
     with pytest.raises(RobotError, match=r"'mast'.*no rigid body has this inertia.*free_base: false"):
         robot_of_body(body, drives | {"free_base": True}, "r.yaml")
+
+
+def test_an_inertia_of_another_unit_is_refused_before_anything_is_guessed_from_it(tmp_path: Path) -> None:
+    def mistyped(link: ET.Element) -> None:
+        link.find("inertial/inertia").attrib.update(ixx="6.9e4", iyy="6.9e4")  # type: ignore[union-attr]
+
+    with pytest.raises(
+        RobotError, match=r"'forearm' \(6.9e\+04 kg.m\^2 for .* m away from its centre\).*1 kg.mm\^2 is 1e-6"
+    ):
+        read_body("urdf", changed(tmp_path, forearm=mistyped))
+    assert read_body("urdf", ARM).parts
+
+
+def test_shapes_of_size_zero_are_left_out_and_said(tmp_path: Path) -> None:
+    def flat(link: ET.Element) -> None:
+        link.find("collision/geometry/box").set("size", "0 0 0")  # type: ignore[union-attr]
+
+    body = read_urdf(changed(tmp_path, forearm=flat))
+    assert "collision shapes of size 0 left out: forearm" in body.notes
+    assert all(min(s.size) > 0 for p in body.parts for s in p.shapes)
+
+    def inside_out(link: ET.Element) -> None:
+        link.find("collision/geometry/box").set("size", "0.1 -0.1 0.1")  # type: ignore[union-attr]
+
+    with pytest.raises(UrdfError, match="expected three positive numbers"):
+        read_urdf(changed(tmp_path, forearm=inside_out))

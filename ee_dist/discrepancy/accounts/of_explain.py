@@ -35,7 +35,7 @@ from ee_dist.discrepancy.accounts.account import (
 from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, ranges
 from ee_dist.discrepancy.assumed import GUESS, LABEL, guessed_text
 from ee_dist.discrepancy.confidence import COUNTED_WAY
-from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL, NOT_DETERMINED
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, HARDLY, NEUTRAL, NOT_DETERMINED, ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.evidence.rule import LUCK
@@ -175,8 +175,8 @@ def explain_account(
 
 def _what(found: Explanation, best: Judged, robot: Robot) -> str:
     """The terms of the best explanation; of drives that were only assumed, those of whose values these data tell something."""
-    flags = {t: [p.flag for p in found.parameters if found.after[p.term] == t] for t in best.terms}
-    vague = [t for t, own in flags.items() if own and all(map(_untold, own))]
+    reports = {t: [p for p in found.parameters if found.after[p.term] == t] for t in best.terms}
+    vague = [t for t, own in reports.items() if own and all(map(_untold, own))]
     told = tuple(t for t in best.terms if t not in vague)
     if best.proposal.label != LABEL:
         return told_all(best.terms, robot) + " (of which these data tell no value)" * (not told)
@@ -188,8 +188,8 @@ def _what(found: Explanation, best: Judged, robot: Robot) -> str:
     return f"{told_all(told, robot)} (with {several}, of which these data tell none by itself)"
 
 
-def _untold(flag: str) -> bool:
-    return any(f in flag for f in (NEUTRAL, HARDLY, NOT_DETERMINED))
+def _untold(report: ParameterReport) -> bool:
+    return report.doubt == ALL_OF_IT or any(f in report.flag for f in (NEUTRAL, HARDLY, NOT_DETERMINED))
 
 
 def _still(problem: Problem) -> str:

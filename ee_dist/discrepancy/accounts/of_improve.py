@@ -29,7 +29,7 @@ from ee_dist.discrepancy.accounts.account import (
 )
 from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, flag_texts, ranges, rest_text, scale_text, weight_text
 from ee_dist.discrepancy.calibrated_away import OddOne
-from ee_dist.discrepancy.evidence.intervals import HARDLY, NEUTRAL, NOT_DETERMINED
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, ENDED, HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
@@ -37,7 +37,7 @@ from ee_dist.discrepancy.ladder import Improvement, Twin
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
-from ee_dist.discrepancy.words import much, percent, phrase, placed, plain
+from ee_dist.discrepancy.words import by_effect, much, percent, phrase, placed, plain, without_values
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
@@ -73,8 +73,8 @@ def improve_account(
     steps = [r for r in found.ladder if r.added]
     lines = []
     if len(steps) > 1:
-        in_turn = "; ".join(phrase(r.added, robot) for r in steps)
-        lines.append(f"Added, in this order, with the values that each had then: {in_turn}.")
+        in_turn = "; ".join(without_values(text) for r in steps for text, _ in by_effect(r.added, robot))
+        lines.append(f"Added, in this order: {in_turn}.")
     # Which way a joint counts is mended in a file, not carried along in a model.
     wrong = [t for t in found.terms if CATALOGUE[t.effect].mistake]
     lines += [f"{plain(placed(t.name)).capitalize()}: {CATALOGUE[t.effect].physics}" for t in wrong]
@@ -93,7 +93,15 @@ def improve_account(
         ties[t.name] = [*ties.get(t.name, []), t.term.name]
     told = names | {t.term.name for t in found.twins}
     gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in told)
-    lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone]
+    of_joints = {t.effect for t in found.terms}
+    single = list(dict.fromkeys(plain(e) for d in gone if (e := d.partition("@")[0]) in of_joints))
+    lines += [
+        f"Dropped again: {placed(d)}, which a later effect made useless."
+        for d in gone
+        if d.partition("@")[0] not in of_joints
+    ]
+    if single:
+        lines.append(f"Shared at first, and of other joints or of each by itself since: {'; '.join(single)}.")
     # What may be nothing is no news, whatever depends on it together with others.
     parts = sorted(shares(found, robot), key=lambda s: (s.terms[0] not in wrong, may_be_nothing(found, s.terms)))
     lines += doubt_text([s for s in parts if s.doubted])
@@ -150,9 +158,15 @@ def improve_account(
 
 
 def may_be_nothing(found: Improvement, terms: Sequence[Term]) -> bool:
-    """Whether no value of some terms of the model is determined, told from neutral, and farther off than luck may tell one."""
-    flags = [p.flag for p in found.parameters if found.terms[p.term] in terms]
-    return bool(flags) and all(flag in (NEUTRAL, HARDLY) or flag.endswith(NOT_DETERMINED) for flag in flags)
+    """Whether no value of some terms of the model is determined, told from neutral, and farther off than luck may tell one, nor
+    than what is left unexplained may push one that ended at its bound."""
+    mine = [p for p in found.parameters if found.terms[p.term] in terms]
+    return bool(mine) and all(
+        p.flag in (NEUTRAL, HARDLY)
+        or p.flag.endswith(NOT_DETERMINED)
+        or (p.flag.startswith(ENDED) and p.doubt == ALL_OF_IT)
+        for p in mine
+    )
 
 
 def twin_text(twin: Twin, found: Improvement, robot: Robot) -> str:
@@ -188,7 +202,7 @@ def doubt_text(doubted: Sequence[Share]) -> list[str]:
     one = len(doubted) == 1
     return [
         f"Less depends on {'this' if one else 'each of these'} than is left unexplained, so that "
-        f"{'it' if one else 'any of them'} may stand in for something else: {'; '.join(s.text for s in doubted)}."
+        f"{'it' if one else 'any of them'} may stand in for something else: {'; '.join(without_values(s.text) for s in doubted)}."
     ]
 
 

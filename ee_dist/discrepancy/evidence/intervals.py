@@ -31,10 +31,11 @@ FARTHER = 2.0
 FEW = 3
 """Trials from which they are the pieces that vary; with fewer, segments are."""
 NOT_DETERMINED = "not determined by these data"
-BOUND = "at its bound: the range is too small, or the effect is another"
-NONE_LEFT = "at its bound: next to none is left of what was described"
+ENDED = "at its bound"
+BOUND = f"{ENDED}: the range is too small, or the effect is another"
+NONE_LEFT = f"{ENDED}: next to none is left of what was described"
 NO_LIGHTER = (
-    "at its bound: with less its controller would shake in this time step; write what is left into the description (or a smaller "
+    f"{ENDED}: with less its controller would shake in this time step; write what is left into the description (or a smaller "
     "time_step_s), and begin anew"
 )
 LEFT_AT_MOST = 0.15

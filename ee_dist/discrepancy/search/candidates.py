@@ -195,6 +195,22 @@ def on_top_of(robot: Robot, terms: Hypothesis, pool: Iterable[Candidate]) -> lis
     ]
 
 
+def with_room_left(robot: Robot, terms: Hypothesis, parts: Iterable[Candidate]) -> tuple[Candidate, ...]:
+    """The parts of a model of these ``terms``, each of a single joint with as much to take off as is there now, described or
+    shared: what joints share may have changed, or gone, since a part came into the model."""
+    out = []
+    for c in parts:
+        here = [p.on_top for p in c.effect.parameters]
+        if any(here) and not c.members(robot):
+            fresh = candidate(robot, c.effect, c.target)
+            shared = tuple(t for t in terms if members_of(robot, t.target, c.effect.targets(robot)))
+            (now,) = on_top_of(robot, shared, [fresh])
+            ends = zip(here, c.bounds, now.bounds, strict=True)
+            c = replace(c, bounds=tuple((left if on_top else low, high) for on_top, (low, high), (left, _) in ends))
+        out.append(c)
+    return tuple(out)
+
+
 def not_said(robot: Robot, parts: Iterable[Candidate], pool: Iterable[Candidate]) -> list[Candidate]:
     """Those of the pool that a model of these ``parts`` does not have yet: nor what all members of a group share where each has a
     value of its own, for then only sums would tell."""

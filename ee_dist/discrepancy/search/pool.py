@@ -21,6 +21,9 @@ else;"""
 SCALE_OF_MASS = "part_mass@all_parts"
 STILL_RAD = 1e-3
 """How far (rad, m) a command goes up to which its joint is only held."""
+SELDOM, MOVES, BEYOND_STOPS = 0.01, 0.1, 1.2
+"""Share of its readings at either end that may be glitches, share of its joint's way from which a sensor moves, and times that
+way that a joint may go: stops are soft."""
 OFTEN = 0.99
 """share of the readings below that highest speed: the rest may be noise."""
 
@@ -32,7 +35,8 @@ def pool_of(problem: Problem, without: Sequence[str] = (), only: Sequence[str] =
     able = (c for c in told if problem.shows(c.effect.name, c.target))
     named = {name.partition("@")[0] for name in only}
     seen = (c if c.effect.seen_at is None else _seen_at(problem, c, c.effect.name in named) for c in able)
-    judged = (as_long(problem, c) for c in (_judged(problem, c) for c in seen if c is not None) if c is not None)
+    moved = (_alive(problem, c) for c in seen if c is not None)
+    judged = (as_long(problem, c) for c in (_judged(problem, c) for c in moved if c is not None) if c is not None)
     # Several groups may be one where joints that nothing is known of are left out.
     out = {c.name: _hinted(problem, as_slow(problem, c)) for c in judged}
     if SCALE_OF_MASS.partition("@")[0] not in named and no_scale(problem.robot, out):
@@ -61,6 +65,24 @@ def held_still(problem: Problem) -> frozenset[str]:
         if spans and max(spans) <= STILL_RAD:
             found.add(name)
     return frozenset(found)
+
+
+def _alive(problem: Problem, c: Candidate) -> Candidate | None:
+    """A failing position sensor with no more lost of its signal than leaves room for what it read, between the stops of its
+    joint; None where that is nothing. Beside a model that runs away a dead sensor would explain any reading, also one that
+    moves."""
+    robot = problem.robot
+    if c.effect.name != "sensor_failing" or c.target not in robot.sensor_names:
+        return c
+    at = robot.sensor_names.index(c.target)
+    if robot.sensors[at].kind != "position":
+        return c
+    low, high = robot.joint(robot.sensors[at].target).ends
+    read = np.concatenate([t.log.sensors[t.log.readings, at] for t in problem.measured])
+    shown = float(np.ptp(np.quantile(read, [SELDOM, 1 - SELDOM]))) / (BEYOND_STOPS * (high - low))
+    if not shown > MOVES:
+        return c
+    return replace(c, bounds=((0.0, 1.0 - shown),)) if shown < 1.0 else None
 
 
 def as_long(problem: Problem, c: Candidate) -> Candidate:
