@@ -381,6 +381,8 @@ class _Look:
     ) -> list[tuple[Model, Array]]:
         """Parts of a model (those ``taken``), each with the values that these have in all of it, or with what the others were
         making up for, as far as slopes tell, whichever leaves less."""
+        if len(starts) == 1:
+            return list(starts)
         search, count = self.search, len(kept.parts)
         (whole,) = follow_valley(search, [(Model(kept.parts), kept.u)], search.everything, PRIOR, 1, (AGAIN,))
         foretold = [without_these(whole, [k for k in range(count) if k not in some]) for some in taken]

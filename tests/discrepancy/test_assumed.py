@@ -18,7 +18,7 @@ from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.assumed import GUESS, LABEL, assumed_drives, guessed_text, of_one_guess, puts_right
 from ee_dist.discrepancy.compare import compare
-from ee_dist.discrepancy.everywhere import instead, taken_apart
+from ee_dist.discrepancy.everywhere import instead
 from ee_dist.discrepancy.evidence import judge
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import explain
@@ -448,15 +448,6 @@ def test_it_is_told_that_the_description_only_guessed() -> None:
     assert "late" in guessed_text((term("command_delay", "all_joints", delay_s=0.01),)) and "late" not in guessed_text(
         ()
     )
-
-
-def test_a_shared_effect_that_istaken_apart_is_not_called_dropped() -> None:
-    robot = samples()["arm"].robot
-    assert taken_apart(robot, candidate(robot, "position_gain", "all_joints")) == [
-        "position_gain@shoulder",
-        "position_gain@elbow",
-    ]
-    assert taken_apart(robot, candidate(robot, "position_gain", "elbow")) == []
 
 
 def test_friction_that_slows_as_back_emf_does_is_worth_trying_where_the_stated_speed_is_nobodys() -> None:

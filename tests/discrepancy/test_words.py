@@ -283,6 +283,12 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     assert not any("cannot tell" in line for line in gone.lines) and "not told from" not in gone.sure
     assert "Dropped again: offset torque at servo, which a later effect made useless." in lines
     assert "Left out in the end, since these data do not tell them from neutral: rotor inertia at servo." in lines
+    rung.dropped = ("coulomb_friction@all_joints", "coulomb_friction@elbow", "backlash@servo")
+    apart = improve_account(problem, found).lines  # type: ignore[arg-type]
+    assert "Shared at first, and of other joints or of each by itself since: coulomb friction." in apart
+    assert [line for line in apart if line.startswith("Dropped")] == [
+        "Dropped again: backlash at servo, which a later effect made useless."
+    ]
 
 
 def test_an_interval_below_what_there_is_is_told_as_it_is() -> None:
