@@ -22,6 +22,8 @@ from ee_dist.robots.inverse_dynamics import (
     joint_torques,
     parameters,
     regressor,
+    rotors,
+    torques_of_parts,
     weights,
 )
 from ee_dist.robots.linear_stage import linear_stage
@@ -123,3 +125,16 @@ def test_gravity_adds_what_is_linear_in_it() -> None:
     np.testing.assert_allclose(level @ masses + pull @ weights(masses), tipped @ masses, atol=1e-9)
     assert geometry(robot) == geometry(tilted.with_part("forearm", mass_kg=3.0).with_joint("elbow", freedom=0.5))
     assert geometry(robot) != geometry(robot.with_joint("elbow", axis=(1.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("tilted", [False, True])
+def test_torques_of_one_set_of_masses_are_those_of_the_regressor(tilted: bool) -> None:
+    rng = np.random.default_rng(4)
+    arm, _ = load_robot(ARM)
+    if tilted:
+        arm = replace(arm.with_world(tilt_x_rad=0.3, tilt_y_rad=-0.2), start_rotation=(0.5, 0.5, 0.5, 0.5))
+    for robot in (arm, linear_stage(mass_kg=3.0), servo_pendulum()):
+        q, w, a = rng.standard_normal((3, 50, len(robot.drives)))
+        linear = regressor(robot, q, w, a) @ parameters(robot)
+        np.testing.assert_allclose(torques_of_parts(robot, q, w, a), linear, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(joint_torques(robot, q, w, a), linear + rotors(robot) * a, rtol=1e-9, atol=1e-9)

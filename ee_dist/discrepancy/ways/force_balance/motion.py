@@ -15,13 +15,23 @@ from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import LowPass
 from ee_dist.robots.instruments import MOTOR_TORQUE
-from ee_dist.robots.inverse_dynamics import geometry, gravity, gravity_regressor, parameters, regressor, weights
+from ee_dist.robots.inverse_dynamics import (
+    geometry,
+    gravity,
+    gravity_regressor,
+    parameters,
+    regressor,
+    torques_of_parts,
+    weights,
+)
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import travel
 from ee_dist.trials.log import Array, SensorLog
 
 ROOM = 150_000_000
 """Bytes of regressors that are kept for a motion, if there are more than two geometries."""
+ONCE = 16
+"""Geometries of which the torques of one set of masses are kept for a motion."""
 PASSED = 1 / 20
 """Cut-off of the positions' low-pass as a share of their rate: above it, differences twice over are mostly noise."""
 SLOWEST_HZ, STEEPEST = 5.0, 1 / 5
@@ -109,6 +119,8 @@ class Motion:
     judged: tuple[int, ...]
     external: Array | None = None
     known: dict[tuple[object, ...], Moved] = field(default_factory=dict)
+    once: dict[tuple[object, ...], tuple[bytes, Array]] = field(default_factory=dict)
+    """Torques (T, M) of geometries that were asked for with one set of masses and gravity."""
 
     def of_judged(self, series: Array) -> Array:
         """(T, J, ...) what a series (T, M, ...) holds of the judged drives."""
@@ -116,17 +128,26 @@ class Motion:
 
     def needed(self, robot: Robot) -> tuple[object, Array]:
         """(T, M) torque that the motion of the parts needs, without that of the rotors; equal keys have equal torques. What
-        depends on geometry and gravity is computed once for each."""
+        depends on geometry and gravity is computed once for each that is asked for with two sets of masses: most that a search
+        asks for come once."""
         shape, pull, masses = geometry(robot), gravity(robot), parameters(robot)
+        # Most hypotheses change the drives alone.
+        asked = masses.tobytes() + pull.tobytes()
         if shape not in self.known:
+            once = self.once.get(shape)
+            if once is None:
+                if len(self.once) >= ONCE:
+                    self.once.pop(next(iter(self.once)))
+                once = asked, torques_of_parts(robot, self.position, self.speed, self.acceleration)
+                self.once[shape] = once
+            if once[0] == asked:
+                return (shape, asked), once[1]
             found = regressor(robot, self.position, self.speed, self.acceleration)
             while len(self.known) >= max(2, ROOM // max(found.nbytes, 1)):
                 self.known.pop(next(iter(self.known)))
             self.known[shape] = Moved(found, pull)
         # The one asked for last goes last: what most hypotheses share stays.
         known = self.known[shape] = self.known.pop(shape)
-        # Most hypotheses change the drives alone.
-        asked = masses.tobytes() + pull.tobytes()
         if known.last is None or known.last[0] != asked:
             torque = known.all_of_it @ masses
             if (pull != known.pull).any():
