@@ -1,4 +1,4 @@
-"""Torques that take work out of a motion: no model is needed to see that they cannot be a drive's."""
+"""Torques that take work out of a motion, as no drive does that moves a joint to and fro."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from ee_dist.basics.names import listed
 from ee_dist.measurements import signals
+from ee_dist.measurements.need import torques_needed
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
@@ -31,17 +32,30 @@ def takers(robot: Robot, torques: Array, joints: Array, step_s: float) -> dict[s
     if robot.free_base:
         return {}
     found = {}
-    for name, torque, position in zip(robot.motor_names, torques.T, joints.T, strict=True):
+    for k, name in enumerate(robot.motor_names):
+        torque, position = torques[:, k], joints[:, k]
         if np.isfinite(torque).all() and np.isfinite(position).all() and (work := work_taken(torque, position, step_s)):
-            found[name] = work
-    return found
+            found[name] = work, k
+    moves = [k for k, column in enumerate(joints.T) if not np.isfinite(column).all() or np.ptp(column) > 0]
+    if len(moves) < 2 or not found:
+        return {name: work for name, (work, _) in found.items()}
+    # Where others move too a joint may be led by them all the way and be held back by its drive, in any arm without friction.
+    needed = torques_needed(robot, joints, step_s) if np.isfinite(joints).all() else None
+    if needed is None:
+        return {}
+    return {
+        name: work
+        for name, (work, k) in found.items()
+        if work_taken(torques[:, k], joints[:, k], step_s, needed[0][:, k]) is not None
+    }
 
 
-def work_taken(torque: Array, position: Array, step_s: float) -> Work | None:
+def work_taken(torque: Array, position: Array, step_s: float, needed: Array | None = None) -> Work | None:
     """The work of a drive (torque and position (T,) of its joint) that takes more out of a motion to and fro than it puts in, by
-    whatever masses: friction takes work, gravity gives back what it took, and no robot without another motor has any to
-    give. Speeds are smoothed; from the first time that the joint is in the middle to the last, so that what its weight did on
-    the way there is not counted. None for a drive that gives, and a joint that does not turn round often enough to tell."""
+    whatever masses if nothing else moves: friction takes work, gravity gives back what it took, and no robot without another
+    motor has any to give. Where others move too, more than what the masses of the model exchange with them (``needed`` (T,)
+    torques). Speeds are smoothed; from the first time that the joint is in the middle to the last, so that what its weight did
+    on the way there is not counted. None for a drive that gives, and a joint that does not turn round often enough to tell."""
     width = max(3, round(SMOOTHED_S / step_s))
     speed = np.gradient(signals.smooth(position[:, None], width)[:, 0], step_s)
     at = np.flatnonzero(np.diff(np.sign(position - np.median(position))))
@@ -50,7 +64,8 @@ def work_taken(torque: Array, position: Array, step_s: float) -> Work | None:
         return None
     work = (torque * speed)[at[0] : at[-1]] * step_s
     most, total = float(np.abs(work).sum()), float(work.sum())
-    if not np.isfinite(most) or most == 0 or total > -TAKES * most:
+    beyond = total if needed is None else total - float((needed * speed)[at[0] : at[-1]].sum() * step_s)
+    if not np.isfinite(most) or most == 0 or max(total, beyond) > -TAKES * most:
         return None
     return Work(-float(work[work < 0].sum()), float(work[work > 0].sum()))
 
@@ -59,7 +74,7 @@ def power_suspicion(name: str, work: Work) -> str:
     """A line on it for a column ``name`` that is being imported."""
     return (
         f"{name}: takes {work.taken_j:.3g} J out of the motion and gives it {work.given_j:.3g}, where a joint "
-        "that goes to and fro needs some, whatever the masses: a swapped sign, another joint's column, or no torque?"
+        "that goes to and fro needs some, and these masses take none: a swapped sign, another joint's column, or no torque?"
     )
 
 
@@ -72,8 +87,8 @@ def taking(robot: Robot, logs: Sequence[tuple[str, SensorLog]]) -> list[str]:
         for joint in takers(robot, log.torques, log.joints, float(log.times_s[1] - log.times_s[0])):
             where.setdefault(joint, []).append(name)
     return [
-        f"The torque of {joint} takes more work out of the motion than it gives it, during {listed(trials)}; whatever the "
-        "masses, a joint that goes to and fro needs some. A swapped sign, another joint's column, or no torque? Left out of the "
-        "mapping, the others are compared without it."
+        f"The torque of {joint} takes more work out of the motion than it gives it, during {listed(trials)}; a joint that goes "
+        "to and fro needs some, and the model's masses take none there. A swapped sign, another joint's column, or no torque? "
+        "Left out of the mapping, the others are compared without it."
         for joint, trials in where.items()
     ]

@@ -8,15 +8,16 @@ model with other masses then costs one product.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.mass_matrix import parents_first, rotation_matrix
-from ee_dist.robots.model import Joint, Robot, RobotError
+from ee_dist.robots.model import Joint, Part, Robot, RobotError
 
 Array = NDArray[np.float64]
 
@@ -60,22 +61,22 @@ def torques_of_parts(robot: Robot, position: Array, speed: Array, acceleration: 
     out = np.zeros(acceleration.shape)
     names = {name for j in course.order for name in (j.parent, j.child)}
     forces, moments = ({name: np.zeros((rows, 3)) for name in names} for _ in range(2))
+    masses = dict(zip((j.name for j in _bodies(robot).moving), parameters(robot).reshape(-1, 10), strict=True))
     for joint in reversed(course.order):
-        part = robot.part(joint.child)
-        turn, w, dw = course.turn[part.name], course.spin[part.name], course.spin_rate[part.name]
-        com = turn @ np.array(part.com_m)
-        own = part.mass_kg * (course.pull[part.name] + _cross(dw, com) + _cross(w, _cross(w, com)))
-        xx, yy, zz, xy, xz, yz = part.inertia_kg_m2
-        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        w_in, dw_in = (np.einsum("tji,tj->ti", turn, v) for v in (w, dw))
-        about = dw_in @ inertia + _cross(w_in, w_in @ inertia)
-        force = forces[part.name] + own
-        moment = moments[part.name] + np.einsum("tij,tj->ti", turn, about) + _cross(com, own)
+        part, force, moment = joint.child, forces[joint.child], moments[joint.child]
+        if joint.name in masses:
+            own = masses[joint.name]
+            turn, w, dw, pull = course.turn[part], course.spin[part], course.spin_rate[part], course.pull[part]
+            centre, inertia = turn @ own[1:4], _tensor(own[4:])
+            w_in, dw_in = (np.einsum("tji,tj->ti", turn, v) for v in (w, dw))
+            force = force + own[0] * pull + _cross(dw, centre) + _cross(w, _cross(w, centre))
+            about = dw_in @ inertia + _cross(w_in, w_in @ inertia)
+            moment = moment + np.einsum("tij,tj->ti", turn, about) + _cross(centre, pull)
         k = column.get(joint.name)
         if k is not None:
             out[:, k] = np.einsum("ti,ti->t", course.axis[joint.name], force if joint.kind == "slide" else moment)
         forces[joint.parent] = forces[joint.parent] + force
-        moments[joint.parent] = moments[joint.parent] + moment + _cross(course.arm[part.name], force)
+        moments[joint.parent] = moments[joint.parent] + moment + _cross(course.arm[part], force)
     return out
 
 
@@ -102,19 +103,84 @@ def _columns(robot: Robot) -> dict[str, int]:
 
 
 def parameters(robot: Robot, of: Collection[str] | None = None) -> Array:
-    """(10 P,) of the carried parts: mass, mass * centre (3), inertia about the part's frame (xx, yy, zz, xy, xz, yz);
-    ``of``: only of what one of these joints carries."""
-    found: list[float] = []
+    """(10 B,) of the bodies that joints move, each with all that is fixed to it: mass, mass * centre (3), inertia about the frame
+    of the part at the joint (xx, yy, zz, xy, xz, yz); ``of``: only of what one of these joints carries."""
+    bodies, parts = _bodies(robot), {p.name: p for p in robot.parts}
+    found: list[Array] = []
     carried: set[str] = set()
-    for joint in _in_order(robot):
-        if of is not None and joint.name not in of and joint.parent not in carried:
+    for joint in bodies.moving:
+        if of is not None and joint.name not in of and bodies.carrier.get(joint.parent) not in carried:
             continue
-        carried.add(joint.child)
-        part = robot.part(joint.child)
-        m, (x, y, z) = part.mass_kg, part.com_m
-        shift = (y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z)
-        found += [m, m * x, m * y, m * z, *(i + m * s for i, s in zip(part.inertia_kg_m2, shift, strict=True))]
-    return np.array(found)
+        carried.add(joint.name)
+        found.append(sum((_about_frame(parts[m.part], m) for m in bodies.members[joint.name]), np.zeros(10)))
+    return np.concatenate([*found, np.zeros(0)])
+
+
+def _about_frame(part: Part, at: _Member) -> Array:
+    """(10,) of a part, about the frame of the body that it belongs to."""
+    m, (x, y, z), inertia = part.mass_kg, part.com_m, part.inertia_kg_m2
+    if at.turn is not None:
+        x, y, z = (float(v) for v in at.turn @ np.array(part.com_m) + at.place_m)
+        own = at.turn @ _tensor(np.array(inertia)) @ at.turn.T
+        inertia = (own[0, 0], own[1, 1], own[2, 2], own[0, 1], own[0, 2], own[1, 2])
+    shift = (y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z)
+    return np.array([m, m * x, m * y, m * z, *(i + m * s for i, s in zip(inertia, shift, strict=True))])
+
+
+def _tensor(entries: Array) -> Array:
+    xx, yy, zz, xy, xz, yz = entries
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+@dataclass(frozen=True, eq=False)
+class _Member:
+    """A part of a body, turned and placed in its frame; the part at the joint where ``turn`` is None."""
+
+    part: str
+    turn: Array | None
+    place_m: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Bodies:
+    """What the joints of a robot move, parents first: joints that ``moving``, and those in ``order`` on the way to them;
+    ``members`` of a body by its joint; ``carrier``: by part the joint whose body it belongs to, if it is not the base."""
+
+    order: tuple[Joint, ...]
+    moving: tuple[Joint, ...]
+    members: Mapping[str, Sequence[_Member]]
+    carrier: Mapping[str, str]
+
+
+def _bodies(robot: Robot) -> _Bodies:
+    return _bodies_of(robot.root.name, robot.present_joints, f"{robot.name}: ")
+
+
+@lru_cache(256)
+def _bodies_of(root: str, joints: tuple[Joint, ...], where: str) -> _Bodies:
+    order = parents_first(joints, root, where)
+    carrier: dict[str, str] = {}
+    members: dict[str, list[_Member]] = {}
+    at: dict[str, tuple[Array | None, Array]] = {}
+    for joint in order:
+        if joint.kind != "fixed":
+            carrier[joint.child] = joint.name
+            at[joint.child] = None, np.zeros(3)
+        elif joint.parent in carrier:
+            carrier[joint.child] = carrier[joint.parent]
+            turn, place = at[joint.parent]
+            turn = np.eye(3) if turn is None else turn
+            at[joint.child] = turn @ rotation_matrix(joint.rotation), place + turn @ np.array(joint.position_m)
+        else:
+            continue
+        members.setdefault(carrier[joint.child], []).append(_Member(joint.child, *at[joint.child]))
+    on_the_way: set[str] = set()
+    for joint in reversed(order):
+        if joint.kind != "fixed" or joint.child in on_the_way:
+            on_the_way.add(joint.parent)
+    moving = tuple(j for j in order if j.kind != "fixed")
+    chain = tuple(j for j in order if j.kind != "fixed" or j.child in on_the_way)
+    return _Bodies(chain, moving, members, carrier)
 
 
 def rotors(robot: Robot) -> Array:
@@ -129,7 +195,7 @@ def geometry(robot: Robot) -> tuple[object, ...]:
 
 
 def gravity_regressor(robot: Robot, position: Array) -> Array:
-    """(3, T, M, 4 P): what gravity of 1 m/s^2 along x, y and z of the floor adds to the columns of a ``regressor`` that have
+    """(3, T, M, 4 B): what gravity of 1 m/s^2 along x, y and z of the floor adds to the columns of a ``regressor`` that have
     weight, ``weights`` of its parameters; it is linear in it, and inertia about a part's frame weighs nothing."""
     still = np.zeros_like(position)
     down = robot.with_world(gravity_m_s2=1.0, tilt_x_rad=0.0, tilt_y_rad=0.0)
@@ -140,19 +206,20 @@ def gravity_regressor(robot: Robot, position: Array) -> Array:
 
 
 def weights(columns: Array) -> Array:
-    """(..., 4 P) of (..., 10 P): each part's mass, and its mass times centre."""
+    """(..., 4 B) of (..., 10 B): each body's mass, and its mass times centre."""
     apart = columns.reshape(*columns.shape[:-1], -1, 10)[..., :4]
     return np.ascontiguousarray(apart).reshape(*columns.shape[:-1], -1)
 
 
 def regressor(robot: Robot, position: Array, speed: Array, acceleration: Array) -> Array:
-    """(T, M, 10 P): what each of the ``parameters`` adds to the torques, which are linear in them (Atkeson, An, Hollerbach
+    """(T, M, 10 B): what each of the ``parameters`` adds to the torques, which are linear in them (Atkeson, An, Hollerbach
     1986). It depends on the robot's ``geometry`` and gravity only. Raises RobotError as ``joint_torques`` does."""
     column = _columns(robot)
     course = course_of(robot, position, speed, acceleration)
     carrier = {j.child: j for j in course.order}
-    out = np.zeros((*acceleration.shape, 10 * len(course.order)))
-    for place, joint in enumerate(course.order):
+    moving = _bodies(robot).moving
+    out = np.zeros((*acceleration.shape, 10 * len(moving)))
+    for place, joint in enumerate(moving):
         force, moment = _unit_loads(course, joint.child)
         at: Joint | None = joint
         while at is not None:
@@ -194,7 +261,7 @@ def course_of(robot: Robot, position: Array, speed: Array, acceleration: Array) 
     pull = {root: np.broadcast_to(-gravity(robot), (rows, 3))}
     arms: dict[str, Array] = {}
     axes: dict[str, Array] = {}
-    order = _in_order(robot)
+    order = _bodies(robot).order
     for joint in order:
         up, part = turn[joint.parent], joint.child
         arm = np.einsum("tij,j->ti", up, np.array(joint.position_m))
@@ -214,7 +281,7 @@ def course_of(robot: Robot, position: Array, speed: Array, acceleration: Array) 
         elif joint.kind == "slide":
             drag = drag + a * axis + 2 * _cross(w, v * axis)
         turn[part], pull[part], arms[part], axes[joint.name] = facing, drag, arm, axis
-    return Course(tuple(order), turn, spin, rate, pull, arms, axes)
+    return Course(order, turn, spin, rate, pull, arms, axes)
 
 
 def _about(axis: Array, angle: Array) -> Array:
@@ -224,7 +291,3 @@ def _about(axis: Array, angle: Array) -> Array:
     zero = np.zeros_like(x)
     across = np.stack([np.stack([zero, -z, y], 1), np.stack([z, zero, -x], 1), np.stack([-y, x, zero], 1)], 1)
     return c * np.eye(3) + s * across + (1 - c) * axis[:, :, None] * axis[:, None, :]
-
-
-def _in_order(robot: Robot) -> list[Joint]:
-    return parents_first(robot.present_joints, robot.root.name, f"{robot.name}: ")

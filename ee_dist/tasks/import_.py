@@ -193,10 +193,13 @@ def written(proposal: Proposal, config: Config, files: list[Path], out: Path, co
     console.print(f"wrote {shown}", highlight=False, markup=False, soft_wrap=True)
     if proposal.questions:
         more = f" (and {len(proposal.questions) - 1} more)" if len(proposal.questions) > 1 else ""
+        first = proposal.questions[0]
+        # What a description is to say first makes another proposal.
+        then = "then the same again" if "fixed_joints" in first else f"then again with task.mapping={shown}"
         raise MeasurementError(
-            f"{names}: what the file cannot say{more}: {proposal.questions[0]}; then again with task.mapping={shown}"
-            if "task." not in proposal.questions[0]
-            else f"{names}: what the file cannot say{more}: {proposal.questions[0]} (the rest is in {shown})"
+            f"{names}: what the file cannot say{more}: {first}; {then}"
+            if "task." not in first
+            else f"{names}: what the file cannot say{more}: {first} (the rest is in {shown})"
         )
     return read_mapping(path)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,12 +27,14 @@ from ee_dist.measurements.suspicious import (
     unit_suspicion,
     unlike_suspicion,
 )
-from ee_dist.measurements.taking import power_suspicion, taking, work_taken
+from ee_dist.measurements.taking import power_suspicion, takers, taking, work_taken
+from ee_dist.robots.describe import load_robot
 from ee_dist.robots.inverse_dynamics import joint_torques
 from ee_dist.robots.model import CONTINUOUS_RAD
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.log import SensorLog
 
+ARM = Path(__file__).parents[2] / "docs" / "examples" / "arm.yaml"
 T = np.arange(2000) * 0.01
 WAVE = np.sin(2 * T)
 
@@ -188,6 +191,19 @@ def test_a_drive_that_takes_work_out_of_what_goes_to_and_fro_is_told_without_a_m
     assert taken is not None and taken.taken_j > taken.given_j >= 0
     assert "swapped sign" in power_suspicion("torque of j", taken)
     assert work_taken(-friction[:150], position[:150], 0.01) is None, "it does not come back"
+
+
+def test_a_joint_that_others_lead_may_hold_back_all_the_way() -> None:
+    """An arm without any friction: what its elbow takes out of the motion its shoulder puts in."""
+    arm, _ = load_robot(ARM)
+    rng, t = np.random.default_rng(27), np.arange(0, 20, 0.01)[:, None]
+    size, phase, middle = rng.uniform(0.3, 1.2, 3), rng.uniform(0, 6.28, 3), rng.uniform(-1, 1, 3)
+    q, w = middle + size * np.sin(2 * t + phase), 2 * size * np.cos(2 * t + phase)
+    torque = joint_torques(arm, q, w, -4 * size * np.sin(2 * t + phase))
+    assert work_taken(torque[:, 2], q[:, 2], 0.01) is not None, "by itself it looks as if it gave none"
+    assert takers(arm, torque, q, 0.01) == {}
+    rubbed = 3.0 * np.abs(torque[:, 2]).max() * np.sign(w[:, 2])
+    assert list(takers(arm, torque - rubbed[:, None] * [0, 0, 1], q, 0.01)) == ["elbow"]
 
 
 def test_a_log_whose_torque_takes_work_is_told_when_it_is_compared() -> None:

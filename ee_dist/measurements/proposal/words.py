@@ -12,7 +12,7 @@ _QUANTITY = {
     "rotation configuration",
     SPEED: "dq qvel vel velocity velocities speed speeds omega qdot dtheta thetadot jvel spd rate geschwindigkeit drehzahl "
     "qp thetap dphi dotq",
-    TORQUE: "tau tor torque torques effort efforts trq moment drehmoment force kraft jtau frc",
+    TORQUE: "tau tor torq torqs torque torques effort efforts trq moment drehmoment force kraft jtau frc",
     CURRENT: "cur curr current currents amps ampere strom iq amperage",
     OTHER: "acc accel acceleration qdd ddq qddot ddotq volt voltage volts temp temperature pwm err error fric friction duty "
     "status flag mode supply battery load enable enabled counter seq id ticks cycle wrench imu tcp cartesian eef",

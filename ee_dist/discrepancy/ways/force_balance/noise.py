@@ -129,7 +129,9 @@ class MotionNoise:
 
 
 def _products(columns: Array) -> Array:
-    return np.asarray(np.einsum("tmp,tmq->mpq", columns, columns))
+    """(J, P, P) sums over time of products of columns (T, J, P)."""
+    by_drive = np.moveaxis(columns, 1, 0)
+    return np.asarray(by_drive.swapaxes(1, 2) @ by_drive)
 
 
 def _added(trial: MeasuredTrial, model: Robot, motion: Motion, processing: Processing, number: int) -> Array:
