@@ -25,6 +25,7 @@ from ee_dist.basics.names import did_you_mean, listed, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.groups import common, members_of, name_of, shared_targets
 from ee_dist.effects.scales import Range, Ranges
+from ee_dist.robots.bodies import heaviest
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.system import System
 from ee_dist.trials.log import Array
@@ -137,9 +138,14 @@ class Effect:
         )
 
     def proposed(self, robot: Robot) -> tuple[str, ...]:
-        """The targets at which ``explain`` proposes it by itself: all or none."""
+        """The targets at which ``explain`` proposes it by itself: all or none, but of parts that are fixed to one another only
+        the heaviest."""
         sought = self.searchable and (self.worth_proposing is None or self.worth_proposing(robot))
-        return self.targets(robot) if sought else ()
+        if not sought or self.family != "body" or not self.parameters or not isinstance(robot, Robot):
+            return self.targets(robot) if sought else ()
+        found, one_each = self.targets(robot), heaviest(robot)
+        parts = {p.name for p in robot.parts}
+        return tuple(t for t in found if t in one_each or t not in parts)
 
     def guessed(self, robot: System) -> str:
         """The joints, or the group, at which a description only assumed what it changes; empty where it assumed nothing."""

@@ -8,15 +8,15 @@ model with other masses then costs one product.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.basics.quoted import quoted
-from ee_dist.robots.mass_matrix import parents_first, rotation_matrix
+from ee_dist.robots.bodies import Member, bodies_of
+from ee_dist.robots.mass_matrix import rotation_matrix
 from ee_dist.robots.model import Joint, Part, Robot, RobotError
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ def torques_of_parts(robot: Robot, position: Array, speed: Array, acceleration: 
     out = np.zeros(acceleration.shape)
     names = {name for j in course.order for name in (j.parent, j.child)}
     forces, moments = ({name: np.zeros((rows, 3)) for name in names} for _ in range(2))
-    masses = dict(zip((j.name for j in _bodies(robot).moving), parameters(robot).reshape(-1, 10), strict=True))
+    masses = dict(zip((j.name for j in bodies_of(robot).moving), parameters(robot).reshape(-1, 10), strict=True))
     for joint in reversed(course.order):
         part, force, moment = joint.child, forces[joint.child], moments[joint.child]
         if joint.name in masses:
@@ -105,7 +105,7 @@ def _columns(robot: Robot) -> dict[str, int]:
 def parameters(robot: Robot, of: Collection[str] | None = None) -> Array:
     """(10 B,) of the bodies that joints move, each with all that is fixed to it: mass, mass * centre (3), inertia about the frame
     of the part at the joint (xx, yy, zz, xy, xz, yz); ``of``: only of what one of these joints carries."""
-    bodies, parts = _bodies(robot), {p.name: p for p in robot.parts}
+    bodies, parts = bodies_of(robot), {p.name: p for p in robot.parts}
     found: list[Array] = []
     carried: set[str] = set()
     for joint in bodies.moving:
@@ -116,7 +116,7 @@ def parameters(robot: Robot, of: Collection[str] | None = None) -> Array:
     return np.concatenate([*found, np.zeros(0)])
 
 
-def _about_frame(part: Part, at: _Member) -> Array:
+def _about_frame(part: Part, at: Member) -> Array:
     """(10,) of a part, about the frame of the body that it belongs to."""
     m, (x, y, z), inertia = part.mass_kg, part.com_m, part.inertia_kg_m2
     if at.turn is not None:
@@ -130,57 +130,6 @@ def _about_frame(part: Part, at: _Member) -> Array:
 def _tensor(entries: Array) -> Array:
     xx, yy, zz, xy, xz, yz = entries
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-@dataclass(frozen=True, eq=False)
-class _Member:
-    """A part of a body, turned and placed in its frame; the part at the joint where ``turn`` is None."""
-
-    part: str
-    turn: Array | None
-    place_m: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Bodies:
-    """What the joints of a robot move, parents first: joints that ``moving``, and those in ``order`` on the way to them;
-    ``members`` of a body by its joint; ``carrier``: by part the joint whose body it belongs to, if it is not the base."""
-
-    order: tuple[Joint, ...]
-    moving: tuple[Joint, ...]
-    members: Mapping[str, Sequence[_Member]]
-    carrier: Mapping[str, str]
-
-
-def _bodies(robot: Robot) -> _Bodies:
-    return _bodies_of(robot.root.name, robot.present_joints, f"{robot.name}: ")
-
-
-@lru_cache(256)
-def _bodies_of(root: str, joints: tuple[Joint, ...], where: str) -> _Bodies:
-    order = parents_first(joints, root, where)
-    carrier: dict[str, str] = {}
-    members: dict[str, list[_Member]] = {}
-    at: dict[str, tuple[Array | None, Array]] = {}
-    for joint in order:
-        if joint.kind != "fixed":
-            carrier[joint.child] = joint.name
-            at[joint.child] = None, np.zeros(3)
-        elif joint.parent in carrier:
-            carrier[joint.child] = carrier[joint.parent]
-            turn, place = at[joint.parent]
-            turn = np.eye(3) if turn is None else turn
-            at[joint.child] = turn @ rotation_matrix(joint.rotation), place + turn @ np.array(joint.position_m)
-        else:
-            continue
-        members.setdefault(carrier[joint.child], []).append(_Member(joint.child, *at[joint.child]))
-    on_the_way: set[str] = set()
-    for joint in reversed(order):
-        if joint.kind != "fixed" or joint.child in on_the_way:
-            on_the_way.add(joint.parent)
-    moving = tuple(j for j in order if j.kind != "fixed")
-    chain = tuple(j for j in order if j.kind != "fixed" or j.child in on_the_way)
-    return _Bodies(chain, moving, members, carrier)
 
 
 def rotors(robot: Robot) -> Array:
@@ -217,7 +166,7 @@ def regressor(robot: Robot, position: Array, speed: Array, acceleration: Array) 
     column = _columns(robot)
     course = course_of(robot, position, speed, acceleration)
     carrier = {j.child: j for j in course.order}
-    moving = _bodies(robot).moving
+    moving = bodies_of(robot).moving
     out = np.zeros((*acceleration.shape, 10 * len(moving)))
     for place, joint in enumerate(moving):
         force, moment = _unit_loads(course, joint.child)
@@ -261,7 +210,7 @@ def course_of(robot: Robot, position: Array, speed: Array, acceleration: Array) 
     pull = {root: np.broadcast_to(-gravity(robot), (rows, 3))}
     arms: dict[str, Array] = {}
     axes: dict[str, Array] = {}
-    order = _bodies(robot).order
+    order = bodies_of(robot).order
     for joint in order:
         up, part = turn[joint.parent], joint.child
         arm = np.einsum("tij,j->ti", up, np.array(joint.position_m))
