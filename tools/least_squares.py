@@ -12,6 +12,7 @@ from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.measurements.sampling import decimated
+from ee_dist.robots.bodies import bodies_of
 from ee_dist.robots.inverse_dynamics import parameters, regressor
 from ee_dist.trials.log import Array
 
@@ -35,10 +36,10 @@ def least_squares(
     problem: ForceBalance, cut: Cut, part: str | None = None, known: Hypothesis = (), rows: Mask | None = None
 ) -> LeastSquares:
     """The fit on all values, and on what each turn of ``cut`` sees. ``known``: terms that the robot has beside it; ``part``:
-    what a payload hangs on; ``rows`` (n,): values that are fitted at all."""
+    at a joint, what a payload hangs on; ``rows`` (n,): values that are fitted at all."""
     robot, size, motors = apply(problem.robot, known), problem.scale, len(problem.channels)
     blocks, wanted = [], []
-    order = _parts_in_order(problem)
+    order = [joint.child for joint in bodies_of(robot).moving]
     for motion in problem.motions:
         q, v, a = motion.position, motion.speed, motion.acceleration
         each = regressor(robot, q, v, a)
@@ -66,15 +67,3 @@ def least_squares(
     return LeastSquares(
         target - table @ whole, held, whole[: PER_JOINT * motors].reshape(motors, PER_JOINT), load, len(whole)
     )
-
-
-def _parts_in_order(problem: ForceBalance) -> list[str]:
-    """Carried parts in the order of the regressor's columns: parents first."""
-    robot = problem.robot
-    placed, order, waiting = {robot.root.name}, [], list(robot.present_joints)
-    while waiting:
-        ready = [j for j in waiting if j.parent in placed]
-        order += [j.child for j in ready]
-        placed |= {j.child for j in ready}
-        waiting = [j for j in waiting if j.child not in placed]
-    return order

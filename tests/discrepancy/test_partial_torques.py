@@ -155,7 +155,7 @@ def test_a_torque_of_a_few_steps_of_its_readings_does_not_outweigh_the_others() 
         # In newton metres what is left is what it was.
         left = problem.raw(problem.residuals([FRICTION])[0])[problem.channel_of == 0]
         plain = ForceBalance(measured("arm"), arm())
-        assert left == pytest.approx(plain.raw(plain.residuals([FRICTION])[0])[plain.channel_of == 0], abs=1e-9)
+        assert left == pytest.approx(plain.raw(plain.residuals([FRICTION])[0])[plain.channel_of == 0], abs=1e-7)
 
 
 def test_a_last_word_on_other_joints_than_were_fitted_says_so() -> None:

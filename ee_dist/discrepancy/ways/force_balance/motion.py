@@ -95,14 +95,26 @@ class Processing:
 
 @dataclass(eq=False)
 class Moved:
-    """The regressor (T, M, 10 P) of one geometry along a motion, under gravity ``pull`` (3,); what other gravity adds to what
-    has weight of it (3, T, M, 4 P) for each m/s^2 along x, y, z, once that is asked for."""
+    """The regressor of one geometry along a motion, column by column (10 B, T, M), under gravity ``pull`` (3,); what other
+    gravity adds to what has weight of it (3, T, M, 4 B) for each m/s^2 along x, y, z, once that is asked for."""
 
-    all_of_it: Array
+    columns: Array
     pull: Array
     by_pull: Array | None = None
     last: tuple[bytes, Array] | None = None
     """Masses and gravity asked for last, and the torque (T, M)."""
+    base: tuple[Array, Array] | None = None
+    """Masses that others differ from in a few numbers, and their torque under ``pull``."""
+
+    def torque(self, masses: Array) -> Array:
+        """(T, M) under ``pull``. Most that a search asks for differ from one another in a body or two."""
+        if self.base is not None:
+            change = masses - self.base[0]
+            at = np.flatnonzero(change)
+            if 2 * len(at) <= len(masses):
+                return np.asarray(self.base[1] + np.tensordot(change[at], self.columns[at], 1))
+        self.base = masses, np.tensordot(masses, self.columns, 1)
+        return self.base[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,13 +155,14 @@ class Motion:
             if once[0] == asked:
                 return (shape, asked), once[1]
             found = regressor(robot, self.position, self.speed, self.acceleration)
+            found = np.ascontiguousarray(np.moveaxis(found, 2, 0))
             while len(self.known) >= max(2, ROOM // max(found.nbytes, 1)):
                 self.known.pop(next(iter(self.known)))
             self.known[shape] = Moved(found, pull)
         # The one asked for last goes last: what most hypotheses share stays.
         known = self.known[shape] = self.known.pop(shape)
         if known.last is None or known.last[0] != asked:
-            torque = known.all_of_it @ masses
+            torque = known.torque(masses)
             if (pull != known.pull).any():
                 if known.by_pull is None:
                     known.by_pull = gravity_regressor(robot, self.position)
