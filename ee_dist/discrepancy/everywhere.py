@@ -347,11 +347,11 @@ class _Look:
         starts = [(Model(tuple(kept.parts[k] for k in some)), _values(kept.u, places, some)) for some in taken]
         # Shown is how far each step comes, and most have many values. Where slopes that are known lead nowhere values that have
         # seen all data would be told as held out, so that far from the noise each turn is fitted anew.
-        fits = fit_all(search, self._better_starts(kept, starts, taken), None, SLOPES[2:], PRIOR, short=AWAY)
-        if fits[-1].energy > NEAR * float(problem.floor.sum()):
-            fitted = cross_fit(search, [(f.model, f.u) for f in fits], found.cut, short=AWAY)
+        begun, left = self._better_starts(kept, starts, taken)
+        if left > NEAR * float(problem.floor.sum()):
+            fitted = cross_fit(search, begun, found.cut, short=AWAY)
         else:
-            fitted = held_by_slopes(search, fits, found.cut)
+            fitted = held_by_slopes(search, fit_all(search, begun, None, SLOPES[2:], PRIOR), found.cut)
         energies = [held.energy for held in fitted]
         last, model, held_energy = self._as_far(found, starts, energies)
         for k in range(last + 1):
@@ -378,19 +378,19 @@ class _Look:
 
     def _better_starts(
         self, kept: Current, starts: Sequence[tuple[Model, Array]], taken: Sequence[Sequence[int]]
-    ) -> list[tuple[Model, Array]]:
+    ) -> tuple[list[tuple[Model, Array]], float]:
         """Parts of a model (those ``taken``), each with the values that these have in all of it, or with what the others were
-        making up for, as far as slopes tell, whichever leaves less."""
-        if len(starts) == 1:
-            return list(starts)
+        making up for, as far as slopes tell, whichever leaves less; and what the last of them leaves."""
         search, count = self.search, len(kept.parts)
-        (whole,) = follow_valley(search, [(Model(kept.parts), kept.u)], search.everything, PRIOR, 1, (AGAIN,))
-        foretold = [without_these(whole, [k for k in range(count) if k not in some]) for some in taken]
-        both = [*starts, *((f.model, f.u) for f in foretold)]
+        both = [*starts]
+        if len(starts) > 1:
+            (whole,) = follow_valley(search, [(Model(kept.parts), kept.u)], search.everything, PRIOR, 1, (AGAIN,))
+            foretold = [without_these(whole, [k for k in range(count) if k not in some]) for some in taken]
+            both += [(f.model, f.u) for f in foretold]
         rows = search.residuals([model.hypothesis(u) for model, u in both])
         left = [float(r @ r) if np.isfinite(r).all() else np.inf for r in rows]
-        half = len(starts)
-        return [both[k + half] if left[k + half] < left[k] else both[k] for k in range(half)]
+        best = [min(range(k, len(both), len(starts)), key=lambda i: left[i]) for k in range(len(starts))]
+        return [both[i] for i in best], left[best[-1]]
 
     def _as_far(
         self, found: _Kept, starts: Sequence[tuple[Model, Array]], energies: Sequence[float]
