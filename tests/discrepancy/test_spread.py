@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -52,8 +53,17 @@ def test_in_the_end_a_joint_has_as_much_to_lose_as_is_there_then() -> None:
     )
     assert at_first[0].bounds[0][0] == -0.2
     shared = parse(robot, "coulomb_friction@all_joints")
-    (same, now), (alone,) = with_room_left(robot, (SHARED,), (shared, *at_first)), with_room_left(robot, (), at_first)
+    own = term("coulomb_friction", "elbow", torque_nm=0.1)
+    (same, now), (alone,) = (
+        with_room_left(robot, (SHARED, own), (shared, *at_first)),
+        with_room_left(robot, (own,), at_first),
+    )
     assert (same, now.bounds[0][0], alone.bounds[0][0]) == (shared, -0.3, 0.0)
+    less = term("coulomb_friction", "elbow", torque_nm=-0.1)
+    assert with_room_left(robot, (less,), at_first)[0].bounds[0][0] == -0.1, "no value leaves its bounds"
+    light = candidate(robot, "rotor_inertia", "elbow")
+    narrow = replace(light, bounds=((-1e-6, 1.0),))
+    assert with_room_left(robot, (term("rotor_inertia", "elbow", added_kg_m2=0.0),), (narrow,)) == (narrow,)
     assert now.bounds[0][1] == alone.bounds[0][1] == at_first[0].bounds[0][1]
 
 

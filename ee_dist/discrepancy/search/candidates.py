@@ -14,6 +14,7 @@ from ee_dist.effects.groups import groups, members_of
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
+ROTOR = "rotor_inertia"
 SHAREABLE = ("drive", "sensing", "body")
 """Families whose effects many joints or sensors may share."""
 
@@ -197,16 +198,19 @@ def on_top_of(robot: Robot, terms: Hypothesis, pool: Iterable[Candidate]) -> lis
 
 def with_room_left(robot: Robot, terms: Hypothesis, parts: Iterable[Candidate]) -> tuple[Candidate, ...]:
     """The parts of a model of these ``terms``, each of a single joint with as much to take off as is there now, described or
-    shared: what joints share may have changed, or gone, since a part came into the model."""
-    out = []
+    shared: what joints share may have changed, or gone, since a part came into the model. Values stay within their bounds; how
+    light a rotor may be is for the time step to say."""
+    values, out = {t.name: dict(t.values) for t in terms}, []
     for c in parts:
-        here = [p.on_top for p in c.effect.parameters]
-        if any(here) and not c.members(robot):
-            fresh = candidate(robot, c.effect, c.target)
+        less = [bool(p.on_top) and p.on_top != ROTOR for p in c.effect.parameters]
+        if any(less) and not c.members(robot):
             shared = tuple(t for t in terms if members_of(robot, t.target, c.effect.targets(robot)))
-            (now,) = on_top_of(robot, shared, [fresh])
-            ends = zip(here, c.bounds, now.bounds, strict=True)
-            c = replace(c, bounds=tuple((left if on_top else low, high) for on_top, (low, high), (left, _) in ends))
+            (now,) = on_top_of(robot, shared, [candidate(robot, c.effect, c.target)])
+            lowest = [
+                min(left, values[c.name][p.name]) for p, (left, _) in zip(c.effect.parameters, now.bounds, strict=True)
+            ]
+            ends = zip(less, c.bounds, lowest, strict=True)
+            c = replace(c, bounds=tuple((left if renewed else low, high) for renewed, (low, high), left in ends))
         out.append(c)
     return tuple(out)
 

@@ -68,21 +68,26 @@ def held_still(problem: Problem) -> frozenset[str]:
 
 
 def _alive(problem: Problem, c: Candidate) -> Candidate | None:
-    """A failing position sensor with no more lost of its signal than leaves room for what it read, between the stops of its
-    joint; None where that is nothing. Beside a model that runs away a dead sensor would explain any reading, also one that
+    """Failing position sensors with no more lost of their signal than leaves room for what they read, between the stops of their
+    joints; None where that is nothing. Beside a model that runs away a dead sensor would explain any reading, also one that
     moves."""
-    robot = problem.robot
-    if c.effect.name != "sensor_failing" or c.target not in robot.sensor_names:
+    if c.effect.name != "sensor_failing":
         return c
-    at = robot.sensor_names.index(c.target)
-    if robot.sensors[at].kind != "position":
-        return c
-    low, high = robot.joint(robot.sensors[at].target).ends
-    read = np.concatenate([t.log.sensors[t.log.readings, at] for t in problem.measured])
-    shown = float(np.ptp(np.quantile(read, [SELDOM, 1 - SELDOM]))) / (BEYOND_STOPS * (high - low))
+    shown = max(_shown(problem, name) for name in c.members(problem.robot) or (c.target,))
     if not shown > MOVES:
         return c
     return replace(c, bounds=((0.0, 1.0 - shown),)) if shown < 1.0 else None
+
+
+def _shown(problem: Problem, sensor: str) -> float:
+    """Share of the way of its joint that a position sensor read; 0 of another sensor, and where nothing ends that way."""
+    robot = problem.robot
+    at = robot.sensor_names.index(sensor)
+    if robot.sensors[at].kind != "position":
+        return 0.0
+    low, high = robot.joint(robot.sensors[at].target).ends
+    read = np.concatenate([t.log.sensors[t.log.readings, at] for t in problem.measured])
+    return float(np.ptp(np.quantile(read, [SELDOM, 1 - SELDOM]))) / (BEYOND_STOPS * (high - low))
 
 
 def as_long(problem: Problem, c: Candidate) -> Candidate:
