@@ -27,6 +27,8 @@ ALL_OFF = 0.1
 """and all of them by one factor."""
 SCALED = ("N.m", "N.m.s/rad", "N.m/rad", "kg.m^2", "kg")
 """Units of what is larger with the torques,"""
+TORQUES = {"N.m", "N"}
+"""those of torques and forces themselves,"""
 FACTORS = ("position_gain", "speed_gain", "rotor_factor")
 """and factors on such values."""
 
@@ -35,8 +37,11 @@ def other_scale(
     problem: Problem, current: Current, own: int, pool: Sequence[Candidate]
 ) -> Iterator[tuple[Model, Array]]:
     """The model with the strength of all motors in the place of each mass, of those beyond its first ``own`` parts, that is
-    far off, or of all masses, and where this leads if all follow by one factor. Nothing where ``pool`` is of less than half
-    of the kinds of effects that there are: who asks for some wants these."""
+    far off, or of all masses, and where this leads if all follow by one factor. Nothing where torques were measured, which say
+    how large they are themselves, nor where ``pool`` is of less than half of the kinds of effects that there are: who asks for
+    some wants these."""
+    if {*problem.layout.units} & TORQUES:
+        return
     terms, parts = current.hypothesis, current.parts
     least = [ALL_OFF if c.members(problem.robot) else SELDOM_OFF for c in parts]
     far = [k for k in range(own, len(parts)) if terms[k].effect == MASS and abs(_change(terms[k])) > least[k]]

@@ -48,6 +48,13 @@ def test_masses_far_off_are_there_to_be_scaled() -> None:
     assert len(found) == len(find("part_mass").targets(of_arm.robot)) > 1
 
 
+def test_torques_that_were_measured_say_how_large_they_are() -> None:
+    """Masses that had to stand in for a spring would be nearer to the description if all torques were twice as large."""
+    by_forces, model = problem("arm", "force_balance"), model_of_arm()
+    u = np.where(model.lower < 0, -1.0, 0.5)
+    assert not list(other_scale(by_forces, Current(model.parts, u), 0, pool_of(by_forces)))
+
+
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.floats(0.05, 0.3), min_size=6, max_size=6), st.sampled_from([0, 1]))
 def test_without_a_mass_all_that_goes_with_torques_is_scaled_and_the_motion_is_the_same(
