@@ -40,7 +40,7 @@ def other_scale(
     far off, or of all masses, and where this leads if all follow by one factor. Nothing where torques were measured, which say
     how large they are themselves, nor where ``pool`` is of less than half of the kinds of effects that there are: who asks for
     some wants these."""
-    if {*problem.layout.units} & TORQUES:
+    if torques_compared(problem):
         return
     terms, parts = current.hypothesis, current.parts
     least = [ALL_OFF if c.members(problem.robot) else SELDOM_OFF for c in parts]
@@ -64,6 +64,11 @@ def other_scale(
             u = [*(parts[i].shares(dict(t.values)) for i, t in zip(stay, new, strict=True)), comes.shares(values)]
             yield model, np.clip(np.concatenate(u), model.lower, model.upper)
         return
+
+
+def torques_compared(problem: Problem) -> bool:
+    """Whether some of what is compared is a torque or a force, which says how large all of them are."""
+    return bool({*problem.layout.units} & TORQUES)
 
 
 def _change(t: Term) -> float:

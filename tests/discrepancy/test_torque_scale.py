@@ -13,7 +13,7 @@ from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import pool_of
-from ee_dist.discrepancy.torque_scale import STRENGTH, other_scale, without_masses
+from ee_dist.discrepancy.torque_scale import STRENGTH, other_scale, torques_compared, without_masses
 from ee_dist.effects.catalogue import apply, find
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -53,6 +53,7 @@ def test_torques_that_were_measured_say_how_large_they_are() -> None:
     by_forces, model = problem("arm", "force_balance"), model_of_arm()
     u = np.where(model.lower < 0, -1.0, 0.5)
     assert not list(other_scale(by_forces, Current(model.parts, u), 0, pool_of(by_forces)))
+    assert torques_compared(by_forces) and not torques_compared(problem("arm", "open_loop"))
 
 
 @settings(max_examples=10, deadline=None)

@@ -45,6 +45,7 @@ def made_up() -> SimpleNamespace:
         trials=("a",),
         measured=(),
         says_nothing=lambda _: "",
+        layout=SimpleNamespace(units=("rad",)),
     )
 
 

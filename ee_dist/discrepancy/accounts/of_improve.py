@@ -36,6 +36,7 @@ from ee_dist.discrepancy.improve import EXPLAINED
 from ee_dist.discrepancy.ladder import Improvement, Twin
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.torque_scale import torques_compared
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
 from ee_dist.discrepancy.words import by_effect, much, percent, phrase, placed, plain, without_values
 from ee_dist.effects.catalogue import CATALOGUE, Term
@@ -112,7 +113,7 @@ def improve_account(
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += flag_texts(found.terms, found.parameters)
     lines += beyond_a_guess(robot, found.terms, found.parameters)
-    lines += weight_text(robot, found.terms) + scale_text(robot, found.terms)
+    lines += weight_text(robot, found.terms) + ([] if torques_compared(problem) else scale_text(robot, found.terms))
     lines += rest_text(found.terms, found.parameters)
     worse = worse_trials(problem, found)
     if worse:
