@@ -116,6 +116,7 @@ def improve(
     else:
         exchanges, looked, spread, anew, refused = 0, -1, 0, 0, 0
         beside: set[str] = set()
+        tried_with: set[str] = set()
         seen: dict[str, tuple[Candidate, Array]] = {}
         worse: list[Proposal] = []
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
@@ -139,6 +140,7 @@ def improve(
             if ready and not plain and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
                 at_once, some = search.doing(AT_ONCE), looked_for_at_once(problem, pool)
+                tried_with |= special
                 found = everywhere(
                     at_once, current, own, some, held_out_by(problem), spread > 0, alike, [*seen.values()]
                 )
@@ -190,7 +192,9 @@ def improve(
                 stopped = NO_MORE.format(why=WORSE)
                 break
             climb(rung)
-        current, twins = last_steps(search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew)
+        current, twins = last_steps(
+            search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew, tried_with
+        )
     return _finish(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
 
 

@@ -4,6 +4,7 @@ description comes in the place of another, and what is a little wrong everywhere
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from ee_dist.discrepancy.everywhere import AT_ONCE, Everywhere, everywhere, looked_for_at_once, stands_out
@@ -33,10 +34,12 @@ def last_steps(
     spread: bool,
     seen: Sequence[tuple[Candidate, Array]],
     often: int,
+    tried: AbstractSet[str],
 ) -> tuple[Current, list[Twin]]:
     """The model without what is not told, or the one that does as well and is nearer to the description, or better; and what does
     as well as an effect of it. Where what is a little wrong everywhere (``spread``) had stood in for an effect that only comes in
-    its place here, it is fitted anew beside that, ``often`` times at most."""
+    its place here, it is fitted anew beside that, ``often`` times at most, and not beside what it was ``tried`` with before
+    (names of effects), which would come to the same."""
     problem, robot, asked = search.problem, search.problem.robot, frozenset[str]()
     while True:
         plain = in_plain_terms(search.doing(NOT_TOLD), current, own, pool, strictest(problem))
@@ -57,7 +60,7 @@ def last_steps(
                 found = _beside_a_twin(search, current, own, pool, twins, seen)
         else:
             climb(step)
-            came = [c for c in current.parts if c.name not in before and stands_out(robot, c)]
+            came = [c for c in current.parts if c.name not in {*before, *tried} and stands_out(robot, c)]
             if spread and often and came:
                 left = leftovers(problem, search.on(current.hypothesis).base())
                 if not settled(left, step.error_heldout, problem.noise_floor()[0]):

@@ -116,10 +116,10 @@ def test_small_values_are_fitted_anew_beside_what_came_in_the_place_of_one(monke
     monkeypatch.setattr(ending, "everywhere", everywhere)
     climbed: list[Rung] = []
 
-    def settled(spread: bool, often: int) -> Current:
+    def settled(spread: bool, often: int, tried: frozenset[str] = frozenset()) -> Current:
         climbed.clear()
         pool: list[Candidate] = []
-        return ending.last_steps(search, current, 0, pool, climbed.append, spread, [], often)[0]
+        return ending.last_steps(search, current, 0, pool, climbed.append, spread, [], often, tried)[0]
 
     assert settled(True, 1).parts == (came,) and [r.name for r in climbed][-2:] == ["supply sag", "all anew"]
     assert asked == [tuple(c.name for c in then.parts)]
@@ -129,4 +129,5 @@ def test_small_values_are_fitted_anew_beside_what_came_in_the_place_of_one(monke
     assert settled(False, 1).parts == then.parts, (
         "where nothing is a little wrong everywhere there is nothing to fit anew"
     )
+    assert settled(True, 1, frozenset({came.name})).parts == then.parts, "all of it was tried beside that before"
     assert len(asked) == 1
