@@ -79,3 +79,12 @@ def test_joints_that_were_not_recorded_are_named_with_what_to_do(tmp_path: Path)
     assert "fixed_joints: {" in asked
     (turning,) = proposed(tmp_path, frame.assign(elbow_velocity=np.cos(3.0 * m["t"]))).questions
     assert "of elbow speeds were recorded" in turning and "fixed_joints" not in turning
+
+
+@pytest.mark.parametrize("word", ["torq", "torque", "trq"])
+def test_torques_are_known_by_whatever_they_are_short_for(tmp_path: Path, word: str) -> None:
+    m = samples.motion()
+    joints = {f"{j}_position": m["q"][:, k] for k, j in enumerate(samples.JOINTS)}
+    torques = {f"{word}_{j}": np.sin((k + 1) * m["t"]) for k, j in enumerate(samples.JOINTS)}
+    found = proposed(tmp_path, pd.DataFrame({"t": m["t"], **joints, **torques}))
+    assert [c.entry["column"] for c in found.choices if c.group == "torques"] == list(torques)

@@ -11,6 +11,7 @@ from typing import Any
 import measurement_files as samples
 import numpy as np
 import odd_files
+import pandas as pd
 import pytest
 import small_logs as logs
 
@@ -45,6 +46,16 @@ def test_a_file_without_a_mapping_becomes_a_recording(tmp_path: Path, command: C
     for metadata in kept:
         (line,) = changed_sources(metadata)
         assert str(robot) in line and "has changed since the import" in line
+
+
+def test_what_a_description_is_to_say_first_makes_another_proposal(tmp_path: Path, command: Command) -> None:
+    """The mapping that was written knows nothing of it."""
+    m = samples.motion()
+    frame = pd.DataFrame({"time_s": m["t"], "shoulder_position": m["q"][:, 0], "shoulder_effort": np.sin(m["t"])})
+    given = (f"measured={logs.written(tmp_path, frame)}", "robot=urdf", f"robot.drives={samples.robot_file(tmp_path)}")
+    status, _, complaint = command(*given, f"hydra.run.dir={tmp_path / 'out'}")
+    assert status == 2
+    assert "fixed_joints: {elbow: 0.0}" in complaint and complaint.rstrip().endswith("; then the same again")
 
 
 def test_a_log_of_a_servo_drive_comes_in_at_five_kilohertz_or_at_the_rate_that_is_asked_for(
