@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import glob
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -31,8 +33,21 @@ def real(path: str | Path) -> Path:
     return Path(os.path.realpath(path))
 
 
-def named(path: str | Path) -> list[Path]:
-    """The file or folder of that name, or all that match it as a pattern (``runs/sine_*.csv``), by name. What matches nothing
-    is left as it is, so that whoever opens it says what is wrong."""
-    found = [] if os.path.lexists(path) else sorted(glob.glob(str(path), recursive=True))
-    return [Path(f) for f in found] or [Path(path)]
+def named(asked: Any) -> list[Path]:
+    """The files and folders that a setting names, one or several: each by its name, or all that match it as a pattern
+    (``runs/sine_*.csv``), by name. What matches nothing is left as it is, so that whoever opens it says what is wrong."""
+    found: list[Path] = []
+    for path in map(str, asked if isinstance(asked, (list, tuple)) else [asked]):
+        matching = [] if os.path.lexists(path) else sorted(glob.glob(path, recursive=True))
+        found += map(Path, matching or [path])
+    return found
+
+
+def repeated(files: Sequence[Path]) -> Path | None:
+    """The first of some files that is one of those before it, by whatever path."""
+    known: set[Path] = set()
+    for file in files:
+        if real(file) in known:
+            return file
+        known.add(real(file))
+    return None

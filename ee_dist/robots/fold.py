@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.robots.kinematics import compose
-from ee_dist.robots.mass_matrix import rotation_matrix
+from ee_dist.robots.mass_matrix import rotation_matrix, symmetric
 from ee_dist.robots.model import NO_TURN, ZERO3, Joint, Part, Quat, Shape, Vec3
 
 DUMMY_KG = 1e-6
@@ -96,8 +96,7 @@ def _joined(carrier: Part, part: Part, at: Pose) -> Part:
 
 def tensor(part: Part) -> NDArray[np.float64]:
     """(3, 3) inertia about the centre of mass, in the axes of the part."""
-    xx, yy, zz, xy, xz, yz = part.inertia_kg_m2
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return symmetric(part.inertia_kg_m2)
 
 
 def entries(matrix: NDArray[np.float64]) -> tuple[float, float, float, float, float, float]:

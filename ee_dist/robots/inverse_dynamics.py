@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.bodies import Member, bodies_of
-from ee_dist.robots.mass_matrix import rotation_matrix
+from ee_dist.robots.fold import entries, tensor
+from ee_dist.robots.mass_matrix import rotation_matrix, symmetric
 from ee_dist.robots.model import Joint, Part, Robot, RobotError
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ def torques_of_parts(robot: Robot, position: Array, speed: Array, acceleration: 
         if joint.name in masses:
             own = masses[joint.name]
             turn, w, dw, pull = course.turn[part], course.spin[part], course.spin_rate[part], course.pull[part]
-            centre, inertia = turn @ own[1:4], _tensor(own[4:])
+            centre, inertia = turn @ own[1:4], symmetric(own[4:])
             w_in, dw_in = (np.einsum("tji,tj->ti", turn, v) for v in (w, dw))
             force = force + own[0] * pull + _cross(dw, centre) + _cross(w, _cross(w, centre))
             about = dw_in @ inertia + _cross(w_in, w_in @ inertia)
@@ -121,15 +122,9 @@ def _about_frame(part: Part, at: Member) -> Array:
     m, (x, y, z), inertia = part.mass_kg, part.com_m, part.inertia_kg_m2
     if at.turn is not None:
         x, y, z = (float(v) for v in at.turn @ np.array(part.com_m) + at.place_m)
-        own = at.turn @ _tensor(np.array(inertia)) @ at.turn.T
-        inertia = (own[0, 0], own[1, 1], own[2, 2], own[0, 1], own[0, 2], own[1, 2])
+        inertia = entries(at.turn @ tensor(part) @ at.turn.T)
     shift = (y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z)
     return np.array([m, m * x, m * y, m * z, *(i + m * s for i, s in zip(inertia, shift, strict=True))])
-
-
-def _tensor(entries: Array) -> Array:
-    xx, yy, zz, xy, xz, yz = entries
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def rotors(robot: Robot) -> Array:

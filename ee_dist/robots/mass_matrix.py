@@ -33,6 +33,12 @@ def rotation_matrix(quaternion: tuple[float, float, float, float]) -> Array:
     )
 
 
+def symmetric(entries: Sequence[float] | Array) -> Array:
+    """(3, 3) of (xx, yy, zz, xy, xz, yz)."""
+    xx, yy, zz, xy, xz, yz = entries
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
 @dataclass(frozen=True, eq=False)
 class Places:
     """Where the joints and parts of robots with the same joints are, at positions (P, joints that move).
@@ -141,8 +147,7 @@ def _rotors(robot: Robot, places: Places) -> Array:
 def _of_part(places: Places, name: str, mass_kg: float, com_m: Vec3, inertia_kg_m2: tuple[float, ...]) -> Array:
     """(P, w, w) what a part adds, for the coordinates that move it."""
     _, facing = places.part[name]
-    xx, yy, zz, xy, xz, yz = inertia_kg_m2
-    inertia = facing @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ facing.swapaxes(1, 2)
+    inertia = facing @ symmetric(inertia_kg_m2) @ facing.swapaxes(1, 2)
     linear, angular = _jacobians(places, name, com_m)
     added: Array = mass_kg * linear @ linear.swapaxes(1, 2) + angular @ inertia @ angular.swapaxes(1, 2)
     return added

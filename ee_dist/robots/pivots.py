@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ee_dist.robots.fold import entries, tensor
 from ee_dist.robots.model import Part, RobotError
 
 PIVOT_HINT = "hint: the inertia of "
@@ -18,17 +19,13 @@ def about_centre(part: Part, where: str) -> Part:
     Who enters the moment about the joint's axis often enters it about every axis. No body is spread like that: a moment beyond
     the sum of the two others is taken down to it.
     """
-    xx, yy, zz, xy, xz, yz = part.inertia_kg_m2
     away = np.array(part.com_m)
-    stated = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    tensor = stated - part.mass_kg * (away @ away * np.eye(3) - np.outer(away, away))
-    moments, axes = np.linalg.eigh(tensor)
+    stated_kg_m2 = max(part.inertia_kg_m2[:3])
+    moments, axes = np.linalg.eigh(tensor(part) - part.mass_kg * (away @ away * np.eye(3) - np.outer(away, away)))
     if moments[0] <= 0:
         raise RobotError(
             f"{where}: inertia_about: joint: {part.name!r} of {part.mass_kg:g} kg, {np.linalg.norm(away):.3g} m from its joint, "
-            f"has more inertia about the joint than the {max(xx, yy, zz):.3g} kg.m^2 stated: they are about its centre"
+            f"has more inertia about the joint than the {stated_kg_m2:.3g} kg.m^2 stated: they are about its centre"
         )
     moments[2] = min(moments[2], moments[0] + moments[1])
-    t = axes @ np.diag(moments) @ axes.T
-    xx, yy, zz, xy, xz, yz = (float(t[i, k]) for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-    return replace(part, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
+    return replace(part, inertia_kg_m2=entries(axes @ np.diag(moments) @ axes.T))

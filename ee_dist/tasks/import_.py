@@ -18,7 +18,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from ee_dist.basics.files import named, real, write_whole
+from ee_dist.basics.files import named, real, repeated, write_whole
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
@@ -238,10 +238,9 @@ def files_of(measured: Any, kind: str | None = None) -> tuple[list[Path], list[s
     """
     if not measured:
         raise MeasurementError("measured=: which file? name one, several as [a.csv,b.csv], or a folder")
-    names = measured if isinstance(measured, (list, tuple)) else [measured]
     files: list[Path] = []
     notes: list[str] = []
-    for path in (p for name in names for p in named(str(name))):
+    for path in named(measured):
         if path.is_dir() and kind_of(path) is None:
             inside, remarks = recordings_in(path, kind)
             if not inside:
@@ -251,9 +250,8 @@ def files_of(measured: Any, kind: str | None = None) -> tuple[list[Path], list[s
             notes += remarks
         else:
             files.append(path)
-    twice = [f for k, f in enumerate(files) if real(f) in [real(g) for g in files[:k]]]
-    if twice:
-        raise MeasurementError(f"measured={twice[0]}: the same file twice; name each once")
+    if (twice := repeated(files)) is not None:
+        raise MeasurementError(f"measured={twice}: the same file twice; name each once")
     return files, notes
 
 

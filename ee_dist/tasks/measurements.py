@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ee_dist.basics.files import named, real
+from ee_dist.basics.files import named, repeated
 from ee_dist.basics.names import listed, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.lags import with_lags
@@ -214,8 +214,7 @@ def files_of(measured: Any) -> list[Path]:
     if not measured:
         raise ConfigError("measured=: which log? name an .mcap, several as [a.mcap,b.mcap], or the folder of a trial")
     found: list[Path] = []
-    names = measured if isinstance(measured, (list, tuple)) else [measured]
-    for path in (p for name in names for p in named(str(name))):
+    for path in named(measured):
         if path.is_dir():
             inside = sorted(path.glob("*.mcap"))
             if not inside:
@@ -231,10 +230,9 @@ def files_of(measured: Any) -> list[Path]:
             raise ConfigError(f"measured={path}: not a recording; bring it in first: task=import measured={path}")
         else:
             found.append(path)
-    twice = [p for k, p in enumerate(found) if real(p) in [real(q) for q in found[:k]]]
-    if twice:
+    if (twice := repeated(found)) is not None:
         # What is held out would be what was fitted.
-        raise ConfigError(f"measured={twice[0]}: the same log twice; name each once")
+        raise ConfigError(f"measured={twice}: the same log twice; name each once")
     return found
 
 

@@ -94,15 +94,12 @@ def improve_account(
         ties[t.name] = [*ties.get(t.name, []), t.term.name]
     told = names | {t.term.name for t in found.twins}
     gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in told)
-    of_joints = {t.effect for t in found.terms}
-    single = list(dict.fromkeys(plain(e) for d in gone if (e := d.partition("@")[0]) in of_joints))
-    lines += [
-        f"Dropped again: {placed(d)}, which a later effect made useless."
-        for d in gone
-        if d.partition("@")[0] not in of_joints
-    ]
-    if single:
-        lines.append(f"Shared at first, and of other joints or of each by itself since: {'; '.join(single)}.")
+    kind = {d: d.partition("@")[0] for d in gone}
+    elsewhere = [d for d in gone if kind[d] in {t.effect for t in found.terms}]
+    lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone if d not in elsewhere]
+    if elsewhere:
+        kinds = dict.fromkeys(plain(kind[d]) for d in elsewhere)
+        lines.append(f"Shared at first, and of other joints or of each by itself since: {'; '.join(kinds)}.")
     # What may be nothing is no news, whatever depends on it together with others.
     parts = sorted(shares(found, robot), key=lambda s: (s.terms[0] not in wrong, may_be_nothing(found, s.terms)))
     lines += doubt_text([s for s in parts if s.doubted])

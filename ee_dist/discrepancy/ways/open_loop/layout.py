@@ -71,7 +71,7 @@ def lay_out(
         floor=np.concatenate(floor),
         known=np.concatenate(known),
         channels=(*robot.sensor_names, *(f"command_{m}" for m in computed)),
-        units=(*(x.unit for x in robot.sensors), *(joint_unit(robot, m) for m in computed)),
+        units=(*(x.unit for x in robot.sensors), *(_joint_unit(robot, m) for m in computed)),
         joint_of_channel=joints_of(robot, [*(x.target for x in robot.sensors), *computed]),
     )
     return layout, slices
@@ -93,5 +93,5 @@ def _middles(robot: Robot, part: Stretch, filled: bool, size: int) -> Array:
     return block_sums(log.times_s[log.readings][:, None], size)[:, 0] / size + half
 
 
-def joint_unit(robot: Robot, joint: str) -> str:
+def _joint_unit(robot: Robot, joint: str) -> str:
     return "m" if robot.joint(joint).kind == "slide" else "rad"

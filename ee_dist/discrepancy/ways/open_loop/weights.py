@@ -7,7 +7,7 @@ that is so: what they differ in counts for less (see predictability.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -59,11 +59,11 @@ class Weights:
     @property
     def tiny(self) -> Array:
         """(S,) roughness that is too small to count."""
-        return (TINY * self.scale.scale) ** 2
+        return _tiny(self.scale)
 
     def rough(self, predicted: Digest) -> Array:
         """(windows, S) of a prediction, with the noise that no description declares."""
-        return np.asarray(predicted.rough + self.undeclared + self.tiny)
+        return _rough(predicted, self.undeclared, self.tiny)
 
     def floors(self, part: int, soft: float) -> tuple[list[Array], list[Array]]:
         """Mean squares of a part's values under a perfect model, and what of them is no noise: of means (blocks * S,), then of
@@ -71,7 +71,7 @@ class Weights:
         # How far noise moves the log of roughness beside what is too small to count, as a share of what it does alone.
         noise = self.scale.noise**2
         noisy = (noise / (noise + self.tiny) * (1.0 + TINY**2)) ** 2
-        pure = 2 * 1.95 / self.window + 0.01
+        pure = _by_luck(self.window)
         (means, texture), off, grain_off = self.known[part], self.deviation[part] ** 2, self.grain_deviation[part] ** 2
         left = means / off
         share = (noise / self.block + self.begun[part]) / off + left
@@ -96,29 +96,35 @@ def weigh(
     found = predictor.digests(pairs)
     first = found[::count]
     repeats = repeating(robot, zip(data, first, moving, strict=True), window)
-    weights = Weights(
-        scale,
-        block,
-        window,
-        (),
-        (),
-        tuple(predictor.by_start(k, m) for k, m in pairs[::count]),
-        tuple(known),
-        _rougher(robot, scale, data, first),
-        frozenset(repeats),
-    )
+    undeclared, tiny = _rougher(robot, scale, data, first), _tiny(scale)
+    begun = tuple(predictor.by_start(k, m) for k, m in pairs[::count])
     deviation, grain_deviation = [], []
     for k in range(len(held)):
         base, others = first[k], [d for d in found[k * count + 1 : (k + 1) * count] if d.finite]
-        noise = scale.scale**2 / block + weights.begun[k] + known[k][0]
+        noise = scale.scale**2 / block + begun[k] + known[k][0]
         spread = np.zeros_like(base.means, dtype=float)
         grain = np.zeros_like(base.rough, dtype=float)
         if others and base.finite:
             spread = np.mean([(d.means.astype(float) - base.means) ** 2 for d in others], axis=0)
-            grain = np.mean([np.log(weights.rough(d) / weights.rough(base)) ** 2 for d in others], axis=0)
+            usual = _rough(base, undeclared, tiny)
+            grain = np.mean([np.log(_rough(d, undeclared, tiny) / usual) ** 2 for d in others], axis=0)
         deviation.append(np.sqrt(noise + _held_up(spread)))
-        grain_deviation.append(np.sqrt(2 * 1.95 / window + 0.01 + known[k][1] + _held_up(grain)))
-    return replace(weights, deviation=tuple(deviation), grain_deviation=tuple(grain_deviation))
+        grain_deviation.append(np.sqrt(_by_luck(window) + known[k][1] + _held_up(grain)))
+    settled = tuple(deviation), tuple(grain_deviation), begun, tuple(known), undeclared, repeats
+    return Weights(scale, block, window, *settled)
+
+
+def _tiny(scale: Scale) -> Array:
+    return (TINY * scale.scale) ** 2
+
+
+def _rough(predicted: Digest, undeclared: Array, tiny: Array) -> Array:
+    return np.asarray(predicted.rough + undeclared + tiny)
+
+
+def _by_luck(window: int) -> float:
+    """Mean square that noise makes of a difference of the log of roughness over so many readings."""
+    return 2 * 1.95 / window + 0.01
 
 
 def _held_up(spread: Array) -> Array:
