@@ -30,6 +30,7 @@ from benchmarks.arm6 import desk_arm_6
 from benchmarks.cases import tried
 
 from ee_dist.discrepancy.accounts.of_improve import may_be_nothing
+from ee_dist.discrepancy.accounts.ranges import as_loads
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.importance import added, shares
 from ee_dist.discrepancy.improve import improve
@@ -187,7 +188,7 @@ class Bench:
         that no value is told from neutral."""
         steps = [r for r in result.ladder if r.added]
         named = {t.name for t in result.terms} | {name for r in steps for name in r.tied_with}
-        named |= {t.term.name for t in result.twins}
+        named |= {t.term.name for t in result.twins} | {t.name for t in as_loads(self.robot, result.terms)}
         found.within = all(self.covers(named, h) for h in hidden)
         at = {(t.effect, t.target) for t in truth}
         doubted = {t.name for s in shares(result, self.robot) if s.doubted for t in s.terms}

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.effects.catalogue import FAMILIES, Hypothesis
+from ee_dist.effects.catalogue import FAMILIES, Beside, Hypothesis
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
@@ -167,6 +167,11 @@ class Problem(ABC):
     def trial_error(self, residual: Array, trial: int) -> float:
         """The error of one trial by itself, of the residual (n,) of all."""
         return error(residual[self.trial_of == trial]) / math.sqrt(self.weight_of(trial))
+
+    def beside(self, residual: Array, channel: int) -> list[Beside]:
+        """What a sensor read and what the model that leaves ``residual`` (n,) predicts of it, of each trial that was simulated;
+        none where a way cannot tell one from the other."""
+        return []
 
     def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
         """The simulated motion of each trial with the poses of all parts; None where nothing is simulated."""

@@ -14,7 +14,7 @@ import math
 import re
 import sys
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from numbers import Real
@@ -85,6 +85,15 @@ SLIDE_UNITS = {
 RESERVED = frozenset({"effect", "target", "effect_name"})
 
 
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """What a sensor read in a trial and what a model predicts, (N,) each, at times (N,) since the trial began, s."""
+
+    times_s: Array
+    measured: Array
+    predicted: Array
+
+
 @dataclass(frozen=True)
 class Effect:
     """An entry of the catalogue. ``physics`` and ``signature`` are for people: what it is, what it leaves in a residual."""
@@ -118,6 +127,8 @@ class Effect:
     seen_at: Callable[[Robot, str, Array, Array], Mapping[str, float]] | None = None
     """Its values as the commands (T,) and positions (T,) of a joint show them, of all trials and as late as they are; empty where
     they show none, and there it is not proposed unasked."""
+    seen_beside: Callable[[Sequence[Beside]], Mapping[str, float]] | None = None
+    """Its values as what a model leaves of a sensor shows them: a search looks there too. Empty where it shows none."""
     plainer: str = ""
     """The effect that says most of it with fewer numbers: what a search asks for in its place, once all else is known."""
     mistake: bool = False
@@ -207,6 +218,10 @@ class Effect:
         """The same, as commands (T,) and positions (T,) of a joint show them (``seen_at``)."""
         return {} if self.seen_at is None else self._shown("seen_at", partial(self.seen_at, robot, joint, told, at))
 
+    def shown_beside(self, trials: Sequence[Beside]) -> dict[str, float]:
+        """The same, as a sensor beside a model without it shows them (``seen_beside``)."""
+        return {} if self.seen_beside is None else self._shown("seen_beside", partial(self.seen_beside, trials))
+
     def _shown(self, called: str, look: Callable[[], Mapping[str, float]]) -> dict[str, float]:
         try:
             found = dict(look())
@@ -285,6 +300,7 @@ def effect(
     guesses: Callable[[Robot], tuple[str, ...]] | None = None,
     seen_in: Callable[[Array], Mapping[str, float]] | None = None,
     seen_at: Callable[[Robot, str, Array, Array], Mapping[str, float]] | None = None,
+    seen_beside: Callable[[Sequence[Beside]], Mapping[str, float]] | None = None,
     plainer: str = "",
     mistake: bool = False,
 ) -> Callable[[Transform], Transform]:
@@ -322,6 +338,7 @@ def effect(
             guesses,
             seen_in,
             seen_at,
+            seen_beside,
             plainer,
             mistake,
         )

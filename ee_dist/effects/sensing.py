@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import Beside, Parameter, effect
 from ee_dist.effects.scales import Range, always, longest_delay
 from ee_dist.effects.targets import continuous_sensors, sensor_groups, sensors, touch_sensors
 from ee_dist.robots.model import Robot, Sensor
@@ -156,6 +158,30 @@ def sensor_quantisation(robot: Robot, target: str, values: Mapping[str, float]) 
     return robot.with_sensor(target, quantum=max(_sensor(robot, target).quantum, values["step"]))
 
 
+def _sticks(trials: Sequence[Beside]) -> Mapping[str, float]:
+    """The moment from which on a share of the movement since then is missing, and that share, by least squares over every moment
+    that there is: between two of them the value at which it would stick goes up and down, so that no slope leads there."""
+    moments = max((t.times_s for t in trials), key=len, default=np.zeros(0))
+    along, reach = np.zeros(len(moments)), np.zeros(len(moments))
+    for t in trials:
+        at = np.clip(np.searchsorted(t.times_s, moments, side="right") - 1, 0, None)
+        gap, moved = t.measured - t.predicted, t.predicted - t.predicted.mean()
+
+        def after(values: Array, at: Array = at) -> Array:
+            total = np.cumsum(values)
+            return np.asarray(total[-1] - total[at])
+
+        here = moved[at]
+        along += here * after(gap) - after(gap * moved)
+        reach += after(moved**2) - 2 * here * after(moved) + here**2 * (len(moved) - 1 - at)
+    if not np.any(reach > 0):
+        return {}
+    share = np.clip(np.divide(along, reach, out=np.zeros_like(along), where=reach > 0), 0.0, 1.0)
+    gained = 2 * share * along - share**2 * reach
+    best = int(gained.argmax())
+    return {"share": float(share[best]), "from_s": float(moments[best])} if gained[best] > 0 else {}
+
+
 @effect(
     "sensor_stuck",
     family="sensing",
@@ -170,6 +196,7 @@ def sensor_quantisation(robot: Robot, target: str, values: Mapping[str, float]) 
     signature="One channel stays at a value that it once truly had, which need not be zero, while all others move on.",
     reference=FAULTS,
     ranges=always(from_s=(0.0, 5.0)),
+    seen_beside=_sticks,
 )
 def sensor_stuck(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
     if values["share"] == 0:

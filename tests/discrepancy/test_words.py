@@ -12,7 +12,7 @@ from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
-from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, weight_text
+from ee_dist.discrepancy.accounts.ranges import as_loads, beyond_a_guess, load_text, weight_text
 from ee_dist.discrepancy.assumed import LABEL
 from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
@@ -22,7 +22,7 @@ from ee_dist.discrepancy.ladder import Twin
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.words import percent, percents, phrase, plain, span, told, told_all
-from ee_dist.effects.catalogue import Term, term
+from ee_dist.effects.catalogue import Term, apply, term
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.robots.servo_pendulum import servo_pendulum
@@ -389,6 +389,25 @@ def test_of_drives_that_were_assumed_only_what_the_data_tell_is_named(flag: str,
     assert head.startswith("Not what was assumed: coulomb friction") and said in head
     assert not any("commanded to move" in line for line in of(moving).lines)
     assert any("Only 0 joints of 1 are commanded to move here" in line for line in of(still).lines)
+
+
+@pytest.mark.parametrize(("mass", "x"), [(0.1, 0.03), (0.2, -0.05)])
+def test_a_mass_and_a_centre_that_are_a_load_in_other_words_are_told_to_be_one(mass: float, x: float) -> None:
+    robot = servo_pendulum()
+    arm = robot.parts[1]
+    held = apply(robot, (term("payload", arm.name, mass_kg=mass, x_m=x, y_m=0.0, z_m=-0.1),)).part(arm.name)
+    moved = [b - a for a, b in zip(arm.com_m, held.com_m, strict=True)]
+    shifted = term("com_shifted", arm.name, **dict(zip(("along_x_m", "along_y_m", "along_z_m"), moved, strict=True)))
+    heavier = term("part_mass", arm.name, change=mass / arm.mass_kg)
+    (load,) = as_loads(robot, (heavier, shifted))
+    assert load.name == f"payload@{arm.name}"
+    assert list(dict(load.values).values()) == pytest.approx([mass, x, 0.0, -0.1])
+    (line,) = load_text(robot, (heavier, shifted))
+    assert f"{mass:.3g} kg" in line and "load" in line
+    lighter = term("part_mass", arm.name, change=-0.3)
+    far = term("com_shifted", arm.name, along_x_m=3.0, along_y_m=0.0, along_z_m=0.0)
+    assert not load_text(robot, (heavier,)) and not load_text(robot, (shifted,)), "one of them says what it says"
+    assert not load_text(robot, (lighter, shifted)) and not load_text(robot, (heavier, far))
 
 
 def test_all_that_moves_being_much_heavier_than_described_is_told() -> None:

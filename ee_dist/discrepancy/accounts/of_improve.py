@@ -27,7 +27,15 @@ from ee_dist.discrepancy.accounts.account import (
     unsure_of,
     was_or_were,
 )
-from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, flag_texts, ranges, rest_text, scale_text, weight_text
+from ee_dist.discrepancy.accounts.ranges import (
+    beyond_a_guess,
+    flag_texts,
+    load_text,
+    ranges,
+    rest_text,
+    scale_text,
+    weight_text,
+)
 from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, ENDED, HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.discrepancy.explain import NOTHING_MISSING
@@ -110,7 +118,8 @@ def improve_account(
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += flag_texts(found.terms, found.parameters)
     lines += beyond_a_guess(robot, found.terms, found.parameters)
-    lines += weight_text(robot, found.terms) + ([] if torques_compared(problem) else scale_text(robot, found.terms))
+    lines += load_text(robot, found.terms) + weight_text(robot, found.terms)
+    lines += [] if torques_compared(problem) else scale_text(robot, found.terms)
     lines += rest_text(found.terms, found.parameters)
     worse = worse_trials(problem, found)
     if worse:

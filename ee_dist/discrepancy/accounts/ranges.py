@@ -19,13 +19,17 @@ from ee_dist.discrepancy.evidence.intervals import (
     called,
 )
 from ee_dist.discrepancy.torque_scale import of_masses
-from ee_dist.discrepancy.words import placed, plain, quantity, span
+from ee_dist.discrepancy.words import phrase, placed, plain, quantity, span
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term, apply
 from ee_dist.robots.model import Robot
 from ee_dist.robots.starter import moving_mass
 
 WEIGHS = 1.3
 """Times heavier (lighter) than described from which all that moves is told to be so."""
+HEAVIER = 0.1
+"""Share of a part's mass that must be added to it for a load to be told."""
+BEYOND = 1.5
+"""How far beyond what is worth trying of a load it may be: a centre that is a little off puts a light one far away."""
 LISTED = 3
 """Places that a line lists; of more the table of values tells."""
 
@@ -93,6 +97,31 @@ def weight_text(robot: Robot, terms: Hypothesis) -> list[str]:
     return [
         f"All that moves weighs {now:.3g} kg in this model, and {was:.3g} kg as it is described: a scale would tell, and of what "
         "only moves together the data may tell no more than sums and ratios."
+    ]
+
+
+def as_loads(robot: Robot, terms: Hypothesis) -> list[Term]:
+    """The loads that parts carry in other words: the payload at each part of which the model has a larger mass and another
+    centre, where such a load may be. Of what is felt at the joints the two ways of saying it differ by inertias alone."""
+    payload, now, found = CATALOGUE["payload"], apply(robot, terms), []
+    for part in dict.fromkeys(t.target for t in terms if t.effect == "com_shifted"):
+        was, is_ = robot.part(part), now.part(part)
+        more = is_.mass_kg - was.mass_kg
+        if not more > HEAVIER * was.mass_kg or part not in payload.targets(robot):
+            continue
+        at = [(is_.mass_kg * b - was.mass_kg * a) / more for a, b in zip(was.com_m, is_.com_m, strict=True)]
+        load = Term("payload", part, tuple(zip((p.name for p in payload.parameters), (more, *at), strict=True)))
+        worth = payload.bounds(robot, part)
+        if all(BEYOND * worth[n][0] <= value <= BEYOND * worth[n][1] for n, value in load.values):
+            found.append(load)
+    return found
+
+
+def load_text(robot: Robot, terms: Hypothesis) -> list[str]:
+    """A line for each load that the model says in other words."""
+    return [
+        f"Mass and centre of {plain(t.target)} together are what a load there would make of them: {phrase((t,), robot)}."
+        for t in as_loads(robot, terms)
     ]
 
 

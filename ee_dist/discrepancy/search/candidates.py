@@ -116,6 +116,11 @@ class Candidate:
             points += [u + side * share * np.eye(self.size)[k] for u in beside for side in sides for share in shares]
         return [*points, *self.hinted]
 
+    def has(self, values: Mapping[str, float]) -> bool:
+        """Whether values are among those worth trying."""
+        ends = zip(self.effect.parameters, self.bounds, strict=True)
+        return all(low <= values[p.name] <= high for p, (low, high) in ends)
+
     @property
     def hinted(self) -> list[Array]:
         """The point that the measurements show by themselves, if there is one."""

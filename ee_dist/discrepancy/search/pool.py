@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -158,7 +158,7 @@ def _seen_at(problem: Problem, c: Candidate, named: bool) -> Candidate | None:
     both = np.concatenate(told or [np.zeros(0)]), np.concatenate(at or [np.zeros(0)])
     known = np.isfinite(both[0]) & np.isfinite(both[1])
     values = c.effect.shown_at(robot, c.target, both[0][known], both[1][known])
-    if values and _within(c, values):
+    if values and c.has(values):
         return replace(c, hint=tuple(c.shares(values).tolist()))
     return c if named else None
 
@@ -170,12 +170,6 @@ def _hinted(problem: Problem, c: Candidate) -> Candidate:
     at = problem.robot.sensor_names.index(c.target)
     read = [log.sensors[log.readings, at] for log in (t.log for t in problem.measured)]
     values = c.effect.shown_in(np.concatenate(read)) if read else {}
-    if not values or not _within(c, values):
+    if not values or not c.has(values):
         return c
     return replace(c, hint=tuple(c.shares(values).tolist()))
-
-
-def _within(c: Candidate, values: Mapping[str, float]) -> bool:
-    """Whether values are among those worth trying."""
-    ends = zip(c.effect.parameters, c.bounds, strict=True)
-    return all(low <= values[p.name] <= high for p, (low, high) in ends)

@@ -14,9 +14,11 @@ from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.search.fitted import Fit
 from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.rows import NOISE, over_rows
+from ee_dist.discrepancy.search.screen import seen_beside
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.discrepancy.search.trials import telling_values
+from ee_dist.discrepancy.search.valley import NARROWEST, follow_valley
 from ee_dist.trials.log import Array
 
 MOVES = (0.0125, 0.03, 0.1, 0.3)
@@ -47,8 +49,26 @@ def over_ridges(search: Search, fit: Fit, prior: float = 0.0) -> Fit:
         if not best.energy < wanted:
             best = over_rows(search, fit, wanted, prior)
         if not best.energy < wanted:
+            best = _seen_anew(search, fit, wanted, prior)
+        if not best.energy < wanted:
             break
         fit = best
+    return fit
+
+
+def _seen_anew(search: Search, fit: Fit, wanted: float, prior: float) -> Fit:
+    """The fit, or one of the same model of less energy than ``wanted``, begun from what a sensor shows of an effect beside all
+    else that the model has by now."""
+    for c, place in zip(fit.model.parts, fit.model.places, strict=True):
+        if c.effect.seen_beside is None:
+            continue
+        others = tuple(t for t in fit.hypothesis if t.name != c.name)
+        shown = seen_beside(search.problem, c, search.on(others).base()).hint
+        if shown and np.abs(fit.u[place] - shown).max() > 0:
+            u = fit.u.copy()
+            u[place] = shown
+            (found,) = follow_valley(search, [(fit.model, u)], fit.mask, prior, widths=(NARROWEST,))
+            fit = found if found.energy < wanted else fit
     return fit
 
 

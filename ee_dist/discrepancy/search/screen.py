@@ -8,10 +8,11 @@ this is exact from a single probe; for others a probe of the right size comes cl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.search import Search
@@ -56,6 +57,7 @@ def screen(
     them may show further on. One ``trial`` of the search, where one is named, is enough for all this, but for what does not show
     in it at all."""
     whole = _Ground.of(search, refit)
+    pool = [seen_beside(search.problem, c, whole.base) for c in pool]
     alone = whole if trial is None or search.trials == (trial,) else _Ground.of(search.among([trial]), refit)
     if alone.total <= 0:
         alone = whole
@@ -126,6 +128,14 @@ class _Probe:
     def unbounded(self) -> float:
         """Energy that the change would take off at the best of all sizes."""
         return self.along**2 / self.reach if self.reach > 0 else 0.0
+
+
+def seen_beside(problem: Problem, c: Candidate, residual: Array) -> Candidate:
+    """The candidate with what its sensor shows of its values beside a model that leaves ``residual`` (n,)."""
+    if c.effect.seen_beside is None or c.target not in problem.robot.sensor_names:
+        return c
+    values = c.effect.shown_beside(problem.beside(residual, problem.robot.sensor_names.index(c.target)))
+    return replace(c, hint=tuple(c.shares(values).tolist())) if values and c.has(values) else c
 
 
 def _smallest(c: Candidate, shares: Sequence[float]) -> list[Array]:

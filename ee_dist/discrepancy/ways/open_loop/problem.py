@@ -46,7 +46,7 @@ from ee_dist.discrepancy.ways.open_loop.stretches import (
 from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
 from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, Weights, soften, weigh
-from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
+from ee_dist.effects.catalogue import Beside, Hypothesis, applied, apply, find
 from ee_dist.effects.groups import members_of
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
@@ -327,6 +327,19 @@ class OpenLoop(Problem):
     def raw_blocks(self, part: int, residual: Array) -> Array:
         """The same before softening, in the units of the channels."""
         return np.asarray(self.smooth(self.blocks(part, residual)) * self.weights.deviation[part])
+
+    def beside(self, residual: Array, channel: int) -> list[Beside]:
+        """By the means of blocks."""
+        found = []
+        for k, part in enumerate(self.parts):
+            if not np.isfinite(mine := residual[self.slices[k]]).all() or not mine.any():
+                continue
+            measured = self._data[k].means[:, channel].astype(float)
+            log, of_blocks = part.run.log, len(measured) * self.block
+            began = log.times_s[0] - (part.run.begun.after_s if part.run.begun else 0.0)
+            times = log.times_s[log.readings][:of_blocks].reshape(-1, self.block).mean(axis=1) - began
+            found.append(Beside(times, measured, measured - self.raw_blocks(k, residual)[:, channel]))
+        return found
 
     def raw_grain(self, part: int, residual: Array) -> Array:
         """(R // window, S): differences of the log of roughness, before softening."""
