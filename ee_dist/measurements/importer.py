@@ -19,7 +19,7 @@ from ee_dist.measurements.led import Led
 from ee_dist.measurements.looking import Looked, repeats
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.on_grid import OnGrid
-from ee_dist.measurements.reading import told_of
+from ee_dist.measurements.reading import holes_told, told_of
 from ee_dist.measurements.report import Report, in_one_line
 from ee_dist.measurements.robot_channels import check_names
 from ee_dist.measurements.sampling import LowPass
@@ -79,6 +79,7 @@ class _Import:
         """``paces``: seconds between readings by table, of the trials in which that shows. Raises MeasurementError."""
         self.on.at_paces(paces)
         self.report.done += told_of(self.on.clocks, self.on.read_at)
+        self.report.suspicious += holes_told(self.mapping, self.on.clocks)
         positions = self._sensors()
         self.report.suspicious += repeats(self.mapping, self.on.clocks, self.on.paces())
         torques = self.led.torques()

@@ -12,7 +12,7 @@ from ee_dist.measurements.clocks import Clocked, check_grid, other_clocks
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.held_readings import written_late
 from ee_dist.measurements.mapping import Column, Mapping
-from ee_dist.measurements.reading import between_readings, paces_of, rows_read
+from ee_dist.measurements.reading import between_readings, holes, paces_of, rows_read
 from ee_dist.measurements.report import TORQUE, Report
 from ee_dist.measurements.sampling import carried, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import clock_suspicion, rolled_over, spike_suspicion, suspicions, time_suspicion
@@ -89,7 +89,8 @@ class OnGrid:
     def filled(self) -> Array | None:
         """(T,) which rows lie between readings; None where none does. Tells how many."""
         rows_s = self._rows_s() if self.as_is else None
-        return between_readings(self.at_s, rows_s, self.main, self.clocks, self.read_at, self.report.done)
+        empty = holes(self.mapping, self.clocks)
+        return between_readings(self.at_s, rows_s, self.main, self.clocks, self.read_at, self.report.done, empty)
 
     def _rows_s(self) -> Array:
         """When the rows of the log were, (T,) s since the main table began. Rows that are taken sample by sample count as evenly

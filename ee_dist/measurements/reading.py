@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as AnyMapping
+from collections.abc import Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +12,12 @@ from numpy.typing import NDArray
 from ee_dist.measurements.clocks import Clocked
 from ee_dist.measurements.held_readings import held_readings
 from ee_dist.measurements.mapping import Column, Mapping
-from ee_dist.measurements.sampling import filled
+from ee_dist.measurements.sampling import GAP, filled
 from ee_dist.trials.log import Array
 
 Rows = NDArray[np.intp]
+SHOWN = 3
+"""Runs of empty cells that are told by themselves."""
 
 
 def rows_read(
@@ -35,6 +39,37 @@ def rows_read(
         rows = held_readings(np.stack(read, axis=1), every)
         out[name] = np.arange(count) if rows is None else rows
     return out
+
+
+def holes(mapping: Mapping, clocks: AnyMapping[str, Clocked]) -> dict[str, list[tuple[str, Rows]]]:
+    """The long runs of empty cells in the columns of sensors, by table: (channel, rows). A line across one is no measurement; the
+    few cells that a reading is missing in now and then, or that other columns are written in between, are as good as joined."""
+    found: dict[str, list[tuple[str, Rows]]] = {}
+    for channel, c in mapping.sensors.items():
+        if not isinstance(c, Column) or c.gaps != "interpolate":
+            continue
+        own = clocks[c.table].table
+        count, good = len(clocks[c.table].times_s), np.flatnonzero(np.isfinite(own.numbers(c.column, gaps=True)))
+        if len(good) < 2:
+            continue
+        ends = np.concatenate([[-1], good, [count]])
+        for k in np.flatnonzero(np.diff(ends) > GAP * float(np.median(np.diff(good)))):
+            found.setdefault(c.table, []).append((channel, np.arange(ends[k] + 1, ends[k + 1])))
+    return found
+
+
+def holes_told(mapping: Mapping, clocks: AnyMapping[str, Clocked]) -> list[str]:
+    """A line for each of the first holes."""
+    lines = []
+    for name, found in holes(mapping, clocks).items():
+        for channel, rows in found[:SHOWN]:
+            times_s, row = clocks[name].times_s, clocks[name].table.line(int(rows[0]))
+            lasting = (len(rows) + 1) * float(np.median(np.diff(times_s)))
+            run = f"{len(rows)} empty cells one after another from row {row} on, {lasting:.3g} s"
+            lines.append(f"{channel}: {run}: nothing there is compared")
+        if len(found) > SHOWN:
+            lines.append(f"and {len(found) - SHOWN} more such runs of empty cells")
+    return lines
 
 
 def paces_of(clocks: AnyMapping[str, Clocked], read_at: AnyMapping[str, Rows]) -> dict[str, float]:
@@ -64,9 +99,14 @@ def between_readings(
     clocks: AnyMapping[str, Clocked],
     read_at: AnyMapping[str, Rows],
     done: list[str],
+    empty: AnyMapping[str, Sequence[tuple[str, Rows]]] = MappingProxyType({}),
 ) -> Array | None:
     """(T,) whether nothing was read at the times ``at_s`` (T,) of the grid, by the table that is read the most seldom; None where
-    all may be readings. ``rows_s`` (T,): when rows that are taken sample by sample were."""
+    all may be readings. ``rows_s`` (T,): when rows that are taken sample by sample were; ``empty``: rows that are none."""
+    read_at = {
+        t: np.setdiff1d(rows, np.concatenate([some for _, some in empty.get(t, ())] or [rows[:0]]))
+        for t, rows in read_at.items()
+    }
     read = [clocks[t].times_s[rows] for t, rows in read_at.items() if len(rows) > 1] or [main.times_s]
     # The grid begins where the main table does.
     read_s = max(read, key=lambda times_s: float(np.median(np.diff(times_s)))) - main.times_s[0]

@@ -104,6 +104,9 @@ def filled(at_s: Array, read_s: Array) -> Array | None:
     # The first row that may know of a reading: what is held (commands, torques) is there from then on.
     rows = np.ceil(read_s / step - SLACK).astype(int)
     if float(np.median(apart)) < FILLED * step:
+        # Nor is anything known before the first reading and after the last.
+        apart = np.diff(np.concatenate([[-step], read_s, [at_s[-1] + step]]))
+        rows = np.concatenate([[-1], rows, [len(at_s)]])
         return _lost(rows, apart > GAP * max(float(np.median(apart)), step), len(at_s))
     out = np.ones(len(at_s), dtype=bool)
     out[rows[(rows >= 0) & (rows < len(at_s))]] = False

@@ -25,6 +25,8 @@ _SWITCH = {"true": 1.0, "false": 0.0, "": np.nan}
 _BETWEEN = re.compile(r"[,;\s]+")
 WIDEST = 256
 """Cells that hold more numbers than this are pictures or the like, not channels."""
+DROP = "drop the row"
+"""What may always be done about a row that cannot be read."""
 LARGEST = 1e30
 """What is measured is smaller, in whatever unit; times in ns since 1970 are."""
 
@@ -111,13 +113,13 @@ class Table:
             known = "empty" if raw is None or raw == "" else f"{raw}"
             raise MeasurementError(
                 f"{self}: row {self.line(int(bad[0]))}, column {quoted(column)} is {known}; "
-                "fill the gap, drop the row, or set 'gaps: interpolate' for the column"
+                f"fill the gap, {DROP}, or set 'gaps: interpolate' for the column"
             )
         beyond = np.flatnonzero(np.abs(out) > LARGEST)
         if len(beyond):
             row = int(beyond[0])
             said = "infinite" if np.isinf(out[row]) else f"{out[row]:g}, which nothing measures"
-            raise MeasurementError(f"{self}: row {self.line(row)}, column {quoted(column)} is {said}; drop the row")
+            raise MeasurementError(f"{self}: row {self.line(row)}, column {quoted(column)} is {said}; {DROP}")
         return out
 
     def dated(self, column: str) -> bool:

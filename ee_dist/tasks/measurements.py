@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.basics.files import named, repeated
-from ee_dist.basics.names import listed, nearest
+from ee_dist.basics.names import counted, listed, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.discrepancy.lags import with_lags
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, setup_of
@@ -86,7 +86,12 @@ def load(config: Config) -> Measurements:
         _same_robot(file, run, robot)
         found = [t for t in run.trials if t.source == HARDWARE]
         if not found:
-            raise LogError(f"{file}: no hardware trial in it; expected a log of task=trial or task=import")
+            why = (
+                "no whole hardware trial in it: it was cut or damaged"
+                if not run.complete
+                else "no hardware trial in it"
+            )
+            raise LogError(f"{file}: {why}; expected a log of task=trial or task=import")
         held = _held(file, run)
         for t in found:
             if not _enough(t.log):
@@ -105,7 +110,8 @@ def load(config: Config) -> Measurements:
     kept, apart = divided(names, config.trials, config.held_out)
     trials, files = [trials[k] for k in kept], list(dict.fromkeys(of_file[k] for k in kept))
     held_out = tuple(names[k].name for k in apart)
-    remarks = [line for run in runs for line in changed_sources(run.metadata)]
+    remarks = [_incomplete(file, run) for file, run in zip(files, runs, strict=True) if not run.complete]
+    remarks += [line for run in runs for line in changed_sources(run.metadata)]
     real = [t for t in trials if t.real]
     logs = [(t.name, t.log) for t in real]
     remarks += taking(robot, logs)
@@ -156,6 +162,17 @@ def load_held_out(config: Config) -> Measurements | None:
     """Those trials; None where none are named. Raises as ``load`` does."""
     alone = of_held_out(config)
     return None if alone is None else load(alone)
+
+
+def _incomplete(file: Path, run: RunRecord) -> str:
+    """That something of a recording is missing, and what of it is used."""
+    there = [t.name for t in run.trials if t.source == HARDWARE]
+    made = len(json_of(run.metadata.get("trials", "[]")))
+    of = f" of {made}" if made > len(there) else ""
+    return (
+        f"{file} is not complete: it was cut, damaged, or its run was stopped. Only what is whole in it is used: "
+        f"{counted(len(there), 'trial')}{of} ({listed(there)})."
+    )
 
 
 def _with_room(robot: Robot, trials: Sequence[MeasuredTrial], remarks: list[str]) -> Robot:

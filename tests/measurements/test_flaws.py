@@ -30,7 +30,7 @@ def test_the_row_is_asked_about_first(tmp_path: Path, column: str, row: int, val
     table["rising"] = np.linspace(0, 1, len(table)) ** 2
     _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, table))
     assert message in proposal.questions[0]
-    assert "mend that row or drop it" in proposal.questions[0]
+    assert "mend it or drop the row" in proposal.questions[0]
 
 
 def test_a_flaw_in_what_is_not_needed_is_a_note(tmp_path: Path) -> None:

@@ -143,6 +143,20 @@ def test_gaps_are_filled_only_where_asked(tmp_path: Path) -> None:
     assert any("3 empty cells" in d for d in report.done)
 
 
+@pytest.mark.parametrize(("first", "last"), [(100, 159), (0, 29), (370, None)])
+def test_a_long_run_of_empty_cells_is_no_measurement(tmp_path: Path, first: int, last: int | None) -> None:
+    table = stage_table()
+    table.loc[first:last, "x"] = np.nan
+    empty = np.isnan(table["x"].to_numpy())
+    table.to_csv(tmp_path / "a.csv", index=False)
+    mapping = stage_mapping(sensors={"position": {"column": "x", "unit": "m", "gaps": "interpolate"}})
+    record, report = import_file(tmp_path / "a.csv", mapping, STAGE)
+    assert record.log.filled is not None
+    assert np.array_equal(np.asarray(record.log.filled, dtype=bool), empty), "only what was read is compared"
+    (said,) = [line for line in report.suspicious if "one after another" in line]
+    assert f"position: {empty.sum()} empty cells one after another from row {first + 2}" in said
+
+
 def test_filters_have_no_phase() -> None:
     t = np.arange(4000) * 0.001
     wave = np.sin(2 * np.pi * 3 * t)

@@ -76,6 +76,11 @@ class Block:
         return self.units[0] if len(set(self.units)) == 1 else None
 
 
+NEARLY = 0.9
+"""Share of numbers from which a column is one of numbers, with mistakes."""
+_NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*")
+
+
 def joint_words(joints: Sequence[str]) -> dict[str, frozenset[str]]:
     """The words that tell each joint from the others."""
     all_words = {j: frozenset(tokens(j)) for j in joints}
@@ -154,9 +159,10 @@ def blocks_of(
 
 
 def unreadable(table: Table, joints: Sequence[str]) -> list[MeasurementError]:
-    """What is wrong with columns called as others of the same quantity are that can be read."""
+    """What is wrong with columns called as others of the same quantity are that can be read, and with those of numbers but for a
+    few cells."""
     words = joint_words(joints)
-    read, failed = set(), []
+    read, failed = set(), list[tuple[str, bool, MeasurementError]]()
     for address in table.addresses():
         joint = joint_in(address, words)
         reading = read_name(address, words[joint] if joint else frozenset())
@@ -166,8 +172,16 @@ def unreadable(table: Table, joints: Sequence[str]) -> list[MeasurementError]:
             table.numbers(address, gaps=True)
             read.add(reading.family)
         except MeasurementError as error:
-            failed.append((reading.family, error))
-    return [error for family, error in failed if family in read]
+            failed.append((reading.family, _numbers_but_few(table, address), error))
+    return [error for family, nearly, error in failed if nearly or family in read]
+
+
+def _numbers_but_few(table: Table, address: str) -> bool:
+    """Whether nearly all cells of a column are numbers."""
+    try:
+        return sum(bool(_NUMBER.fullmatch(c)) for c in table.texts(address)) > NEARLY * len(table)
+    except MeasurementError:
+        return False
 
 
 def _stem(address: str) -> str:

@@ -20,7 +20,7 @@ from ee_dist.measurements.proposal.torques import add_torques
 from ee_dist.measurements.proposal.units import position_units
 from ee_dist.measurements.proposal.view import View
 from ee_dist.measurements.robot_channels import command_units
-from ee_dist.measurements.table import Recorded
+from ee_dist.measurements.table import DROP, Recorded
 from ee_dist.robots.model import Robot
 
 
@@ -76,7 +76,7 @@ def _without_time(v: View, flaws: list[MeasurementError]) -> Proposal:
     """All that can be found if rows come as often as speeds say, which is asked; else what is to be written."""
     rate = None if flaws else rate_by_speeds(v.recorded, v.robot, v.hints)
     if rate is None:
-        cure = "mend that row or drop it, or say task.rate_hz=ROWS_A_SECOND"
+        cure = f"mend it or {DROP}, or say task.rate_hz=ROWS_A_SECOND"
         v.out.ask(f"{flaws[0]}; {cure}" if flaws else "no column rises like a time; say task.rate_hz=ROWS_A_SECOND")
         why = "not looked for without a time"
         v.out.choices.append(Choice("time", "", {"rate_hz": "???"}, UNKNOWN, "no column rises like a time"))
@@ -108,7 +108,7 @@ def _tell_flaws(v: View, flaws: list[MeasurementError]) -> None:
     """What could not be read comes first where something is open, as it may be why; else it is a note."""
     if v.out.questions:
         v.out.questions[:0] = [
-            f"{flaw}" if isinstance(flaw, SeveralColumnsError) else f"{flaw}; mend that row or drop it"
+            f"{flaw}" if isinstance(flaw, SeveralColumnsError) or DROP in str(flaw) else f"{flaw}; mend it or {DROP}"
             for flaw in flaws
         ]
     else:

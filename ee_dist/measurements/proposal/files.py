@@ -23,6 +23,8 @@ from ee_dist.measurements.table import Recorded, Table
 from ee_dist.robots.model import Robot
 
 MOST_SHOWN = 12
+SWAPPED = 10.0
+"""Steps by which a time goes back at least where another trial begins."""
 TILTS = ("roll", "pitch")
 _CUT = re.compile(r"[_\-. ]+")
 _TRIALS = frozenset(["episode", "episodes", "trial", "trials", "run", "runs", "demo", "traj", "trajectory", "rollout"])
@@ -147,7 +149,9 @@ def _first_of_split(recorded: Recorded, head: dict[str, Any]) -> Recorded:
         except MeasurementError:
             continue
         back = np.flatnonzero(steps < 0)
-        if 0 < len(back) < len(steps) / 20 and (np.delete(steps, back) > 0).all():
+        # Rows that were swapped go back by a step or two: that is no other trial, and is said where times are read.
+        anew = steps[back] < -SWAPPED * np.median(steps)
+        if 0 < len(back) < len(steps) / 20 and anew.all() and (np.delete(steps, back) > 0).all():
             head["split"] = "restarts"
             return Recorded(recorded.name, (table.part(slice(0, int(back[0]) + 1)),))
     return recorded
