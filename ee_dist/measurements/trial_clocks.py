@@ -13,11 +13,16 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Even, Mapping
 from ee_dist.measurements.robot_channels import command_kind
 from ee_dist.measurements.table import Recorded, Table
-from ee_dist.robots.model import Robot
+from ee_dist.measurements.units import factor
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import Array
 
 LEAST_SHARED = 0.5
 """Share of the main table's time that its other tables must cover."""
+
+STALE, LEAST_STALE, NEARLY, FIRST, ENOUGH = 5.0, 2e-3, 0.99, 3, 30
+"""A first reading is of another moment where a joint would go so many times as fast to the next as in nearly all steps after,
+and at least so far, rad (m); their share; first rows that may be so, and steps by which that is judged."""
 
 
 class TrialClocks:
@@ -124,10 +129,11 @@ class TrialClocks:
         return match(here.times_s, a, there.times_s, b, held_between)
 
     def cut(self) -> None:
-        """Cuts the main table to the time that the others cover, and to where all commands are known; what is held needs no
-        end."""
+        """Cuts the main table to the time that the others cover, to where all commands are known, and to where readings are of
+        the motion; what is held needs no end."""
         self._cut_to_shared()
         self._cut_to_commands()
+        self._cut_stale()
 
     def _cut_to_shared(self) -> None:
         start, end = self.main.times_s[0], self.main.times_s[-1]
@@ -167,6 +173,35 @@ class TrialClocks:
         if inside[0] > 0:
             self.done.append(f"{int(inside[0])} rows left out that are before the first command of {latest}")
             self._keep(slice(int(inside[0]), None))
+
+    def _cut_stale(self) -> None:
+        """Cuts first rows that were read before the motion, from a buffer or before the controller was on: a simulation would
+        begin there, at a speed that nothing had."""
+        stale = max(map(self._stale_rows, self.robot.sensors), default=0)
+        if stale:
+            rows = counted(stale, "first row")
+            self.done.append(f"{rows} left out: to the next a joint would go {STALE:g} times as fast as it does after")
+            self._keep(slice(stale, None))
+
+    def _stale_rows(self, sensor: Sensor) -> int:
+        """How many first rows of a position are of another moment."""
+        c = self.mapping.sensors.get(sensor.name)
+        if sensor.kind != "position" or not isinstance(c, Column) or c.table != self.first or c.unwrap or c.rolls_over:
+            return 0
+        read = self.main.table.numbers(c.column, gaps=c.gaps == "interpolate")
+        places = read * c.scale * factor(c.unit, sensor.unit, self.where)
+        steps = np.abs(np.diff(places))
+        speeds = steps / np.diff(self.main.times_s)
+        for k in range(FIRST, 0, -1):
+            after = speeds[k:]
+            known = np.isfinite(after)
+            if (
+                known.sum() >= ENOUGH
+                and steps[k - 1] > LEAST_STALE
+                and speeds[k - 1] > STALE * np.quantile(after[known], NEARLY)
+            ):
+                return k
+        return 0
 
     def _keep(self, rows: slice) -> None:
         """Keeps some rows of the main table."""

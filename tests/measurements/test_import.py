@@ -195,3 +195,15 @@ def test_gains_and_loads_of_single_trials_come_from_columns_and_names(tmp_path: 
     stage_table().assign(kp=np.arange(400)).to_csv(tmp_path / "light.csv", index=False)
     with pytest.raises(MeasurementError, match=r"column 'kp' for position_gain changes within the trial \(0 to 399\)"):
         import_files(files, mapping, STAGE)
+
+
+@pytest.mark.parametrize(("rows", "off"), [(1, 0.02), (2, -0.05), (0, 0.0005)])
+def test_first_readings_of_another_moment_are_left_out(tmp_path: Path, rows: int, off: float) -> None:
+    """0.5 m/s is the fastest that the stage goes: 0.02 m in a row is no motion, half a millimetre is."""
+    table = stage_table()
+    table.loc[: max(rows, 1) - 1, "x"] += off
+    table.to_csv(tmp_path / "a.csv", index=False)
+    record, report = import_file(tmp_path / "a.csv", stage_mapping(), STAGE)
+    assert len(record.log) == len(table) - rows
+    assert record.log.sensors[0, 0] == pytest.approx(table["x"][rows])
+    assert any("left out: to the next a joint would go" in d for d in report.done) == bool(rows)
