@@ -57,6 +57,13 @@ def with_a_common_word(folder: Path, m: Motion) -> None:
         table(folder / f"data{name}.csv", values, None)
 
 
+def in_camel_case(folder: Path, m: Motion) -> None:
+    """As a program for a Kinova arm writes them, the settings of the motion in each name, and where its hand was to be."""
+    named = {"desiredJointPosition": m["g"], "jointPosition": m["q"], "simulationTime": m["t"][:, None]}
+    for name, values in (named | {"desiredEndEffectorPosition": m["g"][:, :1] + 0.3}).items():
+        table(folder / f"Fair_R0.05_T3.0_1_{name}.csv", values, None)
+
+
 def by_joint(folder: Path, m: Motion) -> None:
     for k, joint in enumerate(JOINTS):
         values = np.stack([m["t"], m["q"][:, k], m["g"][:, k]], axis=1)
@@ -76,7 +83,7 @@ def in_turn(folder: Path, m: Motion) -> None:
             table(folder / f"{run}_{stem}.csv", np.c_[own["t"], values], ["time", *JOINTS])
 
 
-LAYOUTS: tuple[Write, ...] = (without_names, arrays, by_quantity, by_joint, by_number)
+LAYOUTS: tuple[Write, ...] = (without_names, arrays, by_quantity, in_camel_case, by_joint, by_number)
 
 
 def taken_in(folder: Path, files: list[Path]) -> list[SensorLog]:

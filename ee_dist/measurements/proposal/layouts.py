@@ -16,9 +16,12 @@ from ee_dist.measurements.side_by_side import side_by_side
 from ee_dist.measurements.table import Table
 
 _WORD = re.compile(r"[^\W\d_]+|\d+")
+_HUMP = re.compile(r"\d+|[A-Z]+(?![a-z])|[A-Z]?[^\W\d_A-Z]+|[^\W\d_]")
 _BEGINS = re.compile(r"[a-z]+(?=[A-Z])")
 _BETWEEN = frozenset(["dot", "ddot", "joint", "joints", "motor", "of", "the", "all"])
 """Words that may stand among those of a quantity and say nothing by themselves."""
+_CLOCKS = frozenset(["simulation", "sim", "elapsed", "log", "system"])
+"""Words before a time that say whose it is."""
 _NUMBERED = re.compile(r"(?<![^\W_])(?:joint|motor|axis|servo|link|drive|dxl|actuator|j|m)[ _.\-]?\d+", re.IGNORECASE)
 
 
@@ -63,17 +66,32 @@ def _quantities(stems: Sequence[str]) -> list[tuple[int, int] | None]:
 
 
 def _quantity(stem: str) -> tuple[int, int] | None:
-    """Where in the name of a file the quantity stands; None where it says none, or in two places."""
-    words = [(m.start(), m.end(), m[0].lower()) for m in _WORD.finditer(stem)]
-    telling = [k for k, (_, _, w) in enumerate(words) if _tells(w)]
-    if not telling:
+    """Where in the name of a file the quantity stands; None where it says none, or in two places, or that of something else than
+    joints (desiredEndEffectorPosition)."""
+    words = [(m.start(), m.end(), m[0].lower()) for m in _humps(stem)]
+    runs: list[list[int]] = []
+    for k in (k for k, (_, _, w) in enumerate(words) if _tells(w)):
+        if runs and all(words[i][2] in _BETWEEN for i in range(runs[-1][-1] + 1, k)):
+            runs[-1].append(k)
+        else:
+            runs.append([k])
+    # A letter by itself beside whole words is a setting of the trial: R0.05_T3_jointPosition.
+    whole = [run for run in runs if len(run) > 1 or len(words[run[0]][2]) > 1] or runs
+    if len(whole) != 1:
         return None
-    first, last = telling[0], telling[-1]
+    first, last = whole[0][0], whole[0][-1]
     while last + 1 < len(words) and words[last + 1][2] in ("dot", "ddot"):
         last += 1
-    if any(k not in telling and words[k][2] not in _BETWEEN for k in range(first, last + 1)):
+    while first and words[first - 1][2] in (_BETWEEN | _CLOCKS):
+        first -= 1
+    if first and words[first - 1][1] == words[first][0] and not words[first - 1][2].isdigit():
         return None
     return words[first][0], words[last][1]
+
+
+def _humps(stem: str) -> list[re.Match[str]]:
+    """The words of a name, those of camel case each by itself."""
+    return [m for whole in _WORD.finditer(stem) for m in _HUMP.finditer(stem, whole.start(), whole.end())]
 
 
 def _tells(word: str) -> bool:
