@@ -124,16 +124,27 @@ def _unit(term: Term, key: str, robot: Robot | None) -> str:
 
 
 def percent(share: float) -> str:
-    """Never all of it where something is left, and never less than nothing where it rounds to nothing."""
+    """Never all of it where something is left, and never less than nothing where it rounds to nothing; a dash where there is no
+    number."""
+    if not math.isfinite(share):
+        return "-"
     return f"{math.floor(1000 * share) / 10:.1f} %" if 0.99 < share < 1 - EXACT else f"{round(100 * share) + 0:d} %"
 
 
 def percents(low: float, high: float) -> str:
     """An interval of shares: ``76 to 100 %``; one that is less than a per cent wide by more digits, or by the one value."""
-    if percent(low) != percent(high):
-        return f"{percent(low).removesuffix(' %')} to {percent(high)}"
-    narrow = f"{100 * low:.3g}", f"{100 * high:.3g}"
-    return f"{narrow[0]} to {narrow[1]} %" if narrow[0] != narrow[1] else percent(high)
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return "-"
+    first, last = percent_within(low, low, high), percent_within(high, low, high)
+    return f"{first.removesuffix(' %')} to {last}" if first != last else last
+
+
+def percent_within(share: float, low: float, high: float) -> str:
+    """A share with as many digits as its interval is told by, which is to hold it."""
+    if not all(map(math.isfinite, (share, low, high))) or percent(low) != percent(high):
+        return percent(share)
+    narrow = f"{100 * low:.3g}" != f"{100 * high:.3g}"
+    return f"{100 * share:.3g} %" if narrow else percent(share)
 
 
 def named(term: Term) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ee_dist.discrepancy.words import percent, percents
+from ee_dist.discrepancy.words import percent_within, percents
 from ee_dist.viewing.finding import BEST, TIED, Candidate, Finding
 
 COMMAND = "python -m ee_dist"
@@ -72,8 +72,8 @@ def candidate_table(candidates: Sequence[Candidate]) -> list[str]:
     lines = ["| # | missing effect | gain | | 95 % interval | |", "|---|---|---|---|---|---|"]
     for k, c in enumerate(candidates):
         name = f"**{c.label}**" if c.kind in (BEST, TIED) else c.label
-        told = percents(c.low, c.high)
-        lines.append(f"| {k + 1} | {name} | {percent(c.gain)} | {bar(c.gain, largest)} | {told} | {c.kind} |")
+        gain, told = percent_within(c.gain, c.low, c.high), percents(c.low, c.high)
+        lines.append(f"| {k + 1} | {name} | {gain} | {bar(c.gain, largest)} | {told} | {c.kind} |")
     return lines
 
 

@@ -12,7 +12,7 @@ from plotly.subplots import make_subplots
 
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
-from ee_dist.viewing.labels import wrapped
+from ee_dist.viewing.labels import cut_marks, left_edge, wrapped
 
 MEASURED, PREDICTED, IMPROVED = "#4a90d9", "#e08a00", "#2e9e62"
 """What was measured, what the model says, and the improved one: the same in every figure."""
@@ -169,8 +169,9 @@ def ranking(
         )
     )
     styled(figure, 80 + 38 * len(names))
-    least = min([100 * i[0] for i in intervals] + [0.0])
-    figure.update_xaxes(title_text="gain above the noise, held out (%)", range=[max(least - 3, -25), 104])
+    figure.update_xaxes(title_text="gain above the noise, held out (%)", range=[left_edge(intervals), 104])
+    for mark in cut_marks(names, gains, intervals):
+        figure.add_annotation(mark)
     figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
     figure.update_layout(margin={"l": 20, "r": 20, "t": 10, "b": 45}, hovermode="closest")
     return figure

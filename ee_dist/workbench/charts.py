@@ -13,7 +13,7 @@ import numpy as np
 from ee_dist.discrepancy.words import plain
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
-from ee_dist.viewing.labels import wrapped
+from ee_dist.viewing.labels import cut_marks, left_edge, wrapped
 from ee_dist.workbench.bench import Step
 from ee_dist.workbench.sight import Cloud
 
@@ -270,13 +270,13 @@ def ranking(
         "error_x": {"type": "data", "array": _short(np.array(high)), "arrayminus": _short(np.array(low)), "symmetric": False,
                     "color": "#1d2733", "thickness": 1.2, "width": 4}, "hovertemplate": "%{y}: %{x:.1f} %<extra></extra>",
     }  # fmt: skip
-    least = min([100 * i[0] for i in intervals if np.isfinite(i[0])] + [0.0])
     return _rows(
         trace,
         104 + 36 * len(names),
-        {"title": {"text": "gain above the noise, held out (%)"}, "range": [max(least - 3, -25), 106]},
+        {"title": {"text": "gain above the noise, held out (%)"}, "range": [left_edge(intervals), 106]},
         {"ticksuffix": "  "},
         showlegend=False,
+        annotations=cut_marks(names, gains, intervals),
         margin={"l": 10, "r": 20, "t": 8, "b": 56},
     )
 

@@ -43,7 +43,7 @@ from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import known
-from ee_dist.discrepancy.words import amounts, is_less, named, percent, percents, phrase, placed, plain, told_all
+from ee_dist.discrepancy.words import amounts, is_less, named, percent_within, percents, phrase, placed, plain, told_all
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -252,19 +252,24 @@ def _twins(best: Judged, more: str, left: bool) -> str:
 
 
 def above(c: Judged) -> tuple[float, float]:
-    """The interval of a candidate's gain as a share of what is above the noise."""
-    scale = c.explained / c.gain if c.gain > 0 and np.isfinite(c.gain) else 1.0
+    """The interval of a candidate's gain as a share of what is above the noise, as ``explained`` is one."""
+    scale = c.explained / c.gain if c.gain and np.isfinite(c.gain) else 1.0
     return c.interval[0] * scale, c.interval[1] * scale
 
 
 def shown_gain(c: Judged) -> tuple[float, float, float]:
-    """The gain of a candidate and the ends of its interval as they are told: no more than all of it, nor than the same lost."""
+    """The gain of a candidate and the ends of its interval as they are told: no more than all of it."""
     low, high = above(c)
-    return max(-1.0, min(c.explained, 1.0)), max(-1.0, min(low, 1.0)), max(-1.0, min(high, 1.0))
+    return min(c.explained, 1.0), min(low, 1.0), min(high, 1.0)
+
+
+def told_gain(c: Judged) -> tuple[str, str]:
+    """Both in words: the gain by as many digits as its interval."""
+    share, low, high = shown_gain(c)
+    return percent_within(share, low, high), percents(low, high)
 
 
 def taken_off(best: Judged) -> str:
     """What it takes off held-out data, as a share of what is not noise, with its interval."""
-    share, low, high = shown_gain(best)
-    interval = f"95 % interval {percents(low, high)}"
-    return f"{percent(share)} of the error above the noise ({interval}), judged on {best.held_out}"
+    share, interval = told_gain(best)
+    return f"{share} of the error above the noise (95 % interval {interval}), judged on {best.held_out}"

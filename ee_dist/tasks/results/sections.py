@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ee_dist.discrepancy.accounts.of_explain import shown_gain
+from ee_dist.discrepancy.accounts.of_explain import shown_gain, told_gain
 from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.last_word import HELD_APART, LastWord
 from ee_dist.discrepancy.problem import Problem, joined
-from ee_dist.discrepancy.words import percent, percents, placed, plain
+from ee_dist.discrepancy.words import percent, placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share, trial_name, worst_trials
@@ -202,8 +202,8 @@ def ranking_section(
     best = judged[0]
     kinds = [kind_of(c, best) for c in judged]
     rows = [
-        [str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
-         percents(*shown_gain(c)[1:]), standing(c, best)]
+        [str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), *told_gain(c),
+         standing(c, best)]
         for c in judged
     ]  # fmt: skip
     pale = [k for k, kind in enumerate(kinds) if kind == "not"]

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ee_dist.discrepancy.accounts.account import Account
-from ee_dist.discrepancy.accounts.of_explain import shown_gain
+from ee_dist.discrepancy.accounts.of_explain import told_gain
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, called
 from ee_dist.discrepancy.evidence.judge import Judged
@@ -60,7 +60,7 @@ def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged]
         return
     best = judged[0]
     rows = [
-        (str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), percent(shown_gain(c)[0]),
+        (str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), told_gain(c)[0],
          standing(c, best)) for c in judged
     ]  # fmt: skip
     columns = (("", True), ("effect", False), ("held out", True), ("gain", True), ("", False))
