@@ -200,9 +200,9 @@ class Problem(ABC):
         """Errors of a model, or of one and another made from it, as this way counts them elsewhere, in lines for people."""
         return []
 
-    def farther_off(self, before: Hypothesis, after: Hypothesis) -> str:
-        """Where the model ``after`` is farther off than the one ``before`` in plain numbers, or hardly nearer in any, though the
-        error fell, for people; empty: nowhere, or the error itself is such a number."""
+    def farther_off(self, before: Hypothesis, after: Hypothesis, fell: bool) -> str:
+        """Where the model ``after`` is farther off than the one ``before`` in plain numbers, or hardly nearer in any, for people;
+        empty: nowhere, or the error itself is such a number. ``fell``: whether the error did."""
         return ""
 
     def spoiled(self, model: Hypothesis) -> list[str]:

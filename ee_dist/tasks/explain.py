@@ -82,7 +82,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     also = problem.other_errors(found.before, found.after) if found.best else ()
     also = (*also, *problem.spoiled(found.after), *way.instead(bool(found.left)))
     named = found.best if found.verdict == EFFECT else None
-    farther = "" if named is None else problem.farther_off(found.before, found.after)
+    fell = named is not None and named.error_heldout < found.baseline_error
+    farther = "" if named is None else problem.farther_off(found.before, found.after, fell)
     account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also)
     account = account.warned((*measured.remarks, *([f"{farther}."] if farther else [])))
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()

@@ -105,11 +105,19 @@ def test_a_real_one_stands_whichever_way_its_commands_are_read() -> None:
 
 def test_a_model_that_is_farther_off_in_plain_numbers_is_told_so() -> None:
     was = {("position", "rad"): 0.0251, ("roll", "rad"): 0.1}
-    said = farther_off(was, {("position", "rad"): 0.0451, ("roll", "rad"): 0.05})
+    said = farther_off(was, {("position", "rad"): 0.0451, ("roll", "rad"): 0.05}, True)
     assert "position 25.1 mrad -> 45.1 mrad" in said and "roll" not in said
-    assert not farther_off(was, {("position", "rad"): 0.0255, ("roll", "rad"): 0.05})
-    said = farther_off(was, {("position", "rad"): 0.0250, ("roll", "rad"): 0.0999})
+    assert not farther_off(was, {("position", "rad"): 0.0255, ("roll", "rad"): 0.05}, True)
+    said = farther_off(was, {("position", "rad"): 0.0250, ("roll", "rad"): 0.0999}, True)
     assert said.startswith("Hardly nearer than before") and "position 25.1 mrad -> 25 mrad; roll" in said
+    assert "though the error fell" in said
+
+
+def test_an_error_that_did_not_fall_is_not_said_to_have_fallen() -> None:
+    was = {("position", "rad"): 0.0251}
+    for now in (0.0250, 0.0451):
+        said = farther_off(was, {("position", "rad"): now}, False)
+        assert "though the error fell" not in said and "and the error did not fall: position 25.1 mrad" in said
 
 
 def test_a_base_without_a_floor_stays_as_high() -> None:

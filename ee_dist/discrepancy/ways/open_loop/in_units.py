@@ -32,17 +32,19 @@ def told_in_units(each: Sequence[InUnits]) -> list[str]:
     return [_told(of, [found[of] for found in each]) for of in each[0]]
 
 
-def farther_off(was: InUnits, now: InUnits) -> str:
-    """A warning for people where a second model, better by its error, is farther off in any of these, or hardly nearer in all;
-    empty: neither."""
+def farther_off(was: InUnits, now: InUnits, fell: bool) -> str:
+    """A warning for people where a second model is farther off in any of these, or hardly nearer in all; empty: neither.
+    ``fell``: whether it is better by its error."""
     worse = [of for of in was if now[of] > FARTHER * was[of]]
     if not worse and any(now[of] < NEARER * was[of] for of in was):
         return ""
     told = "; ".join(_told(of, [was[of], now[of]]) for of in worse or was)
+    head = f"{'Farther off' if worse else 'Hardly nearer'} than before in plain numbers"
+    if not fell:
+        return f"{head}, and the error did not fall: {told}. Look at the curves before you believe the model"
     return (
-        f"{'Farther off' if worse else 'Hardly nearer'} than before in plain numbers, though the error fell: {told}. The error "
-        "counts in standard deviations of what equally good models do, and next to nothing where these part: look at the curves "
-        "before you believe the model"
+        f"{head}, though the error fell: {told}. The error counts in standard deviations of what equally good models do, and "
+        "next to nothing where these part: look at the curves before you believe the model"
     )
 
 

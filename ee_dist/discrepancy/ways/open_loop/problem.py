@@ -380,12 +380,12 @@ class OpenLoop(Problem):
         parts = told_in_units([self._in_units(m) for m in models])
         return [f"Root mean squares over all rows of these trials: {'; '.join(parts)}."] if parts else []
 
-    def farther_off(self, before: Hypothesis, after: Hypothesis) -> str:
+    def farther_off(self, before: Hypothesis, after: Hypothesis, fell: bool) -> str:
         came = set(after).symmetric_difference(before)
         if all(find(t.effect).family == "sensing" for t in came):
             # Noise that a channel has makes no prediction nearer.
             return ""
-        return farther_off(self._in_units(before), self._in_units(after))
+        return farther_off(self._in_units(before), self._in_units(after), fell)
 
     def _in_units(self, model: Hypothesis) -> InUnits:
         return in_units(self.whole.series(model), self.robot.sensors)
