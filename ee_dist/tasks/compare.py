@@ -17,7 +17,7 @@ from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load
-from ee_dist.tasks.results.commands import asked
+from ee_dist.tasks.results.commands import asked, command
 from ee_dist.tasks.results.pages import compare_page
 from ee_dist.tasks.results.scenes import compare_scene
 from ee_dist.tasks.results.story import links
@@ -51,19 +51,20 @@ def run(config: Config, options: Options, out: Path) -> tuple[Problem, Compariso
     found = compare(problem, residual)
     left = leftovers(problem, residual)
     account = compare_account(problem, found, left).warned(measured.remarks)
+    if not account.good:
+        account = account.followed(command(asked("explain", config, options.by)))
     remarks = problem.remarks(measured.model)
     digest = hashlib.sha256(np.ascontiguousarray(residual).tobytes()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
     summary = {**of_comparison(problem, found, account, measured.model, left), "remarks": remarks}
     write_summary(out, "compare", config, options, watch, digest, summary)
-    following = [] if account.good else asked("explain", config, options.by)
     story = links(out, measured.files, config.model)
-    page = compare_page(problem, measured, found, account, residual, remarks, following, story)
+    page = compare_page(problem, measured, found, account, residual, remarks, story)
     write_page(page, out / "report.html")
     if options.rerun:
-        compare_scene(problem, found, account, measured.model, out / "compare.rrd", following)
+        compare_scene(problem, found, account, measured.model, out / "compare.rrd")
     show_comparison(console, problem, found)
     apart = [f"Left out of this: {listed(measured.held_out)}."] if measured.held_out else []
     console.print(f"By {way.name}: {way.why}.", *apart, *remarks, sep="\n", highlight=False, markup=False)
-    show_account(console, account, out, following)
+    show_account(console, account, out)
     return problem, found, account

@@ -20,7 +20,7 @@ from ee_dist.tasks.config import AUTO, Config
 from ee_dist.tasks.measurements import load, with_known_noise
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
-from ee_dist.tasks.results.commands import asked, planning, setting
+from ee_dist.tasks.results.commands import asked, command, planning, setting
 from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
 from ee_dist.tasks.results.story import links
@@ -86,22 +86,21 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     farther = "" if named is None else problem.farther_off(found.before, found.after, fell)
     account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also)
     account = account.warned((*measured.remarks, *([f"{farther}."] if farther else [])))
-    digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
-    out.mkdir(parents=True, exist_ok=True)
-    write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))
-    following = []
     # A mistake of the description or the mapping is mended there: no model on top of it is of any use.
     if found.verdict != NOTHING_MISSING and account.advice != MEND:
         # Where more than this is missing, the rest is looked for beside it.
         alone = found.verdict == EFFECT and found.best is not None and not account.more
         effect = setting("effect", typed(found.best.terms) if alone and found.best else "auto")
-        following = asked("improve", config, options.by, effect)
+        account = account.followed(command(asked("improve", config, options.by, effect)))
+    digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
+    out.mkdir(parents=True, exist_ok=True)
+    write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))
     story = links(out, measured.files, config.model)
-    write_page(explain_page(problem, measured, found, account, following, story), out / "report.html")
+    write_page(explain_page(problem, measured, found, account, story), out / "report.html")
     if options.rerun:
-        explain_scene(problem, found, account, out / "explain.rrd", following)
+        explain_scene(problem, found, account, out / "explain.rrd")
     show_explanation(console, problem, found)
     wall, _ = watch.read()
     console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)
-    show_account(console, account, out, following)
+    show_account(console, account, out)
     return problem, found, account

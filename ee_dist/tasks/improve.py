@@ -31,7 +31,7 @@ from ee_dist.tasks.config import AUTO, Config, ConfigError
 from ee_dist.tasks.measurements import Measurements, load, load_held_out, of_held_out
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
-from ee_dist.tasks.results.commands import asked, planning
+from ee_dist.tasks.results.commands import asked, command, planning
 from ee_dist.tasks.results.labels import step_phrase
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
@@ -110,6 +110,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     path = out / "model.yaml"
     out.mkdir(parents=True, exist_ok=True)
     write_model(path, measured.source, measured.folder, found.terms, account.words)
+    # What was fitted is shown already: what was held out is looked at next, where something was.
+    improved = replace(config, model=str(path))
+    account = account.followed(command(asked("compare", of_held_out(improved) or improved, options.by)))
     if calibration is not None:
         write_whole(
             path.with_suffix(".calibration.yaml"),
@@ -120,19 +123,16 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     write_summary(
         out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path), word)
     )
-    # What was fitted is shown already: what was held out is looked at next, where something was.
-    improved = replace(config, model=str(path))
-    following = asked("compare", of_held_out(improved) or improved, options.by)
     story = links(out, measured.files, config.model)
-    write_page(improve_page(problem, measured, found, account, following, story, word), out / "report.html")
+    write_page(improve_page(problem, measured, found, account, story, word), out / "report.html")
     if options.rerun:
-        improve_scene(problem, found, account, measured.model, out / "improve.rrd", following)
+        improve_scene(problem, found, account, measured.model, out / "improve.rrd")
     show_ladder(console, problem, found)
     show_last_word(console, word)
     if found.last is not None:
         refused = [c for c in found.last.judged if not c.earned]
         show_candidates(console, problem, refused, "Tried on top of it, and refused")
-    show_account(console, account, out, following)
+    show_account(console, account, out)
     return problem, found, account
 
 

@@ -130,21 +130,19 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     trial = ["task=trial", *robot_settings(robot, out), f"task.noise={noise_share(robot):.3g}",
              setting("engine", found.config.engine.name), f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
     explanations = list(zip(names, models, strict=True))
-    following = trial if result.enough and not measured.real else []
     account = account_of(
         robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED,
         every_s, measured.real,
     ).warned([*measured.remarks, *rated(robot)])  # fmt: skip
+    if result.enough and not measured.real:
+        account = account.followed(command(trial))
     digest = digest_of([(t.excitation, [round(s, 9) for s in t.separations]) for t in result.trials])
     rest = of_plan(result, explanations, found.folder, measured.files, options.limits, account)
     rest |= {"reading_s": every_s or robot.time_step_s, "csv": CSV, "command": ["python", "-m", "ee_dist", *trial]}
     write_summary(out, "plan", found.config, options, watch, digest, rest)
-    write_page(
-        plan_page(robot, result, explanations, shown, account, measured.files, command(following) if following else ""),
-        out / "report.html",
-    )
+    write_page(plan_page(robot, result, explanations, shown, account, measured.files), out / "report.html")
     show_plan(console, robot, result)
-    show_account(console, account, out, following)
+    show_account(console, account, out)
     return result
 
 

@@ -203,6 +203,12 @@ def test_a_small_error_is_no_agreement_where_a_channel_stands_out() -> None:
     assert "1 of 1 curve (1 channel in 1 trial) differs by more than noise" in loud.sure and not loud.advice
 
 
+def test_what_is_next_is_said_once_and_among_the_words() -> None:
+    calm, loud = compared(1.02, []), compared(1.02, [Leftover("sway", "a_b", 7.0, 3.0, True)])
+    assert loud.followed("type this").words.count("Next: type this") == 1
+    assert [w for w in calm.followed("type this").words if w.startswith("Next")] == [calm.advice]
+
+
 def test_times_the_floor_are_those_of_the_errors_that_are_told() -> None:
     assert "9 times what noise alone would leave" in compared(3.0, []).headline, "the way tells squares"
 

@@ -88,6 +88,7 @@ def told_alike(folder: Path, said) -> list[str]:
     scenes = [" ".join(text_of(scene)) for scene in folder.glob("*.rrd")]
     following = said.out.strip().splitlines()[-1]
     assert following.startswith("Next: python -m ee_dist task="), "the last line is the next command"
+    assert following in summary["words"]
     for line in (*first, following.removeprefix("Next: ")):
         assert line in plain and line in page and all(line in text for text in scenes)
     return first

@@ -58,7 +58,7 @@ class Account:
     """``headline``: what was found, where, how much of it, and whether more is left. ``error``: of the models, beside the
     noise floor. ``sure``: how sure it is. ``advice``: what to do next, where a command does not say it. ``lines``: what speaks
     for it and what stays open. ``good``: whether the question is settled. ``planner``: the command that finds the trial which
-    tells apart what is tied, where something is. ``warnings``: what may make all of it wrong."""
+    tells apart what is tied, where something is. ``warnings``: what may make all of it wrong. ``then``: the command to type."""
 
     headline: str
     error: str
@@ -69,6 +69,7 @@ class Account:
     planner: str = ""
     warnings: tuple[str, ...] = ()
     more: bool = False
+    then: str = ""
 
     @property
     def first(self) -> list[str]:
@@ -81,15 +82,24 @@ class Account:
         """The same, and before its own warnings these: what to know of the measurements before any result is read."""
         return replace(self, warnings=(*warnings, *self.warnings))
 
+    def followed(self, command: str) -> Account:
+        """The same with the command to type next; without one where the advice is what is next."""
+        return self if "Next:" in self.advice else replace(self, then=command)
+
     @property
     def lead(self) -> str:
         """What stands before the command to type."""
         return OR if self.planner and not self.more and not self.advice.endswith(NO_MOTION_TRIED) else NEXT
 
     @property
+    def last(self) -> list[str]:
+        """What comes after the rest of the first screen: a command to type, where there is one."""
+        return [f"{self.lead}: {self.then}"] if self.then else []
+
+    @property
     def words(self) -> list[str]:
         """All of it, the headline first."""
-        return [self.headline, *self.first, *self.lines]
+        return [self.headline, *self.first, *self.last, *self.lines]
 
 
 def advised(problem: Problem, advice: str) -> str:

@@ -15,7 +15,6 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import phrase, plain
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
-from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.glossary import TERMS
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, step_name
 from ee_dist.tasks.results.story import Link
@@ -32,14 +31,13 @@ def compare_page(
     account: Account,
     residual: Array,
     remarks: Sequence[str] = (),
-    following: Sequence[str] = (),
     links: Sequence[Link] = (),
 ) -> Page:
     """The page of compare."""
     models = [(MODEL, measured.model)]
     overlays = parts.curves(problem, residual, models)
     regimes = sorted(found.regimes, key=lambda r: -r.error)
-    page = _page(problem, measured, "Compare", account, following, links)
+    page = _page(problem, measured, "Compare", account, links)
     page.words = [*page.words, *remarks]
     worst = found.channels[0].name if found.channels else ""
     page.proof = parts.proof_section(problem, overlays, residual, models, channel=worst)
@@ -64,12 +62,11 @@ def explain_page(
     measured: Measurements,
     found: Explanation,
     account: Account,
-    following: Sequence[str] = (),
     links: Sequence[Link] = (),
 ) -> Page:
     """The page of explain."""
     best = found.best
-    page = _page(problem, measured, "Explain", account, following, links)
+    page = _page(problem, measured, "Explain", account, links)
     page.tiles = [
         (problem.told(found.baseline_error), f"{problem.natural_name}, {MODEL}"),
         *([(problem.told(best.error_heldout), f"{IMPROVED}, held out")] if best else []),
@@ -94,13 +91,12 @@ def improve_page(
     measured: Measurements,
     found: Improvement,
     account: Account,
-    following: Sequence[str] = (),
     links: Sequence[Link] = (),
     word: LastWord | None = None,
 ) -> Page:
     """The page of improve; ``word`` is on trials that took no part in it."""
     first, last, changed = found.ladder[0], found.ladder[-1], len(found.ladder) > 1
-    page = _page(problem, measured, "Improve", account, following, links)
+    page = _page(problem, measured, "Improve", account, links)
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name}, {MODEL}"),
         *([(problem.told(last.error_heldout), f"{IMPROVED}, held out")] if changed else []),
@@ -148,7 +144,6 @@ def _page(
     measured: Measurements,
     verb: str,
     account: Account,
-    following: Sequence[str],
     links: Sequence[Link],
 ) -> Page:
     count, model = len(problem.trials), measured.model
@@ -162,7 +157,7 @@ def _page(
         account.lines,
         "good" if account.good else "open",
         account.first,
-        following=command(following) if following else "",
+        following=account.then,
         lead=account.lead,
         links=links,
         terms=TERMS,

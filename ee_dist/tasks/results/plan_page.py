@@ -137,7 +137,6 @@ def plan_page(
     shown: Parting,
     account: Account,
     files: Sequence[Path],
-    trial: str,
 ) -> Page:
     best, names = found.best, [placed(n) for n, _ in explanations]
     sensor = robot.sensors[shown.channel]
@@ -149,7 +148,7 @@ def plan_page(
         account.lines,
         "good" if found.enough else "open",
         account.first,
-        following=trial,
+        following=account.then,
         tiles=[
             (f"{best.separation:.1f}", "standard deviations between the two most similar"),
             (f"{ENOUGH:g}", "are enough to tell them apart"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
 from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import Hypothesis, apply
-from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, trial_name, unit_of, worst_trials
 from ee_dist.tasks.results.labels import drawn as in_unit
 from ee_dist.tasks.results.tables import candidate_label, kind_of
@@ -30,28 +28,22 @@ CANDIDATES = 4
 KINDS = {"best": drawn.BEST, "tied": drawn.TIED, "earned": drawn.EARNED, "not": drawn.REFUSED}
 
 
-def compare_scene(
-    problem: Problem, found: Comparison, account: Account, model: Hypothesis, path: Path, following: Sequence[str] = ()
-) -> None:
-    write_compare_rrd(_finding(problem, found, account, model, following), path)
+def compare_scene(problem: Problem, found: Comparison, account: Account, model: Hypothesis, path: Path) -> None:
+    write_compare_rrd(_finding(problem, found, account, model), path)
 
 
-def explain_scene(
-    problem: Problem, found: Explanation, account: Account, path: Path, following: Sequence[str] = ()
-) -> None:
+def explain_scene(problem: Problem, found: Explanation, account: Account, path: Path) -> None:
     """With the predictions of the first candidates to switch between."""
     shown = found.tied or found.candidates[:CANDIDATES]
     candidates = tuple(_candidate(problem, found, c, c in shown[:CANDIDATES]) for c in found.candidates)
     where = compare(problem, found.base)
-    finding = _finding(problem, where, account, found.before, following)
+    finding = _finding(problem, where, account, found.before)
     write_explain_rrd(replace(finding, candidates=candidates), path)
 
 
-def improve_scene(
-    problem: Problem, found: Improvement, account: Account, model: Hypothesis, path: Path, following: Sequence[str] = ()
-) -> None:
+def improve_scene(problem: Problem, found: Improvement, account: Account, model: Hypothesis, path: Path) -> None:
     """Before, after, and the ladder between them."""
-    finding = _finding(problem, compare(problem, found.base), account, model, following)
+    finding = _finding(problem, compare(problem, found.base), account, model)
     ladder = tuple(
         drawn.Rung(step_name(r), in_unit(problem, r.error_heldout), in_unit(problem, r.error_fit), r.held_out)
         for r in found.ladder
@@ -102,9 +94,7 @@ def _of_series(measured: SensorLog, own: dict[str, Series]) -> SensorLog:
     )
 
 
-def _finding(
-    problem: Problem, where: Comparison, account: Account, model: Hypothesis, following: Sequence[str]
-) -> drawn.Finding:
+def _finding(problem: Problem, where: Comparison, account: Account, model: Hypothesis) -> drawn.Finding:
     names = [trial_name(problem, k) for k in range(len(problem.trials))]
     worst = worst_trials(problem, where)
     channels = tuple(
@@ -142,7 +132,7 @@ def _finding(
         in_unit(problem, where.noise_floor),
         unit_of(problem),
         channels,
-        next_command=command(following) if following else "",
+        next_command=account.then,
         lead=account.lead,
     )
 

@@ -23,7 +23,6 @@ from ee_dist.discrepancy.words import percent, phrase, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.folder import SETTINGS
-from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, excess_share, step_phrase, worst_trials
 from ee_dist.tasks.results.values import kinds_of, within
 
@@ -129,7 +128,7 @@ def last_word_rows(word: LastWord) -> tuple[list[str], list[list[str]]]:
     return ["trial", MODEL, *([IMPROVED] if word.changed else [])], rows
 
 
-def show_account(console: Console, account: Account, out: Path, following: Sequence[str] = ()) -> None:
+def show_account(console: Console, account: Account, out: Path) -> None:
     """What speaks for it, the files, and last the finding with how sure it is and the command to type next."""
     for line in account.lines:
         console.print(line, highlight=False, markup=False)
@@ -141,8 +140,8 @@ def show_account(console: Console, account: Account, out: Path, following: Seque
     for line in account.first:
         whole = bool(account.planner) and line.endswith(account.planner)  # a command is for copying
         console.print(line, highlight=False, markup=False, soft_wrap=whole)
-    if following:
-        console.print(f"{account.lead}: {command(following)}", highlight=False, markup=False, soft_wrap=True)
+    for line in account.last:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def _begun(out: Path) -> float:
