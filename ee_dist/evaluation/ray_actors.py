@@ -33,12 +33,15 @@ class _Worker:
             self.engine = make_engine()
         except SystemExit as stop:
             raise RuntimeError(f"sys.exit({stop.code!r}) was called") from None
+        self.told_s = 0.0
 
-    def run(self, jobs: list[Job], chunk: int) -> tuple[list[Any], float]:
-        """Results, and the seconds that they took."""
+    def run(self, jobs: list[Job], chunk: int) -> tuple[list[Any], float, float]:
+        """Results, the seconds that they took, and the processor time since the last call (s); the first has all until then."""
         began = time.perf_counter()
         try:
-            return run_jobs(self.engine, jobs, chunk), time.perf_counter() - began
+            results, took_s = run_jobs(self.engine, jobs, chunk), time.perf_counter() - began
+            before, self.told_s = self.told_s, time.process_time()
+            return results, took_s, self.told_s - before
         except SystemExit as stop:
             raise RuntimeError(f"sys.exit({stop.code!r}) was called") from None
 
@@ -115,6 +118,8 @@ class RayEvaluator:
         self.chunk = chunk
         self.counts = Counts()
         self.shares = Shares(self.workers)
+        self.worked_s = 0.0
+        """Processor time of the workers."""
         self.patience_s = PATIENCE_S
         start_ray(address, self.workers, folder)
         # Next to no share of a core: what a lost machine leaves must find a place on one that is full.
@@ -148,7 +153,8 @@ class RayEvaluator:
                 idle.append(call.who)
                 free += share[call.who]
                 self._compare(call.who)
-                found, seconds = self._said(ray.get, reference)
+                found, seconds, worked_s = self._said(ray.get, reference)
+                self.worked_s += worked_s
                 self.shares.measured(call.who, call.steps, seconds)
                 results[call.first : call.first + call.count] = found
         return results

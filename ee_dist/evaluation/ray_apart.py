@@ -64,9 +64,12 @@ class RayApart:
             raise
 
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
+        global _worked_s
         if _process is None:
             raise RayLostError("Ray is lost: it was ended")
-        found: list[Any] = _process.ask("evaluate", self._name, list(jobs))
+        found: list[Any]
+        found, took_s = _process.ask("evaluate", self._name, list(jobs))
+        _worked_s += took_s
         steps = sum(j.rollout.steps for j in jobs)
         self.counts.asked += len(jobs)
         self.counts.asked_steps += steps
@@ -155,6 +158,14 @@ class _Process:
         self.process.kill()
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(LEAVE_S)
+
+
+_worked_s = 0.0
+
+
+def worked_s() -> float:
+    """Processor time of all workers so far (s), wherever they are. Ray's own processes are not in it."""
+    return _worked_s
 
 
 _process: _Process | None = None

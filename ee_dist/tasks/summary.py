@@ -17,6 +17,7 @@ from omegaconf import DictConfig, OmegaConf
 from ee_dist.basics.files import write_whole
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.plugins import text_of_plugin
+from ee_dist.evaluation.ray_apart import worked_s
 from ee_dist.tasks.config import Config
 
 FORMAT = 1
@@ -68,7 +69,7 @@ def digest_of(result: Any) -> str:
 
 
 class Stopwatch:
-    """Wall and processor time (s) since it was made, children included."""
+    """Wall and processor time (s) since it was made, children and Ray's workers included."""
 
     def __init__(self) -> None:
         self.wall, self.cpu = time.monotonic(), self._cpu()
@@ -76,7 +77,7 @@ class Stopwatch:
     @staticmethod
     def _cpu() -> float:
         t = os.times()
-        return t.user + t.system + t.children_user + t.children_system
+        return t.user + t.system + t.children_user + t.children_system + worked_s()
 
     def read(self) -> tuple[float, float]:
         return time.monotonic() - self.wall, self._cpu() - self.cpu

@@ -75,6 +75,7 @@ def test_serial_in_any_chunks(reference, chunk):
 def test_ray_with_any_workers_and_chunks(reference, workers, chunk):
     evaluator = RayEvaluator(PyBulletEngine, workers, chunk)
     assert content(evaluator.evaluate(jobs())) == reference
+    assert evaluator.worked_s > 0.01, "the processor time that it took there"
     evaluator.close()
 
 

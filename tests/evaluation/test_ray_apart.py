@@ -20,6 +20,7 @@ from ee_dist import __main__
 from ee_dist.evaluation import ray_apart, ray_watch
 from ee_dist.evaluation.ray_apart import RayApart, abandon_ray, stop_ray
 from ee_dist.evaluation.ray_session import EvaluatorError, RayGoneError, RayLostError
+from ee_dist.tasks.summary import Stopwatch
 
 STAND_IN = """
 import json, os, subprocess, sys, threading, time
@@ -38,7 +39,7 @@ class Desk:
         return make_engine
     def close(self, name): pass
     def stop(self): pass
-    def evaluate(self, name, jobs): return [getattr(self, job.what)() for job in jobs]
+    def evaluate(self, name, jobs): return [getattr(self, job.what)() for job in jobs], 2.5
     def work(self): return os.getpid()
     def die(self): os._exit(1)
     def die_soon(self): threading.Timer(0.2, self.die).start()
@@ -72,6 +73,12 @@ def test_it_answers_and_counts(apart):
     first, second = apart.evaluate([job("work"), job("work")])
     assert first == second == ray_apart._process.process.pid
     assert (apart.counts.asked, apart.counts.simulated, apart.counts.steps) == (2, 2, 14)
+
+
+def test_what_the_workers_took_is_processor_time_of_the_run(apart):
+    watch = Stopwatch()
+    apart.evaluate([job("work")])
+    assert 2.5 <= watch.read()[1] < 5.0
 
 
 def test_its_end_without_a_word_is_told_at_once_and_nothing_is_left(apart):
