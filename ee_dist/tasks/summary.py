@@ -69,10 +69,12 @@ def digest_of(result: Any) -> str:
 
 
 class Stopwatch:
-    """Wall and processor time (s) since it was made, children and Ray's workers included."""
+    """Wall and processor time (s) since it was made, children and Ray's workers included. It stops when it is first read, so that
+    terminal and summary tell one time."""
 
     def __init__(self) -> None:
         self.wall, self.cpu = time.monotonic(), self._cpu()
+        self.stopped: tuple[float, float] | None = None
 
     @staticmethod
     def _cpu() -> float:
@@ -80,7 +82,8 @@ class Stopwatch:
         return t.user + t.system + t.children_user + t.children_system + worked_s()
 
     def read(self) -> tuple[float, float]:
-        return time.monotonic() - self.wall, self._cpu() - self.cpu
+        self.stopped = self.stopped or (time.monotonic() - self.wall, self._cpu() - self.cpu)
+        return self.stopped
 
 
 def hypothesis_list(hypothesis: Hypothesis) -> list[dict[str, Any]]:

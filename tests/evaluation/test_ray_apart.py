@@ -81,6 +81,13 @@ def test_what_the_workers_took_is_processor_time_of_the_run(apart):
     assert 2.5 <= watch.read()[1] < 5.0
 
 
+def test_a_watch_tells_one_time(apart):
+    watch = Stopwatch()
+    first = watch.read()
+    apart.evaluate([job("work")])
+    assert watch.read() == first
+
+
 def test_its_end_without_a_word_is_told_at_once_and_nothing_is_left(apart):
     process, folder = ray_apart._process.process, Path(ray_apart._process.guard.folder)
     assert folder.is_dir()

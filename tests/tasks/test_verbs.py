@@ -120,6 +120,7 @@ def test_every_verb_by_every_way(cli, imported, by):
 
     found, said = run(cli, "task=explain", log, way, SUSPECTS, "task.rerun=false", *QUICK)
     explained = json.loads((found / "summary.json").read_text())
+    assert f"{explained['wall_s']:.0f} s. Digest " in said.out and explained["wall_s"] > 0
     assert explained["verdict"] == "effect" and explained["candidates"][0]["name"] == HIDDEN
     assert explained["candidates"][0]["values"]["torque_nm"] == pytest.approx(0.06, rel=0.15)
     assert not (found / "explain.rrd").exists(), "a scene that was refused"
