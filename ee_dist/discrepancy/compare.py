@@ -26,7 +26,7 @@ NEAR_LIMIT = 0.8
 
 @dataclass(frozen=True)
 class ChannelReport:
-    """``rmse`` in ``unit``; ``normalised`` in standard deviations of the noise of a value."""
+    """``rmse`` in ``unit``; ``normalised`` in standard deviations of the noise of a value; ``worst_trial`` with its number."""
 
     name: str
     unit: str
@@ -84,6 +84,11 @@ def compare(problem: Problem, residual: Array) -> Comparison:
     )
 
 
+def trial_name(problem: Problem, trial: int) -> str:
+    """With its number: repeats have one name."""
+    return problem.trials[trial] if len(problem.trials) == 1 else f"{trial + 1}. {problem.trials[trial]}"
+
+
 def heat(problem: Problem, residual: Array) -> Array:
     """(segments, channels) root mean square of a residual (n,), each by the weight of its trial; zero where there is no value."""
     return _rms(problem, residual, problem.segment_of, problem.trial_of_segment)
@@ -127,7 +132,7 @@ def _channels(problem: Problem, residual: Array) -> list[ChannelReport]:
                 problem.layout.units[c],
                 float(np.sqrt(np.mean(values**2))) if len(values) else 0.0,
                 float(np.sqrt(np.mean(residual[mine] ** 2))),
-                problem.trials[int(problem.trial_of_segment[worst])],
+                trial_name(problem, int(problem.trial_of_segment[worst])),
                 start,
                 end,
             )

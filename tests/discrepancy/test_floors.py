@@ -208,7 +208,7 @@ def test_in_trials_of_unequal_length_equal_errors_look_equal() -> None:
     cells, trials = heat(problem, residual)[:, 0], by_trial(problem, residual)[:, 0]
     np.testing.assert_allclose(cells**2, np.where(problem.trial_of_segment == 0, 2.0, 1.0))
     np.testing.assert_allclose(trials, [problem.trial_error(residual, k) for k in range(2)])
-    assert compare(problem, residual).channels[0].worst_trial == "motion 0"
+    assert compare(problem, residual).channels[0].worst_trial == "1. motion 0"
 
 
 @pytest.mark.parametrize("noise", [2e-3, 1.4e-3, 1e-3, 5e-4])

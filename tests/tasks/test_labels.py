@@ -8,23 +8,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ee_dist.discrepancy.compare import trial_name
 from ee_dist.effects.catalogue import Term
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.tasks import trial
 from ee_dist.tasks.config import Config, EngineConfig, RobotConfig
 from ee_dist.tasks.results import sections
-from ee_dist.tasks.results.labels import excess_share, trial_name, worst_trials
+from ee_dist.tasks.results.labels import excess_share
 from ee_dist.tasks.results.tables import candidate_label
 from ee_dist.viewing.curves import Overlay
 
 
-def test_the_worst_trial_is_told_from_its_repeat() -> None:
-    problem = SimpleNamespace(
-        trials=("sway", "sway"), channels=("a", "b"), trial_of_segment=np.array([0, 0, 1]), robot=None
-    )
-    found = SimpleNamespace(heat=np.array([[1.0, 0.0], [3.0, 1.0], [2.0, 5.0]]))
-    assert worst_trials(problem, found) == {"a": "1. sway", "b": "2. sway"}  # type: ignore[arg-type]
-    assert trial_name(SimpleNamespace(trials=("sway",)), 0) == "sway"  # type: ignore[arg-type]
+def test_a_trial_is_told_from_its_repeat() -> None:
+    several, one = SimpleNamespace(trials=("sway", "sway")), SimpleNamespace(trials=("sway",))
+    assert [trial_name(several, k) for k in range(2)] == ["1. sway", "2. sway"]  # type: ignore[arg-type]
+    assert trial_name(one, 0) == "sway"  # type: ignore[arg-type]
 
 
 def test_shares_of_next_to_nothing_are_not_told() -> None:

@@ -47,20 +47,6 @@ def step_phrase(r: Rung, problem: Problem) -> str:
     return (phrase(r.added, problem.robot) or step_name(r)) + gone
 
 
-def trial_name(problem: Problem, trial: int) -> str:
-    """With its number: repeats have one name."""
-    return problem.trials[trial] if len(problem.trials) == 1 else f"{trial + 1}. {problem.trials[trial]}"
-
-
-def worst_trials(problem: Problem, found: Comparison) -> dict[str, str]:
-    """By channel the trial in which it is worst."""
-    segments = found.heat.argmax(axis=0)
-    return {
-        name: trial_name(problem, int(problem.trial_of_segment[k]))
-        for name, k in zip(problem.channels, segments, strict=True)
-    }
-
-
 def excess_share(found: Comparison, r: RegimeReport) -> str:
     """The share of what is above the noise that falls in a regime; a dash where next to nothing is above it."""
     return percent(r.share) if found.error > CLOSE * found.noise_floor else "-"

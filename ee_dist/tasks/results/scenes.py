@@ -9,14 +9,14 @@ import numpy as np
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import shown_gain
-from ee_dist.discrepancy.compare import Comparison, compare
+from ee_dist.discrepancy.compare import Comparison, compare, trial_name
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.problem import Problem, Series
 from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import Hypothesis, apply
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, trial_name, unit_of, worst_trials
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, step_name, unit_of
 from ee_dist.tasks.results.labels import drawn as in_unit
 from ee_dist.tasks.results.tables import candidate_label, kind_of
 from ee_dist.trials.log import SensorLog
@@ -96,14 +96,13 @@ def _of_series(measured: SensorLog, own: dict[str, Series]) -> SensorLog:
 
 def _finding(problem: Problem, where: Comparison, account: Account, model: Hypothesis) -> drawn.Finding:
     names = [trial_name(problem, k) for k in range(len(problem.trials))]
-    worst = worst_trials(problem, where)
     channels = tuple(
         drawn.ChannelError(
             c.name,
             c.unit,
             in_unit(problem, c.normalised),
             c.rmse,
-            worst[c.name],
+            c.worst_trial,
             c.worst_from_s,
             c.worst_to_s,
         )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.accounts.of_explain import shown_gain, told_gain
-from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of
+from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of, trial_name
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.last_word import HELD_APART, LastWord
@@ -15,7 +15,7 @@ from ee_dist.discrepancy.problem import Problem, joined
 from ee_dist.discrepancy.words import percent, placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share, trial_name, worst_trials
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share
 from ee_dist.tasks.results.tables import candidate_label, kind_of, last_word_rows, standing
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
@@ -253,14 +253,13 @@ def regimes_section(problem: Problem, found: Comparison) -> Section:
 def channels_section(problem: Problem, found: Comparison, after: Comparison | None = None, most: int = 14) -> Section:
     """Errors of the channels, before and perhaps after, largest first."""
     later = {} if after is None else {c.name: c for c in after.channels}
-    worst = worst_trials(problem, found)
     rows, first = [], [c for c in found.channels if not later or c.name in later]
     for c in first:
         unit = "" if c.unit == "1" else f" {c.unit}"
         row = [plain(c.name), f"{c.rmse:.4g}{unit}", problem.told(c.normalised)]
         if after is not None:
             row += [f"{later[c.name].rmse:.4g}{unit}", problem.told(later[c.name].normalised)]
-        rows.append([*row, worst[c.name], f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
+        rows.append([*row, c.worst_trial, f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
     columns = ["channel", "rmse", "error"] + ([] if after is None else [f"rmse, {IMPROVED}", f"error, {IMPROVED}"])
     table = Table([*columns, "worst trial", "when"], rows, tuple(range(1, len(columns))))
     shown = [c for c in first if c.normalised > 0][:most]

@@ -23,7 +23,7 @@ from ee_dist.discrepancy.words import percent, phrase, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.folder import SETTINGS
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, excess_share, step_phrase, worst_trials
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, excess_share, step_phrase
 from ee_dist.tasks.results.values import kinds_of, within
 
 TIED_STANDING = "tied with the best"
@@ -41,10 +41,9 @@ def _table(title: str, columns: Sequence[Column], rows: Sequence[Sequence[str]])
 
 
 def show_comparison(console: Console, problem: Problem, found: Comparison) -> None:
-    worst = worst_trials(problem, found)
     rows = [
         (plain(c.name), f"{c.rmse:.3g} {c.unit}", problem.told(c.normalised),
-         f"{worst[c.name]}, {c.worst_from_s:.1f} to {c.worst_to_s:.1f} s") for c in found.channels[:8]
+         f"{c.worst_trial}, {c.worst_from_s:.1f} to {c.worst_to_s:.1f} s") for c in found.channels[:8]
     ]  # fmt: skip
     columns = (("channel", False), ("rmse", True), ("error", True), ("worst", False))
     console.print(_table("Where it fails: channels", columns, rows))
