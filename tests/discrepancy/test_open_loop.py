@@ -18,12 +18,13 @@ from ee_dist.discrepancy.evidence.rule import LUCK
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, driver_of, setup_of
-from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.problem import Series, error
 from ee_dist.discrepancy.search.candidates import candidates
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
+from ee_dist.discrepancy.ways.open_loop.in_units import in_units, told_in_units
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import from_entries, of_trial, to_entries
 from ee_dist.effects.catalogue import Hypothesis, term
@@ -33,6 +34,7 @@ from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.evaluation.cache import CachedEvaluator
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.evaluation.serial import SerialEvaluator
+from ee_dist.robots.model import Sensor
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.tasks.config import ConfigError
 from ee_dist.tasks.measurements import _calibration
@@ -153,6 +155,13 @@ def test_what_an_effect_took_off_an_untouched_robot_is_no_evidence(mujoco: MuJoC
         "an effect took as much where nothing was wrong"
     )
     assert again.candidates[0].why_not == LUCK
+
+
+@pytest.mark.parametrize(("name", "said"), [("speed", "speed"), ("velocity_servo", "velocity"), ("qd", "velocity")])
+def test_a_channel_of_speeds_is_told_by_the_word_that_it_goes_by(name: str, said: str) -> None:
+    series = Series(0, 0, "rad/s", np.zeros(1), np.ones(1), np.zeros(1))
+    (line,) = told_in_units([in_units([series], [Sensor(name, "velocity", "servo", "rad/s")])])
+    assert line == f"{said} 1 rad/s"
 
 
 def test_errors_are_told_in_the_units_of_the_channels_too() -> None:
