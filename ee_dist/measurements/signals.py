@@ -119,9 +119,15 @@ def each(a: Array, b: Array) -> list[Relation]:
 
 
 def derivative(position: Array, speed: Array, step_s: float) -> Relation:
-    """How far ``speed`` is the change of ``position``, both smoothed alike; slope in units of speed per unit of change."""
-    width = max(3, round(0.04 / step_s))
-    return relation(smooth(smooth(speed, width), width), change(position, step_s))
+    """How far ``speed`` is the change of ``position``; slope in units of speed per unit of change."""
+    return relation(*speed_and_change(position, speed, step_s))
+
+
+def speed_and_change(position: Array, speed: Array, step_s: float) -> tuple[Array, Array]:
+    """Both (T, J), smoothed alike, without their ends: there the mean of a position stands still, and its change is none."""
+    width = max(3, round(0.04 / step_s)) | 1
+    pair = smooth(smooth(speed, width), width), change(position, step_s)
+    return pair if len(speed) < 4 * width else (pair[0][width:-width], pair[1][width:-width])
 
 
 def lead(a: Array, b: Array, step_s: float) -> Lead:

@@ -10,7 +10,7 @@ import pytest
 import small_logs as logs
 
 from ee_dist.measurements.proposal.model import LIKELY, SURE
-from ee_dist.measurements.signals import lead
+from ee_dist.measurements.signals import derivative, lead
 
 T = np.arange(1500) / 100
 
@@ -23,6 +23,13 @@ def test_one_frequency_turns_no_sign(hz: float, late_s: float) -> None:
     assert found.lead_s == pytest.approx(late_s, abs=0.011)
     assert found.correlation > 0.99
     assert found.repeats, "half a period later the other sign fits as well"
+
+
+@pytest.mark.parametrize("step_s", [0.002, 0.004, 0.02])
+def test_the_rate_of_a_short_motion_is_wholly_its_change(step_s: float) -> None:
+    t = np.arange(0.0, 2.0, step_s)[:, None]
+    found = derivative(0.4 * np.sin(3 * t), 1.2 * np.cos(3 * t), step_s)
+    assert found.correlation > 0.9999 and found.slope == pytest.approx(1, rel=1e-3)
 
 
 def test_a_motion_that_does_not_repeat_itself_has_one_lead() -> None:

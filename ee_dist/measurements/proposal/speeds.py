@@ -101,9 +101,7 @@ def _compared(v: View, block: Block) -> list[signals.Relation] | None:
     values = v.on(v.position.block, block)
     if values is None or not v.units.entries:
         return None
-    width = max(3, round(0.04 / v.step(v.position.block)))
-    truth = signals.change(v.metric(), v.step(v.position.block))
-    return signals.each(signals.smooth(signals.smooth(values, width), width), truth)
+    return signals.each(*signals.speed_and_change(v.metric(), values, v.step(v.position.block)))
 
 
 def _seen(v: View, k: int, r: signals.Relation) -> str | None:
