@@ -21,6 +21,8 @@ DOTS = 700
 """Points of a cloud that are drawn; its mean is of all."""
 BAR_ROOM = 56
 """Pixels above a map for the bar of its colours."""
+LOW = 0.15
+"""Share of an axis below which there is no room for words."""
 FEWEST = 5
 """Points that a mean is drawn of."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
@@ -187,11 +189,7 @@ def ladder(
 ) -> go.Figure:
     """Error of each model from the first to the last, and the noise floor. ``held_out``: what was held out of each; a line
     joins neighbours of which that was the same, and the model that was taken as it is."""
-    figure = go.Figure()
-    figure.add_scatter(
-        x=[wrapped(n, 18) for n in names], y=list(fit), name="fitted", mode="lines+markers",
-        line={"color": PREDICTED, "dash": "dot"},
-    )  # fmt: skip
+    figure, top = go.Figure(), 1.25 * max(max(heldout), floor)
     # The model as it is was fitted to nothing, so that it goes with whatever comes next.
     same = [held_out[min(1, len(held_out) - 1)], *held_out[1:]]
     first = 0
@@ -211,11 +209,17 @@ def ladder(
             textposition="top center",
             hovertemplate=f"%{{y:.4g}} on {judged_on}<extra></extra>",
         )
+    # Above the other, and thinner: often both are the same.
+    figure.add_scatter(
+        x=[wrapped(n, 18) for n in names], y=list(fit), name="fitted", mode="lines+markers", legendrank=1,
+        line={"color": PREDICTED, "dash": "dot"}, marker={"size": 5},
+    )  # fmt: skip
+    # Below a line that is near the axis its words would lie on the numbers there.
     figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
-                     annotation_position="bottom left")  # fmt: skip
+                     annotation_position="bottom left" if floor > LOW * top else "top left")  # fmt: skip
     styled(figure, 340)
     figure.update_xaxes(range=[-0.4, len(names) - 0.6], automargin=True)
-    figure.update_layout(yaxis_range=[0, 1.25 * max(max(heldout), floor)])
+    figure.update_layout(yaxis_range=[0, top])
     figure.update_yaxes(title_text=label, rangemode="tozero")
     return figure
 

@@ -47,3 +47,14 @@ def test_a_line_joins_what_was_judged_on_the_same(held_out: tuple[str, ...], lin
     figure = ladder([f"step {k}" for k in range(count)], [1.0] * count, [2.0] * count, held_out, 0.5)
     assert [len(t.x) for t in figure.data if t.name == "held out"] == lines
     assert sum(bool(t.showlegend) for t in figure.data if t.name == "held out") == 1
+
+
+@pytest.mark.parametrize(("floor", "below"), [(0.05, False), (0.25, False), (1.5, True)])
+def test_the_words_of_a_low_floor_do_not_lie_on_the_axis_and_no_curve_hides_the_other(
+    floor: float, below: bool
+) -> None:
+    figure = ladder(["a", "b"], [2.0, 1.0], [2.0, 1.0], (UNFITTED, WINDOWS), floor)
+    (words,) = figure.layout.annotations
+    assert words.text.startswith("noise floor") and (words.yanchor == "top") == below
+    over = figure.data[-1]
+    assert over.name == "fitted" and over.marker.size < figure.data[0].marker.size
