@@ -50,6 +50,8 @@ class Explanation:
     """How sure each value of ``after`` is that was fitted, where an effect was found."""
     given: Hypothesis = ()
     """The model as it was given, whose terms ``before`` has with their values fitted anew."""
+    offered: int = 0
+    """Candidates that were there to be tried."""
 
     @property
     def candidates(self) -> list[Judged]:
@@ -151,7 +153,7 @@ def explain(
     told = [] if found.best is None else _how_sure(replace(search, fixed=fixed), found.best, found)
     return Explanation(
         verdict, error(as_it_is), error(found.base), floor, source, model, fixed, found, kept is not None, unsure, told,
-        tuple(before),
+        tuple(before), len(pool),
     )  # fmt: skip
 
 

@@ -103,3 +103,15 @@ def test_other_verdicts_are_right_as_often_as_they_were() -> None:
     )
     few = replace(RULE, counted={UNEXPLAINED: (FEWEST - 1, FEWEST - 1)})
     assert confidence("open_loop", SimpleNamespace(verdict=UNEXPLAINED, best=None), few) is None  # type: ignore[arg-type]
+
+
+def test_why_fewer_were_tried_than_were_there_is_said(friction: tuple[Problem, Explanation]) -> None:
+    problem, found = friction
+    assert found.offered == found.tried == 3
+    assert any(line.endswith("3 explanations were tried.") for line in explain_account(problem, found, None).lines)
+    for offered, before, said in (
+        (5, (), "tried; 2 more candidates would change what the model has none of."),
+        (4, (HIDDEN,), "tried; 1 more candidate is in the model already, or would change what it has none of."),
+    ):
+        fewer = replace(found, offered=offered, before=before)
+        assert any(line.endswith(said) for line in explain_account(problem, fewer, None).lines)

@@ -82,9 +82,7 @@ def explain_account(
     that another trial might tell apart, ``confidence`` is that of confidence.py, ``also`` is said first."""
     robot, best = problem.robot, found.best
     rest: Sequence[Leftover] = found.left
-    lines = [
-        f"Noise floor: {found.floor_source}. {counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried."
-    ]
+    lines = [f"Noise floor: {found.floor_source}. {_tried(found)}"]
     error = f"{error_name(problem)}: model {problem.told(found.baseline_error)}"
     error += f", noise floor {problem.told(found.noise_floor)}."
     last, advice = found.baseline_error, ""
@@ -171,6 +169,15 @@ def explain_account(
         planner if tied else "",
         more=found.verdict == EFFECT and bool(rest),
     )
+
+
+def _tried(found: Explanation) -> str:
+    """How many explanations, and why no more."""
+    text, less = f"{counted(found.tried, 'explanation')} {was_or_were(found.tried)} tried", found.offered - found.tried
+    if less <= 0:
+        return f"{text}."
+    there = f"{'is' if less == 1 else 'are'} in the model already, or " if found.before else ""
+    return f"{text}; {counted(less, 'more candidate')} {there}would change what {'it' if there else 'the model'} has none of."
 
 
 def _what(found: Explanation, best: Judged, robot: Robot) -> str:
