@@ -39,10 +39,10 @@ def told_in_units(each: Sequence[InUnits]) -> list[str]:
 
 def farther_off(was: InUnits, now: InUnits, fell: bool) -> str:
     """A warning for people where a second model is farther off in any of these, or hardly nearer in all; empty: neither.
-    ``fell``: whether it is better by its error."""
+    ``fell``: whether it is better by its error, and so may be taken for nearer."""
     worse = [of for of in was if now[of] > FARTHER * was[of]]
-    if not worse and any(now[of] < NEARER * was[of] for of in was):
-        return ""
+    if not worse and (not fell or any(now[of] < NEARER * was[of] for of in was)):
+        return ""  # nobody was told of anything better that these do not show
     told = "; ".join(_told(of, [was[of], now[of]]) for of in worse or was)
     head = f"{'Farther off' if worse else 'Hardly nearer'} than before in plain numbers"
     if not fell:
