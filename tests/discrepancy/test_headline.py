@@ -16,11 +16,11 @@ TERMS = (
 )
 
 
-def of(flags: list[str]) -> tuple[Any, Any]:
-    """A finding of as many effects, called a, b, c."""
+def of(flags: list[str], doubted: str = "") -> tuple[Any, Any]:
+    """A finding of as many effects, called a, b, c; on those of ``doubted`` less depends than is left unexplained."""
     terms = [term("coulomb_friction", f"joint_{k}", torque_nm=0.1) for k in range(len(flags))]
     parameters = [SimpleNamespace(term=k, flag=flag, doubt="") for k, flag in enumerate(flags)]
-    shares = [SimpleNamespace(terms=(t,), text="abcde"[k]) for k, t in enumerate(terms)]
+    shares = [SimpleNamespace(terms=(t,), text="abcde"[k], doubted="abcde"[k] in doubted) for k, t in enumerate(terms)]
     return SimpleNamespace(terms=terms, parameters=parameters), shares
 
 
@@ -34,7 +34,7 @@ def headline(flags: list[str], doubt: str = "") -> str:
         SimpleNamespace(term=2, flag=flags[2], doubt=doubt),
     ]
     found: Any = SimpleNamespace(terms=TERMS, parameters=parameters)
-    shares: Any = [SimpleNamespace(terms=(t,), text=t.effect) for t in TERMS]
+    shares: Any = [SimpleNamespace(terms=(t,), text=t.effect, doubted=False) for t in TERMS]
     return _listed(found, shares)
 
 
@@ -55,6 +55,13 @@ def test_what_ended_at_a_bound_and_may_be_what_is_left_unexplained_may_be_nothin
 
 def test_more_than_a_headline_holds_is_counted() -> None:
     assert _listed(*of(["", "", "", "", NEUTRAL])) == "a; b; c; and 1 more, and 1 that may be nothing"
+
+
+def test_what_may_stand_in_for_something_else_does_not_lead() -> None:
+    assert _listed(*of(["", "", "", NEUTRAL], "ab")) == (
+        "c; and 2 that may stand in for something else, and 1 that may be nothing"
+    )
+    assert _listed(*of(["", "", NEUTRAL], "ab")) == "a; b; and 1 that may be nothing", "there is nothing else"
 
 
 def test_where_all_may_be_nothing_it_is_named() -> None:

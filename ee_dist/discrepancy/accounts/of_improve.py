@@ -214,13 +214,16 @@ def doubt_text(doubted: Sequence[Share]) -> list[str]:
 
 
 def _listed(found: Improvement, parts: Sequence[Share]) -> str:
-    """The first few of what is told; what may be nothing is counted, and named only where there is nothing else."""
-    told = [s.text for s in parts if not may_be_nothing(found, s.terms)]
-    names = told or [s.text for s in parts]
+    """The first few of what is told; what may stand in for something else, and what may be nothing, is counted, and named only
+    where there is nothing else."""
+    told = [s for s in parts if not may_be_nothing(found, s.terms)]
+    sure = [s for s in told if not s.doubted]
+    names = [s.text for s in sure or told or parts]
     some = "; ".join(names[:NAMED])
     more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
-    unsure = len(parts) - len(told)
-    more += [f"{unsure} that may be nothing"] if told and unsure else []
+    stands_in, nothing = len(told) - len(sure), len(parts) - len(told)
+    more += [f"{stands_in} that may stand in for something else"] if sure and stands_in else []
+    more += [f"{nothing} that may be nothing"] if told and nothing else []
     return f"{some}; and {', and '.join(more)}" if more else some
 
 
