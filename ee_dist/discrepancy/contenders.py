@@ -64,10 +64,11 @@ def _nearby(model: Model, u: Array) -> tuple[tuple[Hypothesis, ...], tuple[float
     return tuple(out), tuple(steps)
 
 
-def with_one_exchanged(terms: Hypothesis, old: str, new: Hypothesis) -> Hypothesis:
-    """A model in which other terms stand where one of that name stood."""
-    at = [t.name for t in terms].index(old)
-    return (*terms[:at], *new, *terms[at + 1 :])
+def with_others_for(terms: Hypothesis, old: Hypothesis, new: Hypothesis) -> Hypothesis:
+    """A model in which other terms stand where the first of the ``old`` stood, and none of these."""
+    gone = {t.name for t in old}
+    at = [t.name in gone for t in terms].index(True)
+    return (*terms[:at], *new, *(t for t in terms[at:] if t.name not in gone))
 
 
 def suspected(chosen: Candidate, share: float) -> Hypothesis:

@@ -58,7 +58,7 @@ def twins_of(current: Current, ladder: Sequence[Rung], own: int) -> list[tuple[i
         for t in rung.added
         if t.name in where and len(rung.added) == 1
         for p, u in rung.alternatives
-        if p.parts[0].name not in where
+        if len(p.parts) == 1 and p.parts[0].name not in where
     ]
 
 

@@ -178,7 +178,7 @@ def improve(
             # Shown are the values of a fit of all data, which the model keeps; the errors are those of data held out.
             rung.terms = (*search.fixed, *current.hypothesis)
             rung.added = current.hypothesis[len(current.parts) - len(best.proposal.parts) :]
-            rung.alternatives = [(j.proposal, j.own) for j in last.tied[1:] if j.earned and len(j.proposal.parts) == 1]
+            rung.alternatives = [(j.proposal, j.own) for j in last.tied[1:] if j.earned]
             cut = best.outcome.cut
             current, rung.dropped = without_useless(search, current, own, len(best.proposal.parts), cut, len(pool))
             _as_it_stands(search, current, cut, rung)

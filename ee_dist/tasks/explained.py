@@ -7,21 +7,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ee_dist.discrepancy.contenders import with_one_exchanged
+from ee_dist.basics.quoted import one_line
+from ee_dist.discrepancy.accounts.of_improve import EACH
+from ee_dist.discrepancy.contenders import with_others_for
 from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, term
 from ee_dist.effects.plugins import load_plugin
 from ee_dist.robots.model import Robot
 from ee_dist.robots.untrusted import UntrustedError, json_of, text_of, yaml_of
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig
 from ee_dist.tasks.folder import SETTINGS
+from ee_dist.tasks.summary import FORMAT
 
+Explanations = list[tuple[str, Hypothesis]]
 KEY = "task.explained"
 
 
 @dataclass(frozen=True)
 class Explained:
     """``explanations``: (name, all terms of the model with it), the best first; one alone where nothing is tied with it, or
-    nothing was found (then the model as it is). ``way``: of comparing; ``config``: settings that look at the same again."""
+    nothing was found (then the model as it is). ``way``: of comparing; ``config``: settings that look at the same again;
+    ``by_name``: what is tied with it too, of which no values were kept."""
 
     folder: Path
     task: str
@@ -29,6 +34,7 @@ class Explained:
     way: str
     explanations: tuple[tuple[str, Hypothesis], ...]
     config: Config
+    by_name: tuple[str, ...] = ()
 
 
 def summary_of(path: Path) -> Mapping[str, Any]:
@@ -36,10 +42,19 @@ def summary_of(path: Path) -> Mapping[str, Any]:
     file = path / "summary.json" if path.is_dir() else path
     try:
         found = json_of(text_of(file, 2**28))
-    except (OSError, UntrustedError):
-        found = None
-    if not isinstance(found, dict):
-        raise ConfigError(f"{KEY}={path}: no summary.json of explain or improve there")
+    except OSError:
+        raise ConfigError(f"{KEY}={path}: no summary.json of explain or improve there") from None
+    except UntrustedError as error:
+        raise ConfigError(
+            f"{KEY}={path}: its summary cannot be read ({one_line(str(error), 120)}); it was cut or changed: run it again"
+        ) from None
+    if not isinstance(found, dict) or "task" not in found:
+        raise ConfigError(f"{KEY}={path}: {file.name} there is none of ours; expected that of explain or improve")
+    if found.get("format", FORMAT) != FORMAT:
+        raise ConfigError(
+            f"{KEY}={path}: its summary has format {one_line(str(found['format']), 40)}, and this version of ee_dist knows "
+            f"{FORMAT}: read it with the version that wrote it, or run it again"
+        )
     return found
 
 
@@ -56,21 +71,21 @@ def explained(path: str | None, config: Config) -> Explained:
     summary = summary_of(given)
     folder = given if given.is_dir() else given.parent
     read = {"explain": _of_explanation, "improve": _of_model}
-    task = str(summary.get("task"))
+    task = str(summary["task"])
     if task not in read:
         raise ConfigError(
-            f"{KEY}={path}: a run of task={task}, which names no explanations; expected explain or improve"
+            f"{KEY}={path}: a run of task={one_line(task, 40)}, which names no explanations; expected explain or improve"
         )
     settings = _settings(folder, config)
     try:
-        found = read[task](summary)
+        found, by_name = read[task](summary)
         verdict, way, engine = str(summary["verdict"]), str(summary["way"]), str(summary["engine"])
         settings = settings if settings.engine.name == engine else replace(settings, engine=EngineConfig(engine))
     except (EffectError, KeyError, TypeError, ValueError, IndexError, AttributeError):
         raise ConfigError(
             f"{KEY}={path}: its summary is not as task={task} writes it; it was changed, or is of another version: run it again"
         ) from None
-    return Explained(folder, task, verdict, way, tuple(found), settings)
+    return Explained(folder, task, verdict, way, tuple(found), settings, tuple(by_name))
 
 
 def fitting(found: Explained, robot: Robot) -> None:
@@ -82,32 +97,41 @@ def fitting(found: Explained, robot: Robot) -> None:
             raise ConfigError(f"{KEY}={found.folder}: {name} does not fit the robot of the log: {error}") from None
 
 
-def _of_explanation(summary: Mapping[str, Any]) -> list[tuple[str, Hypothesis]]:
+def _of_explanation(summary: Mapping[str, Any]) -> tuple[Explanations, list[str]]:
     model = _terms(summary["model_terms"])
     ranked = [c for c in summary["candidates"] if c["earned"]]
     if summary["verdict"] != "effect" or not ranked:
-        return [("the model as it is", model)]
+        return [("the model as it is", model)], []
     best = ranked[0]
     tied = [best, *(c for c in ranked[1:] if c["name"] in best["tied_with"])]
-    return [(str(c["name"]), (*model, *_terms(c["terms"]))) for c in tied]
+    return [(str(c["name"]), (*model, *_terms(c["terms"]))) for c in tied], []
 
 
-def _of_model(summary: Mapping[str, Any]) -> list[tuple[str, Hypothesis]]:
-    """The model in the end, and that with one of its effects exchanged for what was tied with it when it was added, or does
-    as well in the end."""
+def _of_model(summary: Mapping[str, Any]) -> tuple[Explanations, list[str]]:
+    """The model in the end, and that with what a step added exchanged for what was tied with it then, or does as well in the
+    end; and what was tied with the best that there is, by name alone."""
     model = _terms(summary["model_terms"])
     present = {t.name for t in model}
-    found: list[tuple[str, Hypothesis]] = [("the model as it is", model)]
+    found: Explanations = [("the model as it is", model)]
+    by_name: list[str] = []
     for rung in summary["ladder"]:
         added = _terms(rung["added"])
-        if len(added) != 1 or added[0].name not in present:
+        if not added or not {t.name for t in added} <= present:
             continue
-        others = [t for t in _terms(rung["alternatives"]) if t.name not in present]
-        if others and found[0][1] is model and len(found) == 1:
-            found = [(added[0].name, model)]
-        found += [(t.name, with_one_exchanged(model, added[0].name, (t,))) for t in others]
+        others = [(str(a.get("name", _terms([a])[0].name)), _terms(a.get("terms", [a]))) for a in rung["alternatives"]]
+        others = [(name, terms) for name, terms in others if not {t.name for t in terms} <= present]
+        if others and len(found) == 1:
+            found = [(str(rung.get("name", added[0].name)), model)]
+        found += [(name, with_others_for(model, added, terms)) for name, terms in others]
+        by_name += [str(name) for name in rung.get("tied_with", ()) if not _there(str(name), present)]
     found += [(_terms([t])[0].name, _terms(t["terms"])) for t in summary.get("twins", ())]
-    return list(dict(found).items())
+    return list(dict(found).items()), [name for name in dict.fromkeys(by_name) if name not in dict(found)]
+
+
+def _there(name: str, present: set[str]) -> bool:
+    """Whether the model has what such a name says, a kind of effect at each of some joints too."""
+    effect, _, place = name.partition("@")
+    return name in present or (place.startswith(EACH) and any(p.startswith(f"{effect}@") for p in present))
 
 
 def _terms(entries: Sequence[Mapping[str, Any]]) -> Hypothesis:

@@ -153,6 +153,13 @@ def nothing_tied(found: Explained) -> str:
     if found.task == "explain" and found.verdict != "effect":
         said = "nothing is missing" if found.verdict == "nothing_missing" else "nothing that was tried explains it"
         return f"{where}: its verdict is that {said}, so that nothing is tied; {more}"
+    if found.by_name:
+        names = listed(found.by_name)
+        kinds = ",".join(dict.fromkeys(part.partition("@")[0] for name in found.by_name for part in name.split(" + ")))
+        return (
+            f"{where}: it is tied with {names}, of which it kept no values to plan with; explain keeps them: plan for a run "
+            f"of task=explain on the same measurements (quick with task.only=[{kinds}] and the effect itself)"
+        )
     return f"{where}: nothing is tied with {found.explanations[0][0]}: no further trial is needed to tell; {more}"
 
 

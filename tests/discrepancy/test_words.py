@@ -251,7 +251,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         assert account.headline.endswith(said) or said in account.headline
         assert not account.planner, "nothing is tied"
         assert account.good is (verdict == EXPLAINED) and ("Nothing" in account.headline) is account.good
-    rung.alternatives = [("a proposal", ())]
+    rung.alternatives = [(SimpleNamespace(name="speed_limit@each of 3 joints"), ())]
     found.ladder = [start, rung]
     assert improve_account(problem, found, "plan it").first[-1].endswith(" plan it")  # type: ignore[arg-type]
     rung.dropped = ("offset_torque@servo",)

@@ -16,6 +16,7 @@ from ee_dist.recording.reader import read_run
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.explained import explained
+from ee_dist.tasks.plan import nothing_tied
 from ee_dist.tasks.results.plan_page import account_of
 from ee_dist.trials.excitation import parse
 
@@ -165,6 +166,44 @@ def test_a_run_of_improve_gives_its_model_and_that_with_what_was_tied_in_its_pla
     assert (last[0], [t.effect for t in last[1]]) == (
         "motor_weak@servo", ["command_delay", "coulomb_friction", "motor_weak"]
     )  # fmt: skip
+
+
+def test_what_is_tied_as_a_family_is_told_apart_too(tmp_path):
+    """All that a step added exchanged for all of a family; of a tie whose values were not kept nobody says that there is none."""
+    shared = {"effect": "viscous_friction", "target": "all_joints", "values": {"damping_nm_s_rad": 0.3}}
+    joints = ("turn", "shoulder", "elbow")
+    slow = [{"effect": "speed_limit", "target": j, "values": {"loss": 0.3}} for j in joints]
+    family = {**slow[0], "name": "speed_limit@each of 3 joints", "terms": slow}
+    ties = ["speed_limit@each of 3 joints", "viscous_friction@each of 3 joints"]
+    step = {"name": "viscous_friction@all_joints", "added": [shared], "alternatives": [family], "tied_with": ties}
+    summary = {
+        "task": "improve",
+        "verdict": "explained",
+        "way": "open_loop",
+        "engine": "mujoco",
+        "model_terms": [shared],
+    }
+
+    def found(**changed):
+        (tmp_path / "summary.json").write_text(json.dumps({**summary, "ladder": [{**step, **changed}]}))
+        return explained(str(tmp_path), Config(measured="trial.mcap"))
+
+    assert [(name, [t.name for t in terms]) for name, terms in found().explanations] == [
+        ("viscous_friction@all_joints", ["viscous_friction@all_joints"]),
+        ("speed_limit@each of 3 joints", [f"speed_limit@{j}" for j in joints]),
+    ]
+    assert not found().by_name
+    (tmp_path / "summary.json").write_text(
+        json.dumps({**summary, "model_terms": slow, "ladder": [{**step, "name": family["name"], "added": slow, "alternatives": [
+            {**shared, "name": "viscous_friction@all_joints", "terms": [shared]}]}]})
+    )  # fmt: skip
+    exchanged = explained(str(tmp_path), Config(measured="trial.mcap")).explanations[1]
+    assert [t.name for t in exchanged[1]] == ["viscous_friction@all_joints"]
+    named = found(alternatives=[])
+    assert len(named.explanations) == 1 and named.by_name == ("speed_limit@each of 3 joints",)
+    assert "no further trial" not in nothing_tied(
+        named
+    ) and "task.only=[speed_limit] and the effect itself" in nothing_tied(named)
 
 
 def test_a_plan_looks_at_the_trials_that_its_run_looked_at(tmp_path) -> None:

@@ -41,15 +41,17 @@ from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, ENDED, HARDLY, NEU
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.improve import EXPLAINED
-from ee_dist.discrepancy.ladder import Improvement, Twin
+from ee_dist.discrepancy.ladder import Improvement, Rung, Twin
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import Proposal
 from ee_dist.discrepancy.torque_scale import torques_compared
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
 from ee_dist.discrepancy.words import by_effect, much, percent, phrase, placed, plain, without_values
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
 
 NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
 EACH = "each of "
@@ -71,6 +73,16 @@ def has(names: AbstractSet[str], told: str, robot: Robot) -> bool:
         return name in names or (bool(members) and {f"{kind}@{m}" for m in members} <= names)
 
     return all(map(there, told.split(" + ")))
+
+
+def rivals(found: Improvement, rung: Rung, robot: Robot) -> list[tuple[Proposal, Array]]:
+    """What could be in the place of all that a step added, and the values that suited then: what a further trial is planned to
+    tell from it. Not what the model has in the end, nor what nobody asked about again once more had come."""
+    names = {t.name for t in found.terms}
+    steps = [r for r in found.ladder if r.added]
+    if not rung.added or not {t.name for t in rung.added} <= names or (len(rung.added) > 1 and rung is not steps[-1]):
+        return []
+    return [(p, u) for p, u in rung.alternatives if not has(names, p.name, robot)]
 
 
 def improve_account(
@@ -152,7 +164,7 @@ def improve_account(
         error = f"{error} {word.text}"
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     advice = slower(unsure) if unsure else MEND if wrong else advice
-    tied = bool(found.twins) or any(r.alternatives and len(r.added) == 1 and r.added[0].name in names for r in steps)
+    tied = bool(found.twins) or any(rivals(found, r, robot) for r in steps)
     warnings = tuple(odd_text(o, robot) for o in found.odd)
     nothing = problem.says_nothing(found.terms) if len(found.ladder) > 1 else ""
     if nothing:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_improve import rivals
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged
@@ -17,9 +18,11 @@ from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import Proposal
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.summary import hypothesis_list
+from ee_dist.trials.log import Array
 
 
 def common(problem: Problem, account: Account, floor: float, source: str, model: Hypothesis) -> dict[str, Any]:
@@ -119,7 +122,7 @@ def of_left(left: Sequence[Leftover]) -> list[dict[str, Any]]:
     return [{"trial": g.trial, "channel": g.channel, "deviations": g.z, "slow": g.trend} for g in left]
 
 
-def of_rung(problem: Problem, r: Rung) -> dict[str, Any]:
+def of_rung(problem: Problem, found: Improvement, r: Rung) -> dict[str, Any]:
     added = hypothesis_list(r.added)
     first = added[0] if added else {"effect": None, "target": None, "values": {}}
     return {
@@ -133,8 +136,14 @@ def of_rung(problem: Problem, r: Rung) -> dict[str, Any]:
         "held_out": r.held_out,
         "interval": list(r.interval),
         "tied_with": r.tied_with,
-        "alternatives": hypothesis_list(tuple(t for p, u in r.alternatives for t in Model(p.parts).hypothesis(u))),
+        "alternatives": [_of_rival(p, u) for p, u in rivals(found, r, problem.robot)],
     }
+
+
+def _of_rival(proposal: Proposal, u: Array) -> dict[str, Any]:
+    """As a candidate: of several terms its first, and ``terms`` has all."""
+    terms = hypothesis_list(Model(proposal.parts).hypothesis(u))
+    return {**terms[0], "name": proposal.name, "terms": terms}
 
 
 def _place(name: str) -> dict[str, str]:
@@ -169,7 +178,7 @@ def of_improvement(
         **common(problem, account, found.noise_floor, found.floor_source, found.terms),
         "verdict": found.verdict,
         "explained": found.explained,
-        "ladder": [of_rung(problem, r) for r in found.ladder],
+        "ladder": [of_rung(problem, found, r) for r in found.ladder],
         "model": path,
         "last_word": of_last_word(word),
         "parameters": of_parameters(found.terms, found.parameters),
