@@ -87,7 +87,9 @@ def heat_map(
     label: str = "error (standard deviations)",
 ) -> go.Figure:
     """(segments, channels) errors, one table or two below each other; what ``floor`` noise leaves is near the background."""
-    shown = [k for k in range(tables[0].shape[1]) if any(t[:, k].any() for t in tables)]
+    every = range(tables[0].shape[1])
+    # Without noise a right model may leave nothing at all: then all rows are shown, and none stands out.
+    shown = [k for k in every if any(t[:, k].any() for t in tables)] or [*every]
     top = max(4.0 * floor, float(np.quantile(tables[0][:, shown], 0.98)))
     named = list(titles) if len(tables) > 1 else None
     # Room for a title between two tables, however few rows they have.

@@ -70,6 +70,12 @@ def full_page() -> Page:
     )
 
 
+def test_a_heat_map_of_no_error_at_all_shows_every_row() -> None:
+    """As a right model leaves of sensors without noise."""
+    figure = figures.heat_map([np.zeros((3, 2))], ["a", "b", "c"], ["one", "other"])
+    assert list(figure.data[0].y) == ["one", "other"]
+
+
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(full_page(), tmp_path_factory.mktemp("page") / "report.html")
