@@ -43,6 +43,7 @@ from ee_dist.tasks.folder import (
     NO_NAME,
     SETTINGS,
     Refused,
+    can_go_on,
     claimed,
     forget_sweep,
     free_name,
@@ -54,7 +55,7 @@ from ee_dist.tasks.folder import (
 )
 from ee_dist.tasks.help import answer
 from ee_dist.tasks.sweep import Jobs
-from ee_dist.tasks.unfinished import FOLDER, SO_FAR, can_go_on, finished, goes_on, unfinished
+from ee_dist.tasks.unfinished import FOLDER, SO_FAR, finished, goes_on, unfinished
 
 MISTAKE, DEFECT = 2, 1
 _jobs = Jobs()
@@ -131,7 +132,16 @@ def _lost(why: str, out: Path) -> NoReturn:
 
 
 def _what_is_kept(out: Path) -> str:
-    return kept(out) + _how_to_go_on(out)
+    return kept(out) + (_how_to_go_on(out) or _how_to_begin_anew(out))
+
+
+def _how_to_begin_anew(out: Path) -> str:
+    """Of a run that left files, none of which it could go on from: the same command alone would be refused."""
+    if set(held(out)) <= {SETTINGS}:
+        return ""
+    whole = _whole(out)
+    where = "" if whole == out else f", resume={shown(whole)}"
+    return f"; the same command{where} and overwrite=true begins it anew"
 
 
 def _how_to_go_on(out: Path) -> str:

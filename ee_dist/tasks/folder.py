@@ -30,8 +30,11 @@ _SWEEP = "multirun.yaml"
 NO_NAME = "{key}=: which folder? a run writes into one of its own, such as {key}=logs/mine"
 HELD = (
     "{key}={folder}: holds something already ({content}), and a run does not overwrite; "
-    "name another folder, or say overwrite=true"
+    "{onward}name another folder, or say overwrite=true"
 )
+ONWARD = "the same command and resume={folder} goes on with it; "
+UNFINISHED, BEGUN = "unfinished", "run.json"
+"""What a run leaves for its resumption (see unfinished.py): the folder, and the file in it that is there first."""
 
 _made: tuple[Path, ...] = ()
 _sweep: Path | None = None
@@ -56,7 +59,9 @@ class NotedFolders(Callback):
         if not str(config.hydra.sweep.dir).strip():
             raise Refused(NO_NAME.format(key="hydra.sweep.dir"))
         if (Path(str(config.hydra.sweep.dir)) / _SWEEP).exists() and not (config.overwrite or config.resume):
-            raise Refused(HELD.format(key="hydra.sweep.dir", folder=config.hydra.sweep.dir, content="a sweep"))
+            there = config.hydra.sweep.dir
+            onward = ONWARD.format(folder=there)
+            raise Refused(HELD.format(key="hydra.sweep.dir", folder=there, content="a sweep", onward=onward))
         global _made, _sweep
         folder = Path(str(config.hydra.sweep.dir))
         self._missing = _made = missing(folder)
@@ -107,7 +112,9 @@ def claimed(folder: Path, settings: Mapping[str, str], overwrite: bool) -> Itera
     try:
         found = held(folder)
         if found and not overwrite:
-            raise ConfigError(HELD.format(key="hydra.run.dir", folder=shown(folder), content=_listed(found)))
+            onward = ONWARD.format(folder=shown(folder)) if can_go_on(folder) else ""
+            told = HELD.format(key="hydra.run.dir", folder=shown(folder), content=_listed(found), onward=onward)
+            raise ConfigError(told)
         _place(folder / SETTINGS, settings, before)
         yield
     except BaseException:
@@ -153,6 +160,11 @@ def kept(folder: Path) -> str:
     """What a run that was stopped leaves behind, in words."""
     names = [n + _size(folder / n) for n in held(folder) if n != SETTINGS]
     return f"kept in {shown(folder)}: {_listed(names)}" if names else "nothing was recorded yet, so nothing is kept"
+
+
+def can_go_on(folder: Path) -> bool:
+    """Whether ``resume=`` of that folder would find anything."""
+    return (folder / UNFINISHED / BEGUN).exists()
 
 
 def settings_of(composed: DictConfig, hydra: DictConfig) -> dict[str, str]:

@@ -27,13 +27,12 @@ from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.system import System
 from ee_dist.robots.untrusted import UntrustedError, json_of, plain_of, text_of
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.folder import SETTINGS, held, shown
+from ee_dist.tasks.folder import BEGUN, SETTINGS, UNFINISHED, held, shown
 from ee_dist.tasks.summary import config_digest, config_yaml
 from ee_dist.trials.hardware import Hardware
 from ee_dist.trials.log import SensorLog
 
-FOLDER = "unfinished"
-_RUN, _SIMULATED = "run.json", "simulated.bin"
+FOLDER, _RUN, _SIMULATED = UNFINISHED, BEGUN, "simulated.bin"
 SO_FAR = "model.yaml"
 """The model that a search had reached when it was stopped, for those who cannot wait."""
 _PACKAGES = ("ee_dist", "pybullet", "mujoco", "numpy", "numba")
@@ -244,11 +243,6 @@ def finished(out: Path, config: Config, options: Any) -> bool:
         return bool(summary["config_digest"] == config_digest(config, options))
     except (OSError, UntrustedError, KeyError, TypeError):
         return False
-
-
-def can_go_on(out: Path) -> bool:
-    """Whether ``resume=`` of that folder would find anything."""
-    return (out / FOLDER / _RUN).exists()
 
 
 def goes_on(out: Path) -> bool:

@@ -89,7 +89,7 @@ def test_what_cannot_be_resumed_is_said_in_one_line(cli, tiny, tmp_path, stoppin
     for arguments, said in (
         ((*tiny, *FAST, "seed=3", f"resume={out}"), "the run there has other settings (seed=0)"),
         ((*tiny, *FAST, f"resume={tmp_path}/nowhere"), "no run was begun there"),
-        ((*tiny, *FAST, f"hydra.run.dir={out}"), "holds something already"),
+        ((*tiny, *FAST, f"hydra.run.dir={out}"), "the same command and resume="),
     ):
         outcome = cli(*arguments)
         assert outcome.status == 2
@@ -214,6 +214,14 @@ def test_a_search_that_simulates_nothing_keeps_its_model_too(cli, tmp_path, monk
     monkeypatch.setattr(improving, "examine", real)
     assert cli(*ask, f"resume={run}").status == 0
     assert not so_far.parent.exists() and (run / "model.yaml").exists()
+
+
+def test_a_run_that_kept_nothing_to_go_on_from_says_what_begins_it_anew(tmp_path):
+    """As a trial that was stopped once its envelope was sealed, before it was made: the same command alone is refused."""
+    (tmp_path / "config").mkdir()
+    assert _what_is_kept(tmp_path) == "nothing was recorded yet, so nothing is kept"
+    (tmp_path / "sealed.json").write_text("{}")
+    assert _what_is_kept(tmp_path).endswith(": sealed.json; the same command and overwrite=true begins it anew")
 
 
 def test_a_sweep_goes_on_where_it_stopped(cli, tiny, tmp_path, stopping):
