@@ -20,6 +20,8 @@ from ee_dist.tasks.summary import FORMAT
 
 Explanations = list[tuple[str, Hypothesis]]
 KEY = "task.explained"
+LARGEST_SUMMARY = 2**28
+"""Bytes."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ def summary_of(path: Path) -> Mapping[str, Any]:
     """The summary.json in a folder, or that file. Raises ConfigError."""
     file = path / "summary.json" if path.is_dir() else path
     try:
-        found = json_of(text_of(file, 2**28))
+        found = json_of(text_of(file, LARGEST_SUMMARY))
     except OSError:
         raise ConfigError(f"{KEY}={path}: no summary.json of explain or improve there") from None
     except UntrustedError as error:

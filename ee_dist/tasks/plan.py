@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +25,9 @@ from ee_dist.robots.describe import BUILT_IN
 from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import command_unit
 from ee_dist.robots.serial import robot_to_dict
+from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import Config, ConfigError, one_of
-from ee_dist.tasks.explained import Explained, explained, fitting
+from ee_dist.tasks.explained import LARGEST_SUMMARY, Explained, explained, fitting
 from ee_dist.tasks.measurements import FEWEST_ROWS, load, with_known_noise
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import command, setting
@@ -128,7 +132,8 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     out.mkdir(parents=True, exist_ok=True)
     write_whole(out / CSV, as_csv(robot, best))
     trial = ["task=trial", *robot_settings(robot, out), f"task.noise={noise_share(robot):.3g}",
-             setting("engine", found.config.engine.name), f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
+             setting("engine", found.config.engine.name), f"seed={another_seed(measured.files, config.seed)}",
+             f'task.excitations=["{typed(robot, best)}"]']  # fmt: skip
     explanations = list(zip(names, models, strict=True))
     account = account_of(
         robot, result, explanations, command(trial), any(c.nearby for c in rivals), len(found.explanations) - MOST_TIED,
@@ -208,6 +213,16 @@ def rated(robot: Robot) -> list[str]:
 def noise_share(robot: Robot) -> float:
     """Noise of the sensors as task=trial takes it: the middle one of their shares of the channels' ranges."""
     return float(np.median([s.noise / channel_range(robot, s) for s in robot.sensors]))
+
+
+def another_seed(files: Sequence[Path], own: int) -> int:
+    """The first after the plan's ``own`` that made none of these trials, as far as that is recorded beside them: trials of one
+    seed have the same noise, sample by sample, which explained together would count twice."""
+    used = set()
+    for file in files:
+        with suppress(OSError, UntrustedError, KeyError, TypeError):
+            used.add(json_of(text_of(file.parent / "summary.json", LARGEST_SUMMARY))["seed"])
+    return next(seed for seed in count(own + 1) if seed not in used)
 
 
 def robot_settings(robot: Robot, out: Path) -> list[str]:
