@@ -265,6 +265,11 @@ class Plan:
     def best(self) -> PlannedTrial:
         return self.trials[0]
 
+    @property
+    def all_told(self) -> bool:
+        """Whether the first tells every pair apart, so that nothing is open once it was made."""
+        return self.enough and not self.alike
+
 
 def ranked(count: int, trials: Sequence[PlannedTrial]) -> Plan:
     """Trials of ``count`` explanations by the separation of the two most similar ones, among the pairs that any of the trials

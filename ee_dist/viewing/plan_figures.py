@@ -11,6 +11,8 @@ from ee_dist.trials.log import Array
 from ee_dist.viewing.report_figures import styled
 
 COLOURS = ("#4a90d9", "#e08a00", "#2e9e62", "#d0409a", "#a678e2", "#8a6d3b")
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+"""Explanations that are alike lie on one another: between the dashes of a later one the one below is seen."""
 MOST_POINTS = 1500
 
 
@@ -19,9 +21,15 @@ def parted(
 ) -> go.Figure:
     """Predictions (explanations, T), and below how far each is from the first of the two that are most similar."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.6, 0.4], vertical_spacing=0.06)
-    for k, (values, name) in enumerate(zip(curves, names, strict=True)):
-        line = {"color": COLOURS[k % len(COLOURS)], "width": 3 if k in pair else 1.5}
-        figure.add_scatter(x=times_s, y=values, name=name, line=line, mode="lines", legendgroup=name, row=1, col=1)
+    for place, k in enumerate(sorted(range(len(names)), key=lambda k: k not in pair)):
+        values, name = curves[k], names[k]
+        line = {
+            "color": COLOURS[k % len(COLOURS)],
+            "width": 3 if k in pair else 1.5,
+            "dash": DASHES[place % len(DASHES)],
+        }
+        figure.add_scatter(x=times_s, y=values, name=name, line=line, mode="lines", legendgroup=name, legendrank=k + 1,
+                           row=1, col=1)  # fmt: skip
         figure.add_scatter(x=times_s, y=values - curves[pair[0]], name=name, line=line, mode="lines", legendgroup=name,
                            showlegend=False, row=2, col=1)  # fmt: skip
     figure.add_vrect(x0=around[0], x1=around[1], fillcolor="#8899aa", opacity=0.14, line_width=0, layer="below")

@@ -12,13 +12,15 @@ import pandas as pd
 import pytest
 import yaml
 
+from ee_dist.discrepancy.plan import Parting, PlannedTrial, ranked
 from ee_dist.recording.reader import read_run
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.explained import explained
-from ee_dist.tasks.plan import nothing_tied
-from ee_dist.tasks.results.plan_page import account_of
+from ee_dist.tasks.plan import another_seed, nothing_tied
+from ee_dist.tasks.results.plan_page import account_of, of_plan, plan_page
 from ee_dist.trials.excitation import parse
+from ee_dist.trials.family import Limits
 
 QUICK = ("engine=mujoco", "evaluator=serial")
 SUSPECTS = "task.only=[part_mass,command_gain]"
@@ -66,6 +68,7 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
     # The same file of commands as the trial that the line makes.
     line = shlex.join(found["command"])
     assert line in outcome.out and " task.noise=0.001 " in line, "numbers need no quotes"
+    assert " seed=1 " in line, "the first trial has that of 0"
     second, _ = run(*shlex.split(line)[3:], HIDDEN)
     sent = pd.read_csv(plan / found["csv"])
     assert list(sent.columns) == ["time_s", "servo_command (rad)"]
@@ -104,8 +107,9 @@ def test_the_planned_trial_tells_apart_what_one_trial_left_tied(run, cli):
 def test_who_has_a_real_robot_is_not_sent_to_a_simulated_one():
     robot, best = servo_pendulum(), parse("sway:seconds=2,amplitude=0.5,seed=1")
     found = SimpleNamespace(
-        best=SimpleNamespace(excitation=best, separation=60.0), closest=(0, 1), enough=True, trials=[best], alike=[]
-    )
+        best=SimpleNamespace(excitation=best, separation=60.0), closest=(0, 1), enough=True, trials=[best], alike=[],
+        all_told=True,
+    )  # fmt: skip
     tied_ones = [("part_mass@arm", ()), ("command_gain@servo", ())]
     real, simulated = (
         account_of(robot, found, tied_ones, "python -m ee_dist task=trial", True, real=r) for r in (True, False)
@@ -113,6 +117,46 @@ def test_who_has_a_real_robot_is_not_sent_to_a_simulated_one():
     assert real.first[-1] == "Next: send plan.csv to the robot, and import its log beside the others (task=import)."
     assert not any("Next:" in line for line in simulated.first), "the command follows"
     assert real.headline == simulated.headline
+
+
+def test_what_no_trial_tells_apart_stands_in_the_first_line_and_leaves_the_question_open():
+    trials = tuple(
+        PlannedTrial(parse(f"sway:seconds=2,amplitude=0.5,seed={k}"), 0.0, (20.2, 19.7, 0.07)) for k in range(12)
+    )
+    found, robot = ranked(3, trials), servo_pendulum()
+    tied_ones = [("zero_offset@servo", ()), ("offset_torque@servo", ()), ("friction_asymmetry@servo", ())]
+    told = account_of(robot, found, tied_ones, "python -m ee_dist task=trial", True)
+    assert told.headline.endswith(
+        "No trial within these limits tells offset torque at servo from friction asymmetry at servo."
+    )
+    assert "(19.7 standard deviations, 4 are enough)" in told.headline and not told.good
+    assert "the two most similar that can be told apart decide" in told.sure
+    summary = of_plan(found, tied_ones, Path(), [], Limits(2.0, 0.5), told)
+    assert summary["best"]["enough"] and not summary["enough"] and len(summary["alike"]) == 1
+    curves = np.array([np.linspace(0, 1, 50)] * 3)
+    page = plan_page(robot, found, tied_ones, Parting(0, 0.1, 0.3, np.linspace(0, 1, 50), curves), told, [], "")
+    assert page.tone == "open" and page.tiles[0][1].endswith("the two most similar that can be told apart")
+    assert page.sections[0].caption.endswith(
+        "Shown are 1 of 12, of each motion and size the best; summary.json has all."
+    )
+    drawn = [(curve.line.color, curve.line.dash) for curve in page.proof.figure.data if curve.showlegend is None]
+    assert len({dash for _, dash in drawn}) == 3 and drawn[0][1] == "solid"
+    widths = [curve.line.width for curve in page.proof.figure.data if curve.showlegend is None]
+    assert widths == sorted(widths, reverse=True), "a thick curve hides a thin one that was drawn before"
+
+
+def test_the_next_trial_has_another_noise_than_those_at_hand(tmp_path):
+    """Trials of one seed have the same noise, sample by sample. A log beside which nothing says its seed is passed over."""
+    files = []
+    for name, text in (("a", '{"seed": 1}'), ("b", '{"seed": 2}'), ("c", "[1"), ("d", "[]"), ("e", None)):
+        (tmp_path / name).mkdir()
+        files.append(tmp_path / name / "trial.mcap")
+        if text is not None:
+            (tmp_path / name / "summary.json").write_text(text)
+    assert another_seed(files, 0) == 3
+    assert another_seed(files[:1], 0) == 2
+    assert another_seed(files[2:], 0) == 1
+    assert another_seed(files, 7) == 8
 
 
 def test_a_log_of_30_hz_is_planned_for_at_30_hz(run, cli):

@@ -46,10 +46,13 @@ def account_of(
     best, names = found.best, [placed(n) for n, _ in explanations]
     e, closest = best.excitation, f"{names[found.closest[0]]} from {names[found.closest[1]]}"
     what = f"{e.told(robot).replace('_', ' ')} for {e.seconds:g} s at amplitude {e.amplitude:g}, seed {e.seed}"
+    pairs = listed(f"{names[a]} from {names[b]}" for a, b in found.alike)
     distance = f"{best.separation:.1f} standard deviations, {ENOUGH:g} are enough"
     if found.enough:
         head = f"Record next: {what}. It should tell {closest} ({distance})."
-        sure = f"How sure: {len(found.trials)} trials were simulated for {len(names)} explanations; the two most similar decide."
+        # What stays open belongs beside what is promised, not among the words below.
+        head += f" No trial within these limits tells {pairs}." if found.alike else ""
+        sure = f"How sure: {len(found.trials)} trials were simulated for {len(names)} explanations; {_deciding(found)} decide."
         advice = f"Next: send {CSV} to the robot, and import its log beside the others (task=import)." if real else ""
     else:
         head = f"No trial within these limits is expected to tell {closest}; the best is {what} ({distance})."
@@ -66,16 +69,18 @@ def account_of(
             f"Predicted of sensors that are read every {1000 * every_s:.3g} ms, as in the measurements: read more often, they "
             "tell more."
         )
-    if found.alike and found.enough:
-        pairs = [f"{names[a]} and {names[b]}" for a, b in found.alike]
-        lines.append(f"No trial within these limits tells these apart: {listed(pairs)}.")
     if left_out > 0:
         lines.append(f"{left_out} more that were tied are left out: the first {len(names)} are to be told apart.")
-    return Account(head, f"Tied: {listed(names)}.", sure, tuple(lines), found.enough, advice)
+    return Account(head, f"Tied: {listed(names)}.", sure, tuple(lines), found.all_told, advice)
+
+
+def _deciding(found: Plan) -> str:
+    return "the two most similar that can be told apart" if found.alike and found.enough else "the two most similar"
 
 
 def show_plan(console: Console, robot: Robot, found: Plan) -> None:
-    table = Shown(title="Trials within the limits, by what they tell apart", title_justify="left")
+    of = _shown_of(robot, found)
+    table = Shown(title=f"Trials within the limits, by what they tell apart{of and f' ({of})'}", title_justify="left")
     for name in ("motion", "seconds", "amplitude", "seed", "separation", ""):
         table.add_column(name, justify="left" if name in ("motion", "") else "right")
     for row in _rows(robot, found):
@@ -94,6 +99,12 @@ def _rows(robot: Robot, found: Plan) -> list[list[str]]:
          t.harm or ("enough" if t.separation >= ENOUGH else "not enough")]
         for t in list(kept.values())[:SHOWN]
     ]  # fmt: skip
+
+
+def _shown_of(robot: Robot, found: Plan) -> str:
+    """That a table does not show all, where it does not."""
+    shown, count = len(_rows(robot, found)), len(found.trials)
+    return f"{shown} of {count}, of each motion and size the best" if shown < count else ""
 
 
 def of_plan(
@@ -121,7 +132,7 @@ def of_plan(
         "limits": asdict(limits),
         "explanations": [{"name": n, "terms": hypothesis_list(h)} for n, h in explanations],
         "enough_from": ENOUGH,
-        "enough": found.enough,
+        "enough": found.all_told,
         "alike": [[names[a], names[b]] for a, b in found.alike],
         "best": trial(found.best),
         "trials": [trial(t) for t in found.trials],
@@ -146,11 +157,11 @@ def plan_page(
         f"after {', '.join(f.name for f in files)}; {len(found.trials)} trials were simulated",
         account.headline,
         account.lines,
-        "good" if found.enough else "open",
+        "good" if account.good else "open",
         account.first,
         following=account.then,
         tiles=[
-            (f"{best.separation:.1f}", "standard deviations between the two most similar"),
+            (f"{best.separation:.1f}", f"standard deviations between {_deciding(found)}"),
             (f"{ENOUGH:g}", "are enough to tell them apart"),
             (f"{best.excitation.seconds:g} s", best.excitation.told(robot).replace("_", " ")),
             (str(len(names)), "explanations"),
@@ -159,13 +170,16 @@ def plan_page(
     )
     page.proof = Section(
         f"Where they part most: {plain(sensor.name)}, {around[0]:.1f} to {around[1]:.1f} s",
-        "What each explanation predicts of this trial; below, its distance from the first of the two most similar (drawn thick).",
+        "What each explanation predicts of this trial; below, its distance from the first of the two that decide (drawn thick). "
+        "Where curves lie on one another, dashes let the one below be seen.",
         figures.parted(shown.times_s, shown.curves, names, sensor.unit, around, found.closest),
     )
     rows = _rows(robot, found)
     columns = ["motion", "seconds", "amplitude", "seed", "separation", "judgement"]
     pale = [k for k, r in enumerate(rows) if r[-1] == "not enough"]
-    caption = "Predicted distance of the two explanations that are most similar on it, in standard deviations."
+    of = _shown_of(robot, found)
+    caption = f"Predicted distance of {_deciding(found)} on it, in standard deviations."
+    caption += f" Shown are {of}; summary.json has all." if of else ""
     page.sections.append(
         Section("Trials within the limits", caption, None, Table(columns, rows, (1, 2, 3, 4), (0,), pale))
     )
