@@ -24,7 +24,7 @@ from ee_dist.tasks.results.commands import asked, command, planning, setting
 from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
 from ee_dist.tasks.results.story import links
-from ee_dist.tasks.results.summaries import of_explanation
+from ee_dist.tasks.results.summaries import of_explanation, of_read
 from ee_dist.tasks.results.tables import show_account, show_explanation, typed
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
@@ -94,7 +94,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         account = account.followed(command(asked("improve", config, options.by, effect)))
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
-    write_summary(out, "explain", config, options, watch, digest, of_explanation(problem, found, account, ahead, share))
+    told_all = of_read(measured.read) | of_explanation(problem, found, account, ahead, share)
+    write_summary(out, "explain", config, options, watch, digest, told_all)
     story = links(out, measured.files, config.model)
     write_page(explain_page(problem, measured, found, account, story), out / "report.html")
     if options.rerun:

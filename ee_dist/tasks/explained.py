@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -125,12 +125,12 @@ def _of_model(summary: Mapping[str, Any]) -> tuple[Explanations, list[str]]:
         if others and len(found) == 1:
             found = [(str(rung.get("name", added[0].name)), model)]
         found += [(name, with_others_for(model, added, terms)) for name, terms in others]
-        by_name += [str(name) for name in rung.get("tied_with", ()) if not _there(str(name), present)]
+        by_name += [str(name) for name in rung.get("tied_with", ()) if not is_there(str(name), present)]
     found += [(_terms([t])[0].name, _terms(t["terms"])) for t in summary.get("twins", ())]
     return list(dict(found).items()), [name for name in dict.fromkeys(by_name) if name not in dict(found)]
 
 
-def _there(name: str, present: set[str]) -> bool:
+def is_there(name: str, present: Collection[str]) -> bool:
     """Whether the model has what such a name says, a kind of effect at each of some joints too."""
     effect, _, place = name.partition("@")
     return name in present or (place.startswith(EACH) and any(p.startswith(f"{effect}@") for p in present))

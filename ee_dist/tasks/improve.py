@@ -36,7 +36,7 @@ from ee_dist.tasks.results.labels import step_phrase
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
 from ee_dist.tasks.results.story import links
-from ee_dist.tasks.results.summaries import of_improvement
+from ee_dist.tasks.results.summaries import of_improvement, of_read
 from ee_dist.tasks.results.tables import show_account, show_candidates, show_ladder, show_last_word
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
@@ -120,9 +120,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             "# takes off it.\n" + yaml.safe_dump(calibration, sort_keys=False),
         )
     digest = hashlib.sha256(repr([(r.terms, r.error_heldout) for r in found.ladder]).encode()).hexdigest()
-    write_summary(
-        out, "improve", config, options, watch, digest, of_improvement(problem, found, account, str(path), word)
-    )
+    told_all = of_read(measured.read) | of_improvement(problem, found, account, str(path), word)
+    write_summary(out, "improve", config, options, watch, digest, told_all)
     story = links(out, measured.files, config.model)
     write_page(improve_page(problem, measured, found, account, story, word), out / "report.html")
     if options.rerun:

@@ -61,6 +61,8 @@ class Measurements:
     """What a user should know of before reading any result: where model and log name different robots."""
     held_out: tuple[str, ...] = ()
     """Names of trials that are none of these: they were kept for the last word on a model."""
+    read: tuple[tuple[Path, str], ...] = ()
+    """Every recording that was read, what is held out too, with the seal of the truth beside it, if it has one."""
 
     @property
     def real(self) -> bool:
@@ -107,6 +109,7 @@ def load(config: Config) -> Measurements:
             of_file.append(file)
     if not trials:
         raise LogError(_too_short(*short[0]))
+    read = tuple((file, run.metadata.get("seal", "")) for file, run in zip(files, runs, strict=True))
     kept, apart = divided(names, config.trials, config.held_out)
     trials, files = [trials[k] for k in kept], list(dict.fromkeys(of_file[k] for k in kept))
     held_out = tuple(names[k].name for k in apart)
@@ -129,7 +132,15 @@ def load(config: Config) -> Measurements:
         source = robot.name if named else robot
         lagged = with_lags(robot, trials)
         return Measurements(
-            lagged, tuple(trials), tuple(files), (), source, Path.cwd(), remarks=tuple(remarks), held_out=held_out
+            lagged,
+            tuple(trials),
+            tuple(files),
+            (),
+            source,
+            Path.cwd(),
+            remarks=tuple(remarks),
+            held_out=held_out,
+            read=read,
         )
     believed = read_model(config.model)
     robot, different = agreed(without_sensors(believed.robot, made_of_others), robot, f"model={config.model}")
@@ -150,6 +161,7 @@ def load(config: Config) -> Measurements:
         by,
         tuple(remarks),
         held_out,
+        read,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import one_line
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
@@ -14,7 +15,7 @@ from ee_dist.effects.groups import members_of
 from ee_dist.recording.reader import read_run
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import Config, ConfigError
-from ee_dist.tasks.explained import summary_of
+from ee_dist.tasks.explained import KEY, is_there, summary_of
 from ee_dist.tasks.seal import FILE, opened
 from ee_dist.tasks.summary import Stopwatch, hypothesis_list, write_summary
 from ee_dist.tasks.terminal import terminal
@@ -31,11 +32,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Score:
-    """``right``: all that is true was named at its place, and nothing else. ``named``: what was, in words; ``missed`` and
-    ``invented`` as (effect, target)."""
+    """``right``: all that is true was named at its place, and nothing else. ``named``: what was, each with the alternatives that
+    measurements do not tell from it; ``missed`` and ``invented`` as (effect, target)."""
 
     right: bool
-    named: tuple[str, ...]
+    named: tuple[tuple[str, ...], ...]
     missed: tuple[tuple[str, str], ...] = ()
     invented: tuple[tuple[str, str], ...] = ()
 
@@ -53,20 +54,23 @@ def run(config: Config, options: Options, out: Path) -> None:
     record = read_run(logs[0]) if logs else None
     digest = record.metadata.get("seal") if record else None
     hidden, _ = opened(folder / FILE, digest)
-    found = (
-        score(summary_of(Path(options.explained)), hidden, record.robot if record else None)
-        if options.explained
-        else None
-    )
+    found = None
+    if options.explained:
+        summary = summary_of(Path(options.explained))
+        found = score(summary, hidden, record.robot if record else None)
+        if digest:
+            same_truth(summary, digest, f"{KEY}={options.explained}", f"log={config.log}")
     console.print("The truth: " + ("; ".join(map(str, hidden)) or "nothing was changed"), highlight=False)
     if found is not None:
         verdict = "Right." if found.right else "Not right."
-        console.print(f"Named: {', or '.join(found.named) or 'nothing'}. {verdict}", highlight=False)
+        named = ", and ".join(" or ".join(names) for names in found.named)
+        console.print(f"Named: {named or 'nothing'}. {verdict}", highlight=False)
     out.mkdir(parents=True, exist_ok=True)
     write_summary(out, "reveal", config, options, watch, digest or "", {
         "truth": hypothesis_list(hidden),
         "right": None if found is None else found.right,
-        "named": [] if found is None else found.named,
+        "named": [] if found is None else [names[0] for names in found.named],
+        "alternatives": [] if found is None else [names[1:] for names in found.named],
         "missed": [] if found is None else [{"effect": e, "target": t} for e, t in found.missed],
         "invented": [] if found is None else [{"effect": e, "target": t} for e, t in found.invented],
     })  # fmt: skip
@@ -86,6 +90,24 @@ def score(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -
     raise ConfigError(f"task.explained: a summary of task={one_line(task)}; expected one of explain or improve")
 
 
+def same_truth(summary: Mapping[str, Any], seal: str, run: str, log: str) -> None:
+    """Raises ConfigError where the ``run`` with this summary read recordings, and none that was sealed with this truth. One truth
+    may be sealed beside several logs; what was imported has no seal, and may be of any; earlier versions do not say
+    what they read."""
+    try:
+        read = [(one_line(str(m["file"]), 200), m["seal"]) for m in summary.get("measured", ())]
+    except (KeyError, TypeError):
+        raise ConfigError(
+            f"{run}: its summary does not say what it read as we write it; it was changed: run it again"
+        ) from None
+    seals = [s for _, s in read]
+    if seals and all(seals) and seal not in seals:
+        raise ConfigError(
+            f"{run}: it is of other measurements ({listed(file for file, _ in read)}), with another truth than {log}; name a run "
+            "of explain or improve on that log, or the log that it is of"
+        )
+
+
 def places(terms: Sequence[tuple[str, str]], robot: Robot | None) -> Places:
     """(effect, place) of (effect, target): those of the members where the target is a group."""
     out: set[tuple[str, str]] = set()
@@ -103,7 +125,7 @@ def _of_explanation(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot
     if not hidden or verdict != EFFECT:
         return Score(
             not hidden and verdict == NOTHING_MISSING,
-            tuple(c["name"] for c in summary["candidates"][:1] if verdict == EFFECT),
+            tuple((c["name"],) for c in summary["candidates"][:1] if verdict == EFFECT),
             _pairs(hidden),
         )
     best = summary["candidates"][0]
@@ -114,7 +136,7 @@ def _of_explanation(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot
     right = any(s == whole or s in truth for s in said)
     told = frozenset().union(*said)
     missed = tuple(p for p, t in zip(_pairs(hidden), truth, strict=True) if not t <= told)
-    return Score(right, tuple(c["name"] for c in ties), missed)
+    return Score(right, (tuple(c["name"] for c in ties),), missed)
 
 
 def _of_model(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -> Score:
@@ -143,7 +165,26 @@ def _of_model(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | Non
         else:
             missed.append(pair)
     invented = tuple(a for a in named if a not in used)
-    return Score(not missed and not invented, tuple("@".join(filter(None, n)) for n in named), tuple(missed), invented)
+    return Score(not missed and not invented, _told(summary, named), tuple(missed), invented)
+
+
+def _told(summary: Mapping[str, Any], named: Sequence[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
+    """What was added and stayed, each with what was tied with it then or does as well in the end; what came as one is told as one
+    where something is tied with all of it."""
+    names = {pair: "@".join(filter(None, pair)) for pair in named}
+    present = {"@".join(filter(None, (t["effect"], t["target"]))) for t in summary["model_terms"]}
+    told: dict[str, list[str]] = {}
+    for step in summary["ladder"]:
+        mine = [names[p] for t in step["added"] if (p := (t["effect"], t["target"])) in names]
+        others = [n for n in step.get("tied_with", ()) if not is_there(n, present)] if mine else []
+        for name in [" + ".join(mine)] if others else mine:
+            told.setdefault(name, []).extend(others)
+    for twin in summary.get("twins", ()):
+        place = twin["in_place_of"]
+        told.setdefault("@".join(filter(None, (place["effect"], place["target"]))), []).append(
+            "@".join(filter(None, (twin["effect"], twin["target"])))
+        )
+    return tuple((name, *dict.fromkeys(others)) for name, others in told.items())
 
 
 def _pairs(hidden: Hypothesis) -> tuple[tuple[str, str], ...]:

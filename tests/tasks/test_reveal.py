@@ -8,7 +8,7 @@ from ee_dist.effects.catalogue import Term
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import ConfigError
-from ee_dist.tasks.reveal import score
+from ee_dist.tasks.reveal import same_truth, score
 
 ROBOT = quadruped_lab()
 JOINTS = ROBOT.motor_names
@@ -94,6 +94,33 @@ def test_what_was_missed_and_invented_is_told():
     assert found.invented == (("coulomb_friction", "all_joints"),)
     one = servo_pendulum()
     assert score(explained(("load_friction@servo",)), hidden("load_friction@servo"), one).right
+
+
+def test_what_was_added_is_told_together_and_what_is_tied_as_alternatives():
+    found = score(improved((KNEE,), (OTHER,), tied=("zero_offset@knee_rear_left",)), hidden(KNEE, OTHER), ROBOT)
+    assert found.named == ((KNEE, "zero_offset@knee_rear_left"), (OTHER, "zero_offset@knee_rear_left"))
+    assert score(improved((KNEE,), (OTHER,)), hidden(), ROBOT).named == ((KNEE,), (OTHER,))
+    assert score(improved((OTHER,), twins=((KNEE, OTHER),)), hidden(), ROBOT).named == ((OTHER, KNEE),)
+    assert score(improved((KNEE, OTHER), tied=(ALL,)), hidden(), ROBOT).named == ((f"{KNEE} + {OTHER}", ALL),)
+    # What the model came to have itself is no alternative.
+    assert score(improved((KNEE,), (OTHER,), tied=(KNEE, OTHER)), hidden(), ROBOT).named == ((KNEE,), (OTHER,))
+    assert score(explained((OTHER,), (KNEE,), tied=(KNEE,)), hidden(KNEE), ROBOT).named == ((OTHER, KNEE),)
+
+
+def test_an_explanation_of_other_measurements_is_no_answer():
+    """By the seals of what it read: one truth may be sealed beside several logs, in folders that were moved since."""
+    summary = explained((KNEE,)) | {
+        "measured": [{"file": "logs/a/trial.mcap", "seal": "a"}, {"file": "b", "seal": "b"}]
+    }
+    with pytest.raises(
+        ConfigError, match=r"=logs/e: it is of other measurements \(logs/a/trial.mcap, b\).* log=logs/c"
+    ):
+        same_truth(summary, "c", "task.explained=logs/e", "log=logs/c")
+    same_truth(summary, "a", "task.explained=logs/e", "log=logs/c")
+    same_truth(explained((KNEE,)), "c", "task.explained=logs/e", "log=logs/c")
+    same_truth({"measured": [{"file": "measured.mcap", "seal": None}]}, "c", "task.explained=logs/e", "log=logs/c")
+    with pytest.raises(ConfigError, match="it was changed"):
+        same_truth({"measured": [1]}, "c", "task.explained=logs/e", "log=logs/c")
 
 
 def test_a_summary_of_another_verb_is_refused():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from ee_dist.discrepancy.accounts.account import Account
@@ -40,6 +41,11 @@ def common(problem: Problem, account: Account, floor: float, source: str, model:
         "headline": account.headline,
         "words": account.words,
     }
+
+
+def of_read(read: Sequence[tuple[Path, str]]) -> dict[str, Any]:
+    """What explain and improve read, by name and by the seal of the truth beside it: ``Measurements.read``."""
+    return {"measured": [{"file": str(file), "seal": seal or None} for file, seal in read]}
 
 
 def of_comparison(
