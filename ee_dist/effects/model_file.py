@@ -52,6 +52,10 @@ def read_model(path: str | Path) -> ModelFile:
     """
     file = Path(path)
     data = read_text(file, "a model file (YAML)")
+    if isinstance(data, Mapping) and {"task", "result_digest"} <= set(data):
+        raise RobotError(
+            f"{file}: the summary of a run, not a model; the model that task=improve makes is model.yaml beside it"
+        )
     if isinstance(data, Mapping) and any(key in data for key in (*READERS, "version")):
         if "effects" in data:
             raise RobotError(f"{file}: 'effects' beside the description of a robot: put the description below 'robot:'")
@@ -63,7 +67,11 @@ def read_model(path: str | Path) -> ModelFile:
     for key in data:
         if key not in ("robot", "effects"):
             raise RobotError(f"{file}: unknown key {quoted(key)}; there are: robot, effects")
-    robot, _ = load_robot(data["robot"], file.parent)
+    try:
+        robot, _ = load_robot(data["robot"], file.parent)
+    except RobotError as error:
+        # Of a description within the file nobody else knows where it stands.
+        raise RobotError(f"{file}: {error}" if isinstance(data["robot"], Mapping) else str(error)) from None
     entries = data.get("effects") or []
     if not isinstance(entries, list):
         raise EffectError(f"{file}: effects: expected a list, not {quoted(entries)}")

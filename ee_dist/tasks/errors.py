@@ -163,7 +163,7 @@ def _absent(name: str) -> str:
             else "add it with a plus sign"
         )
         return f"{name}: the chosen {group} has no such setting; {there}"
-    return str(unknown_key("", name, known_settings(), "'python -m ee_dist task=VERB --help' lists them"))
+    return str(unknown_key("", name, ("task", *known_settings()), "'python -m ee_dist task=VERB --help' lists them"))
 
 
 def _elsewhere(name: str) -> str:

@@ -252,7 +252,9 @@ def files_of(measured: Any) -> list[Path]:
         elif path.exists() and not path.is_file():
             raise ConfigError(f"measured={path}: not an ordinary file; name a recording (.mcap)")
         elif not path.is_file():
-            near = nearest(path.name, [p.name for p in path.parent.glob("*.mcap") if p.is_file()], cutoff=0.3)
+            folders = dict.fromkeys(p.parent.name for p in path.parent.glob("*/*.mcap") if not path.suffix)
+            near = nearest(path.name, folders, cutoff=0.6)
+            near = near or nearest(path.name, [p.name for p in path.parent.glob("*.mcap") if p.is_file()], cutoff=0.3)
             hint = f"; did you mean {' or '.join(near)}?" if near else ""
             raise ConfigError(f"measured={path}: no such file{hint}")
         elif path.suffix.lower() != ".mcap" and _of_others(path):

@@ -122,7 +122,8 @@ def test_an_order_that_fits_no_unit_is_a_matter_of_order(tmp_path: Path) -> None
 
 def test_where_no_order_fits_the_unit_is_asked(tmp_path: Path) -> None:
     found = proposed(written(tmp_path, LIMBS, 1e4), robot_file(tmp_path, TRUE))
-    assert any("task.joints=" in q for q in found.questions) and any("task.unit=" in q for q in found.questions)
+    assert any("task.joints=" in q for q in found.questions)
+    assert any("task.unit=rad or deg" in q for q in found.questions), "a hinge has no metres"
 
 
 def test_a_zero_that_is_a_little_off_rules_nothing_out(tmp_path: Path) -> None:

@@ -67,6 +67,8 @@ COMPOSITION: Rows = (
     ("task=recovr", "there are: compare, explain, export, import, improve, online,"),
     ("scenario=8", "add it with a plus sign: +scenario=8"),
     ("+scenario=8 +sed=1", "did you mean seed?"),
+    ("tsk=explain", "tsk: no such setting; did you mean task?"),
+    ("task=compare measured=loged", "measured=loged: no such file; did you mean logged?"),
     ("+scenario.sev=1", "there are: number, name, title, changes"),
     ("+scenario=8 +metric.heder=3", "did you mean header?"),
     ("+scenario=8 sed=1", "did you mean seed?"),
@@ -298,6 +300,11 @@ ROBOTS: Rows = (
 
 MODELS: Rows = (
     ("task=export model=nowhere.yaml", "expected a model file (YAML)"),
+    (
+        "task=export model=whole/summary.json",
+        "the summary of a run, not a model; the model that task=improve makes is model",
+    ),
+    ("task=export model=version.json", "version.json: version: expected 1, not 99"),
     ("task=export model=effect.yaml", "did you mean viscous_friction or coulomb_friction or"),
     ("task=export model=place.yaml", "place.yaml: viscous_friction cannot act on 'elbow' of"),
     ("task=export model=parameter.yaml", "parameter.yaml: viscous_friction has no parameter 'damping'; it"),
@@ -605,6 +612,12 @@ PLANS: Rows = (
         "task=plan task.explained=compared",
         "a run of task=compare, which names no explanations; expected explain or improve",
     ),
+    ("task=plan task.explained=later", "its summary has format 2, and this version of ee_dist knows 1"),
+    (
+        "task=plan task.explained=foreign",
+        "task.explained=foreign: summary.json there is none of ours; expected that of explain",
+    ),
+    ("task=plan task.explained=halved", "task.explained=halved: its summary cannot be read (not JSON"),
     ("task=plan task.explained=tied", "no settings of its run there; say measured=LOG"),
     ("task=plan task.explained=odd measured=trial.mcap", "its summary is not as task=explain writes it"),
     (

@@ -94,6 +94,9 @@ def runs() -> dict[str, dict[str, Any]]:
 
     return {
         "compared": {"task": "compare"},
+        "later": told | {"format": 2},
+        "foreign": {"name": "of another program"},
+        "whole": told | {"result_digest": "0"},
         "odd": {"task": "explain", "verdict": "effect"},
         "settled": told | {"verdict": "nothing_missing", "candidates": []},
         "alone": told | {"verdict": "effect", "candidates": [tied("servo")[0] | {"tied_with": []}]},
@@ -275,7 +278,11 @@ def write(folder: Path) -> None:
     for name, driver in (("trial", Commands(log.commands)), ("weights", Network((0.0,)))):
         with RunWriter(folder / f"{name}.mcap", robot, {"task": "trial"}) as writer:
             writer.trial(TrialRecord(0, "t", HARDWARE, driver, log))
+    (folder / "halved").mkdir()
+    (folder / "halved" / "summary.json").write_text('{"task": "explain", "way": "op')
     content = (folder / "trial.mcap").read_bytes()
+    (folder / "logged").mkdir()
+    (folder / "logged" / "trial.mcap").write_bytes(content)
     (folder / "cut.mcap").write_bytes(content[:60])
     (folder / "flipped.mcap").write_bytes(content[:300] + bytes([content[300] ^ 16]) + content[301:])
     (folder / "sealed.json").write_text(json.dumps({"seal": "wrong"}))

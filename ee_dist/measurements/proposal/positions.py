@@ -162,12 +162,18 @@ def _other_joints(v: View) -> tuple[str, ...]:
     return ()
 
 
+def _of_joints(v: View) -> str:
+    """The units that the joints of the robot can have."""
+    slides = [j.kind == "slide" for j in v.joints]
+    return "rad, deg, m or mm" if any(slides) and not all(slides) else "m or mm" if any(slides) else "rad or deg"
+
+
 def add_positions(v: View) -> None:
     """The position sensors, with a question where their unit is open."""
     block = v.position.block
     names = v.sensor_names("position")
     if v.units.sure == UNKNOWN:
-        units = "deg or task.unit=percent" if block.table.header.get("format") == "lerobot" else "rad, deg, m or mm"
+        units = "deg or task.unit=percent" if block.table.header.get("format") == "lerobot" else _of_joints(v)
         # No unit is right for counts: how many make a turn has to be said.
         cure = " into the mapping, with what one count is" if counts(block) else f"; say task.unit={units}"
         v.out.ask(f"positions ({block.name}): {v.units.why}{cure}")
