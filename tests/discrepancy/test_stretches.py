@@ -17,7 +17,7 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.ways.open_loop import stretches as module
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
-from ee_dist.discrepancy.ways.open_loop.stretches import Stretch, at_most, enough, forgets
+from ee_dist.discrepancy.ways.open_loop.stretches import Stretch, at_most, enough, forgets, unsettled
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.trials.noise import with_noise
@@ -96,6 +96,30 @@ def test_a_trial_that_is_shorter_than_a_stretch_is_one() -> None:
 def test_short_records_are_simulated_as_they_are() -> None:
     whole, some = cut("friction", 10**9)
     assert some is whole
+
+
+def real(trial: MeasuredTrial, first: int) -> MeasuredTrial:
+    """The trial from a row on, as one of somebody's hardware."""
+    return replace(trial, log=trial.log.part(first, first + 800), driver=None, commands_held=True, hardware=True)
+
+
+def test_a_real_trial_that_begins_in_motion_is_compared_once_it_has_settled() -> None:
+    """Nobody knows what the controllers were told before: here a command that is far from where the arm is."""
+    moving, standing = real(measured("friction")[0], 300), real(measured("friction")[0], 0)
+    rows = round(module.SETTLED_S / ARM.time_step_s)
+    assert unsettled(moving, ARM) == rows and unsettled(standing, ARM) == 0
+    assert unsettled(replace(moving, log=moving.log.head(2 * rows)), ARM) == 0, "of a short one that would be much"
+    assert unsettled(replace(moving, commands_held=False, hardware=False), ARM) == 0, "of a simulated one all is known"
+    problem = OpenLoop([moving, standing], ARM, evaluator_for(ARM))
+    first = [float(problem.layout.time_s[(problem.trial_of == k) & problem.layout.reading].min()) for k in (0, 1)]
+    assert first[0] >= module.SETTLED_S - problem.block * ARM.time_step_s and first[1] < 0.1
+    (note,) = [n for n in problem.notes if "begin in motion" in n]
+    assert moving.name in note and "1 trial" in note
+    thrown = moving.log.joints.copy()
+    thrown[0] += 0.2
+    off = replace(moving, log=replace(moving.log, joints=thrown))
+    ends = [error(OpenLoop([t], ARM, evaluator_for(ARM)).residuals([HIDDEN["friction"]])[0]) for t in (moving, off)]
+    assert ends[1] < 1.2 * ends[0], "it has forgotten where it began"
 
 
 def test_a_robot_that_does_not_forget_is_simulated_from_where_it_began() -> None:

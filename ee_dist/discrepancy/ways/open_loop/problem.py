@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ee_dist.basics.names import counted
+from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
 from ee_dist.discrepancy.problem import EVENT, Index, Problem, Series
 from ee_dist.discrepancy.ways.open_loop.falls import fallen
@@ -34,6 +34,7 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
 )
 from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale
 from ee_dist.discrepancy.ways.open_loop.stretches import (
+    SETTLED_S,
     STRETCH_S,
     Stretch,
     at_most,
@@ -42,6 +43,7 @@ from ee_dist.discrepancy.ways.open_loop.stretches import (
     in_one_go,
     stretches,
     too_long,
+    unsettled,
 )
 from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
@@ -98,7 +100,7 @@ class OpenLoop(Problem):
         spacing = reading_s(trials)
         self.block = block if not spacing else min(block, max(1, round(BLOCK_S / spacing)))
         self._whole: OpenLoop | None = None
-        self.parts = tuple(parts) or in_one_go(trials)
+        self.parts = tuple(parts) or in_one_go(robot, trials)
         trials = [p.run for p in self.parts]
         self._rows = [len(t.log.readings) for t in trials]
         # Of a single window nothing could be held out.
@@ -233,6 +235,11 @@ class OpenLoop(Problem):
             "in): how often they do is not compared."
             for kind in sorted(self.weights.repeating)
         ]
+        led = forgets(self.robot, self.measured)
+        if moving := [t.name for t in self.measured if led and unsettled(t, self.robot)]:
+            begun = f"{counted(len(moving), 'trial')} that begin in motion ({listed(moving)})"
+            why = "nobody knows what the controllers were told before"
+            lines.append(f"The first {SETTLED_S:g} s of {begun} is simulated and not compared: {why}.")
         if self._whole is not None:
             compared = sum(self._rows) * (reading_s(self.measured) or self.robot.time_step_s)
             lasting = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)

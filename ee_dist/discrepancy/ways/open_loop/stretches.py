@@ -25,6 +25,8 @@ from ee_dist.trials.log import State
 
 STRETCH_S, SETTLED_S = 4.0, 0.5
 """How much of a record is compared in one go, and how much before is simulated alone, for joints to come to where they go."""
+MOVING, SPARED = 0.1, 0.3
+"""Share of the highest speed in a trial from which it begins in motion, and what of it may be left out for that at most."""
 MOST, FEWEST = 36_000, 15
 """Steps of a simulation, times joints, that a search takes for each model at most: three trials of 20 s of six joints in steps of
 10 ms; but so many stretches, and one of each trial."""
@@ -38,9 +40,33 @@ class Stretch:
     run: MeasuredTrial
 
 
-def in_one_go(trials: Sequence[MeasuredTrial]) -> tuple[Stretch, ...]:
-    """Each trial in one go."""
-    return tuple(Stretch(k, t) for k, t in enumerate(trials))
+def in_one_go(robot: Robot, trials: Sequence[MeasuredTrial]) -> tuple[Stretch, ...]:
+    """Each trial in one go, compared from where it has settled on."""
+    if not forgets(robot, trials):
+        return tuple(Stretch(k, t) for k, t in enumerate(trials))
+    return tuple(Stretch(k, _from(t, unsettled(t, robot))) for k, t in enumerate(trials))
+
+
+def unsettled(trial: MeasuredTrial, robot: Robot) -> int:
+    """How many first rows of a real trial say more of what came before it than of the robot: where it begins in motion, nobody
+    knows what its controllers were told until then. None where it stood, nor where they would be much of it."""
+    log = trial.log
+    if not trial.real or len(log) < 2:
+        return 0
+    speeds = np.abs(starting_speeds(trial, robot))
+    if not speeds[0].max() > MOVING * speeds.max():
+        return 0
+    rows = int(np.searchsorted(log.times_s, log.times_s[0] + SETTLED_S))
+    return rows if rows < SPARED * len(log) else 0
+
+
+def _from(trial: MeasuredTrial, rows: int) -> MeasuredTrial:
+    """The trial, of which so many first rows are simulated and not compared."""
+    if not rows:
+        return trial
+    filled = np.zeros(len(trial.log), dtype=bool) if trial.log.filled is None else trial.log.filled.copy()
+    filled[:rows] = True
+    return replace(trial, log=replace(trial.log, filled=filled))
 
 
 def forgets(robot: Robot, trials: Sequence[MeasuredTrial]) -> bool:
@@ -61,6 +87,7 @@ def stretches(
 
 
 def _of_trial(number: int, trial: MeasuredTrial, robot: Robot, count: int) -> list[Stretch]:
+    trial = _from(trial, unsettled(trial, robot))
     log, step = trial.log, robot.time_step_s
     if len(log.readings) < count:
         return [Stretch(number, trial)]
