@@ -69,6 +69,8 @@ def account(
         noise_floor=1.0,
         floor_source="told",
         tried=9,
+        offered=9,
+        before=(),
         as_it_was=False,
         unsure=unsure,
         after=(what,),
@@ -296,6 +298,11 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     assert [line for line in apart if line.startswith("Dropped")] == [
         "Dropped again: backlash at servo, which a later effect made useless."
     ]
+    rung.dropped = (*(f"part_mass@link_{k}" for k in range(5)), "backlash@servo")
+    assert (
+        "Dropped again: part mass at 5 places; backlash at servo, which later effects made useless."
+        in improve_account(problem, found).lines  # type: ignore[arg-type]
+    )
 
 
 def test_an_interval_below_what_there_is_is_told_as_it_is() -> None:

@@ -31,6 +31,7 @@ from ee_dist.discrepancy.accounts.ranges import (
     beyond_a_guess,
     flag_texts,
     load_text,
+    of_kind,
     ranges,
     rest_text,
     scale_text,
@@ -116,16 +117,18 @@ def improve_account(
     gone = dict.fromkeys(d for r in steps for d in r.dropped if d not in told)
     kind = {d: d.partition("@")[0] for d in gone}
     elsewhere = [d for d in gone if kind[d] in {t.effect for t in found.terms}]
-    lines += [f"Dropped again: {placed(d)}, which a later effect made useless." for d in gone if d not in elsewhere]
+    if useless := [d for d in gone if d not in elsewhere]:
+        later = "a later effect" if len(useless) == 1 else "later effects"
+        lines.append(f"Dropped again: {_by_kind(useless)}, which {later} made useless.")
     if elsewhere:
         kinds = dict.fromkeys(plain(kind[d]) for d in elsewhere)
         lines.append(f"Shared at first, and of other joints or of each by itself since: {'; '.join(kinds)}.")
     # What may be nothing is no news, whatever depends on it together with others.
     parts = sorted(shares(found, robot), key=lambda s: (s.terms[0] not in wrong, may_be_nothing(found, s.terms)))
     lines += doubt_text([s for s in parts if s.doubted])
-    vague = [placed(d) for r in found.ladder if not r.added for d in r.dropped]
+    vague = [d for r in found.ladder if not r.added for d in r.dropped]
     if vague:
-        lines.append(f"Left out in the end, since these data do not tell them from neutral: {'; '.join(vague)}.")
+        lines.append(f"Left out in the end, since these data do not tell them from neutral: {_by_kind(vague)}.")
     lines.append("The model: " + (phrase(found.terms, robot) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += flag_texts(found.terms, found.parameters)
@@ -212,6 +215,14 @@ def odd_text(odd: OddOne, robot: Robot) -> str:
         f"Calibrated away at {plain(odd.term.target)}: {much(odd.term, robot)}, {_many_times(odd.times)} what its like {what} "
         "have: if this robot was not in order, this hides it."
     )
+
+
+def _by_kind(names: Sequence[str]) -> str:
+    """Effects by name, a kind of them at a few places or at so many: robots that are a little wrong everywhere have dozens."""
+    at: dict[str, list[str]] = {}
+    for effect, _, place in (name.partition("@") for name in names):
+        at.setdefault(effect, []).append(place)
+    return "; ".join(of_kind(effect, "", places) for effect, places in at.items())
 
 
 def doubt_text(doubted: Sequence[Share]) -> list[str]:

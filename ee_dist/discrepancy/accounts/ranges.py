@@ -73,7 +73,7 @@ def flag_texts(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list
             term = terms[p.term]
             told.setdefault(p.flag, {}).setdefault((term.effect, quantity(term, p.name)), []).append(term.target)
     return [
-        "; ".join(_of_kind(effect, what, places) for (effect, what), places in kinds.items()) + f": {flag}."
+        "; ".join(of_kind(effect, what, places) for (effect, what), places in kinds.items()) + f": {flag}."
         for flag, kinds in told.items()
     ]
 
@@ -139,8 +139,8 @@ def _guessed(robot: Robot, term: Term) -> bool:
     return CATALOGUE[term.effect].guesses_at(robot, term.target)
 
 
-def _of_kind(effect: str, what: str, places: Sequence[str]) -> str:
-    """``zero offset at hip and knee, offset``."""
+def of_kind(effect: str, what: str, places: Sequence[str]) -> str:
+    """``zero offset at hip and knee, offset``; of a few places which, of more how many."""
     at = f"{len(places)} places" if len(places) > LISTED else _and([plain(place) for place in places])
     return f"{plain(effect)}{f' at {at}' if any(places) else ''}{f', {what}' if what else ''}"
 
