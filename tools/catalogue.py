@@ -29,6 +29,10 @@ An effect is a named, bounded change to a robot. A model is a robot with a list 
 
     - {effect: coulomb_friction, target: knee_front_left, torque_nm: 0.4}
 
+What several joints share is one effect with one target, `all_joints` or their names with + between. A trial hides it so:
+
+    python -m ee_dist task=trial engine=mujoco 'hidden=[{effect: zero_offset, target: all_joints, offset_rad: 0.03}]'
+
 At its neutral value an effect leaves every result bit for bit as it was. On a slide read m for rad and N for N.m. A value
 outside the limits is refused; within them, `explain` and `improve` look in a range that suits the robot and the target,
 of which the tables give examples: for the quadruped (its first target) and, where that has none, for another robot.
