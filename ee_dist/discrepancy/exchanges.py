@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import puts_right
 from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, held_out_by
 from ee_dist.discrepancy.evidence.judge import surely_better
 from ee_dist.discrepancy.examine import Current, Effort, examine
@@ -14,9 +16,10 @@ from ee_dist.discrepancy.instead import Instead, instead_of
 from ee_dist.discrepancy.ladder import Rung, Twin
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import allowed_loss
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.pool import as_long
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS
 from ee_dist.discrepancy.torque_scale import other_scale
@@ -79,7 +82,7 @@ def exchanged(
         return None
     cut = strictest(problem)
     now, *others = cross_fit(search, models, cut, WIDTHS[1:])
-    order = sorted(range(len(options)), key=lambda i: float((others[i].residual ** 2).sum()))
+    order = _best_first(others)
     for i in order[:LOOKED_AT]:
         (k, proposal, _), (model, start), held = options[i], models[1 + i], others[i]
         changed = Current(model.parts, fit_one(search, model, [start], None, WIDTHS[1:]).u)
@@ -107,6 +110,41 @@ def exchanged(
         )
         return changed, rung
     return None
+
+
+def at_one_place(search: Search, current: Current, own: int) -> tuple[Current, Rung] | None:
+    """The model with a number that several places share exchanged for one of a single place, if that is better by more than luck.
+    Of two effects that are missing the first that comes in takes what it can of the other, too: a little at all joints is
+    near to much at one of them and something else at another. Once that has come, one place alone may say it better."""
+    robot, problem = search.problem.robot, search.problem
+    kinds = Counter(c.effect.name for c in current.parts)
+    options: list[tuple[Candidate, Model, Array]] = []
+    for k, (c, place) in enumerate(zip(current.parts, Model(current.parts).places, strict=True)):
+        if k < own or kinds[c.effect.name] > 1 or puts_right(robot, c):
+            continue
+        for target in c.members(robot):
+            single = as_long(problem, candidate(robot, c.effect, target))
+            if problem.shows(c.effect.name, target):
+                u = np.clip(single.shares(c.values(current.u[place])), single.lower, single.upper)
+                values = np.concatenate([current.u[: place.start], u, current.u[place.stop :]])
+                options.append((c, Model((*current.parts[:k], single, *current.parts[k + 1 :])), values))
+    if not options:
+        return None
+    cut = strictest(problem)
+    now, *others = cross_fit(search, [(Model(current.parts), current.u), *(o[1:] for o in options)], cut, WIDTHS[1:])
+    best = _best_first(others)[0]
+    gone, model, start = options[best]
+    if not surely_better(problem, now, others[best], len(options)):
+        return None
+    then = Current(model.parts, fit_one(search, model, [start], None, WIDTHS[1:]).u)
+    at = current.parts.index(gone)
+    rung = refitted(search, then, then.parts[at].name, (gone.name,))
+    rung.added = (then.hypothesis[at],)
+    return then, rung
+
+
+def _best_first(held: Sequence[HeldOut]) -> list[int]:
+    return sorted(range(len(held)), key=lambda i: float((held[i].residual ** 2).sum()))
 
 
 def nearest(

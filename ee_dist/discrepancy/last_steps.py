@@ -11,13 +11,14 @@ from ee_dist.discrepancy.everywhere import AT_ONCE, Everywhere, everywhere, look
 from ee_dist.discrepancy.evidence.holdout import cross_fit, held_out_by, travelling
 from ee_dist.discrepancy.evidence.left import leftovers, settled
 from ee_dist.discrepancy.examine import FAR, Current
-from ee_dist.discrepancy.exchanges import nearest, refitted, strictest
+from ee_dist.discrepancy.exchanges import at_one_place, nearest, refitted, strictest
 from ee_dist.discrepancy.ladder import Rung, Twin
 from ee_dist.discrepancy.plainer import in_plain_terms
 from ee_dist.discrepancy.pruning import without_neutral
 from ee_dist.discrepancy.search.candidates import Candidate, values_of
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.search import Search
+from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.discrepancy.told import told_only
 from ee_dist.trials.log import Array
 
@@ -67,6 +68,9 @@ def last_steps(
                     some = looked_for_at_once(problem, pool)
                     found = everywhere(search.doing(AT_ONCE), current, own, some, held_out_by(problem), True, (), seen)
         if found is None:
+            if not spread and len(current.u) < LARGE and (single := at_one_place(search, current, own)) is not None:
+                current, step = single
+                climb(step)
             if step is not None and (spread or len(current.parts) - own > 1):
                 # Beside what came in the place of another, others may tell nothing any more.
                 current, _ = _told(search, current, own, len(pool), climb, spread)

@@ -74,6 +74,8 @@ Model = TypeVar("Model", bound=System)
 SLIDE_UNITS = {
     "rad": "m",
     "rad/s": "m/s",
+    "s/rad": "s/m",
+    "s^2/rad": "s^2/m",
     "N.m": "N",
     "N.m/rad": "N/m",
     "N.m.s/rad": "N.s/m",

@@ -61,9 +61,11 @@ def told(found: Mapping[str, Placeholder], body: Body, swinging: Collection[str]
     for limit, kind in dict.fromkeys((p.limit, p.joint.kind) for p in found.values()):
         alike = [p for p in found.values() if (p.limit, p.joint.kind) == (limit, kind)]
         most, unit = max(p.needed for p in alike), "N" if kind == "slide" else "N.m"
+        names = listed(p.joint.name for p in alike)
+        why = f"to hold all of the robot, stretched out, and to speed it up takes {most:.2g} {unit}"
+        cure = "if it is one (a screw, a high gear), state torque_limit and rotor_inertia among the drives"
         lines.append(
-            f"effort {limit:g} of {listed(p.joint.name for p in alike)} is no real limit: to hold all of the robot, stretched "
-            f"out, and to speed it up takes {most:.2g} {unit}; drives are guessed from what it needs"
+            f"effort {limit:g} of {names} is taken for no real limit: {why}; drives are guessed from what it needs; {cure}"
         )
     if swinging:
         lines.append(

@@ -15,7 +15,7 @@ from linear_problem import Linear
 from way_samples import Sample, measure, problem_by, samples
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
-from ee_dist.discrepancy.accounts.of_explain import explain_account
+from ee_dist.discrepancy.accounts.of_explain import _rivals, explain_account
 from ee_dist.discrepancy.assumed import GUESS, LABEL, assumed_drives, guessed_text, of_one_guess, puts_right
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.everywhere import instead
@@ -302,8 +302,11 @@ def test_what_does_better_and_does_not_go_first_is_told() -> None:
     other = next(c for c in found.candidates if c.name == "rotor_inertia@shoulder")
     other.held = 0.5 * best.held
     said = explain_account(problem, found, None).sure
-    assert "Of 9 explanations 1 does better, by more numbers where nothing was guessed (" in said
+    assert "Of 9 explanations 1 does better, where nothing was guessed (" in said, (
+        "it has one number, as the guess does"
+    )
     assert "), and 2 others do as well" in said
+    assert "1 does better, by more numbers where nothing was guessed (a)" in _rivals(9, (), "", ["a"], True)
 
 
 def test_a_factor_on_rotors_is_proposed_only_where_unequal_ones_were_guessed() -> None:
@@ -416,6 +419,12 @@ def test_few_guesses_go_before_many_numbers_at_sound_parts(
     order = judge.ranked([judged("each", 12, False, 0.8), judged("guess", size, True, gain)])  # type: ignore[arg-type,list-item]
     assert [order[0].name, [j.rank for j in order]] == [first, [1, 2]]
     assert order[0].tied_with == [], "what it goes before does not do as well"
+    # One number that all share at sound parts takes off more than the guess does: each by itself is the same, and more.
+    shared = judged("shared", 1, False, gain + 0.1)
+    many = [judged("each", 12, False, 0.8), judged("guess", size, True, gain), shared]
+    assert judge.ranked(many)[0].name == "each"  # type: ignore[arg-type]
+    less = [*many[:2], judged("shared", 1, False, gain - 0.1)]
+    assert judge.ranked(less)[0].name == first  # type: ignore[arg-type]
 
 
 def test_a_guess_is_judged_beside_whatever_promises_more() -> None:

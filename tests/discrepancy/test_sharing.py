@@ -9,10 +9,11 @@ from ee_dist.discrepancy import everywhere as module
 from ee_dist.discrepancy.everywhere import everywhere
 from ee_dist.discrepancy.evidence.holdout import travelling
 from ee_dist.discrepancy.examine import Current
+from ee_dist.discrepancy.exchanges import at_one_place
 from ee_dist.discrepancy.search.candidates import Candidate, candidates
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.sharing import shared, singles
-from ee_dist.effects.catalogue import Hypothesis, term
+from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.effects.groups import members_of
 from tests.discrepancy.linear_problem import ROBOT, Linear
 
@@ -79,3 +80,28 @@ def test_each_kind_is_shared_as_widely_as_it_may_be():
     assert {c.target for c in alone} == set(JOINTS)
     assert shared(ROBOT, alone) == alone, "what nobody shares stays as it is"
     assert np.isin([c.effect.name for c in alone], KINDS).all()
+
+
+def exchange_of(*hidden: Term):
+    """A model with viscous friction of all joints, beside the command gain that is hidden as well."""
+    problem = Legs(hidden, motions=4)
+    have = {c.name: c for c in pool_of()}
+    parts = (have["viscous_friction@all_joints"], have[f"command_gain@{JOINTS[0]}"])
+    current = Current(parts, np.array([0.02, 0.5]))
+    return at_one_place(Search(problem), current, 0), at_one_place(Search(problem), current, 1)
+
+
+def test_what_one_joint_has_alone_is_no_longer_shared_once_the_rest_is_known():
+    gain = term("command_gain", JOINTS[0], change=0.1)
+    alone, kept = exchange_of(gain, term("viscous_friction", JOINTS[3], damping_nm_s_rad=0.3))
+    assert alone is not None
+    then, rung = alone
+    assert [c.name for c in then.parts] == [f"viscous_friction@{JOINTS[3]}", f"command_gain@{JOINTS[0]}"]
+    assert then.parts[0].values(then.u[:1])["damping_nm_s_rad"] == pytest.approx(0.3, abs=0.02)
+    assert rung.dropped == ("viscous_friction@all_joints",) and rung.added[0].target == JOINTS[3]
+    assert kept is None, "what was given stays"
+
+
+def test_what_all_joints_have_stays_shared():
+    gain = term("command_gain", JOINTS[0], change=0.1)
+    assert exchange_of(gain, *(term("viscous_friction", j, damping_nm_s_rad=0.2) for j in JOINTS)) == (None, None)

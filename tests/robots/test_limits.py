@@ -32,7 +32,7 @@ def begun(folder: Path, first: str, second: str, mass: float = 0.3, kind: str = 
 def test_a_limit_far_beyond_what_the_arm_needs_is_none_and_said_so(tmp_path: Path) -> None:
     found, open_ = begun(tmp_path, 'effort="10000"', 'effort="10000"'), begun(tmp_path, "", "")
     (said,) = [line for line in found.assumed if line.startswith("effort ")]
-    assert said.startswith("effort 10000 of a, b is no real limit: ") and "\n" not in said
+    assert said.startswith("effort 10000 of a, b is taken for no real limit: ") and "\n" not in said
     assert found.robot.drives == open_.robot.drives
     for drive in found.robot.drives:
         assert drive.torque_limit < 10 and drive.kp < 100 and drive.rotor_inertia < 0.1
@@ -41,7 +41,7 @@ def test_a_limit_far_beyond_what_the_arm_needs_is_none_and_said_so(tmp_path: Pat
 
 def test_only_the_joint_that_states_it_is_guessed(tmp_path: Path) -> None:
     found = begun(tmp_path, 'effort="10000"', 'effort="3"')
-    assert [line.split(" is no")[0] for line in found.assumed if "no real" in line] == ["effort 10000 of a"]
+    assert [line.split(" is taken")[0] for line in found.assumed if "no real" in line] == ["effort 10000 of a"]
     assert found.robot.drives[1].torque_limit == 3.0
 
 

@@ -122,8 +122,10 @@ def explain_account(
         some = best.terms if len(best.terms) <= NAMED else ()  # of more the table tells
         values = ranges(found.after, found.parameters, some, robot, len(best.terms) > 1)
         others = [c for c in looked_at if c.earned and c.name not in best.tied_with]
-        better = [c.name for c in others if float(c.held.sum()) < float(best.held.sum())]
-        sure += f"{_rivals(found.tried, best.tied_with, more, better)}{unsure_of(unsure)}{values}."
+        better = [c for c in others if float(c.held.sum()) < float(best.held.sum())]
+        by_more = all(c.proposal.size > best.proposal.size for c in better)
+        rivals = _rivals(found.tried, best.tied_with, more, [c.name for c in better], by_more)
+        sure += f"{rivals}{unsure_of(unsure)}{values}."
         advice = slower(unsure) if unsure else MEND if entry.mistake else ""
         lines.append(f"{guessed_text(best.terms)}{_still(problem)}" if guessed else entry.physics)
         turned = " Here the other way round: the model has too much of it." if less else ""
@@ -223,14 +225,15 @@ def _told_to_move(commands: Array) -> bool:
     return len(known) > 0 and float(np.ptp(known)) > 0
 
 
-def _rivals(tried: int, tied: Sequence[str], more: str, better: Sequence[str]) -> str:
-    """``better``: what leaves less of what was held out, and does not go first for all that it says."""
+def _rivals(tried: int, tied: Sequence[str], more: str, better: Sequence[str], by_more: bool) -> str:
+    """``better``: what leaves less of what was held out, and does not go first for all that it says; ``by_more`` numbers."""
     of = f"Of {counted(tried, 'explanation')}"
     told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
     as_well = f"{more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
     if better:
         do = "do" if len(better) > 1 else "does"
-        said = f"{of} {len(better)} {do} better, by more numbers where nothing was guessed ({listed_few(better)})"
+        how = "by more numbers where nothing was guessed" if by_more else "where nothing was guessed"
+        said = f"{of} {len(better)} {do} better, {how} ({listed_few(better)})"
         return f"{said}, and {as_well}" if tied else said
     return f"{of} {as_well}" if tied else f"{of} no other does as well"
 

@@ -240,11 +240,16 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
             if j.earned and j.name in first.tied_with and j.proposal.guess and j.proposal.size <= first.proposal.size
         ]
         first = min((first, *asked), key=_least_said)
-        # Nor do a dozen numbers at parts that somebody vouched for go before a few of guesses that take off half as much.
+        # Nor do a dozen numbers at parts that somebody vouched for go before a few of guesses that take off half as much, unless
+        # as few at such parts take off more: then many are only that at each place by itself.
         fewer = [
             j
             for j in ordered
-            if j.earned and j.proposal.guess and j.proposal.size < first.proposal.size and j.gain >= HALF * first.gain
+            if j.earned
+            and j.proposal.guess
+            and j.proposal.size < first.proposal.size
+            and j.gain >= HALF * first.gain
+            and not any(_as_few_do_more(k, j) for k in ordered)
         ]
         sooner = bool(fewer) and not first.proposal.guess
         if sooner:
@@ -280,6 +285,12 @@ def _fuller(j: Judged, first: Judged) -> bool:
     if not j.earned or not contains(j, first):
         return False
     return float(first.held.sum()) > NEAR**2 * first.sure and _left(j) <= FULLER * _left(first)
+
+
+def _as_few_do_more(one: Judged, guess: Judged) -> bool:
+    """Whether one that guesses at nothing says no more than a guess, and is better than it beyond what may be luck."""
+    few = one.earned and not one.proposal.guess and one.proposal.size <= guess.proposal.size
+    return few and one.gain > guess.gain and guess.name not in one.tied_with
 
 
 def _least_said(j: Judged) -> tuple[int, bool, int]:
