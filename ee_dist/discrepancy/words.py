@@ -22,6 +22,8 @@ NOTHING = 1e-12
 """A value of this size is none, in any unit: what is left of it is arithmetic."""
 EXACT = 1e-9
 """What a share of all of it may lack by the arithmetic alone."""
+LEAST_SHARE = 1e-5
+"""A smaller share is told as none."""
 
 
 def plain(name: str) -> str:
@@ -143,6 +145,8 @@ def percent_within(share: float, low: float, high: float) -> str:
     """A share with as many digits as its interval is told by, which is to hold it."""
     if not all(map(math.isfinite, (share, low, high))) or percent(low) != percent(high):
         return percent(share)
+    # Zero has no sign, and a thousandth of a per cent is none.
+    share, low, high = (0.0 if abs(s) < LEAST_SHARE else s for s in (share, low, high))
     narrow = f"{100 * low:.3g}" != f"{100 * high:.3g}"
     return f"{100 * share:.3g} %" if narrow else percent(share)
 

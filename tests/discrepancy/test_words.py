@@ -379,6 +379,7 @@ def test_explain_says_how_sure_a_value_is_and_which_ended_at_its_bound() -> None
 
 
 @pytest.mark.parametrize(("low", "high", "said"), [
+    (0.0001, -1e-9, "0.01 to 0 %"), (-1e-9, 1e-9, "0 %"),
     (0.761, 1.0, "76 to 100 %"), (0.5581, 0.5634, "55.8 to 56.3 %"), (0.56, 0.56, "56 %"), (0.0, 0.0, "0 %"), (1.0, 1.0, "100 %"),
 ])  # fmt: skip
 def test_a_narrow_interval_does_not_end_where_it_begins(low: float, high: float, said: str) -> None:
