@@ -14,6 +14,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_file
 from ee_dist.measurements.mapping import Mapping
 from ee_dist.measurements.mapping_file import mapping_of
+from ee_dist.measurements.proposal.commands import OWN_COURSE
 from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints
 from ee_dist.robots.model import Drive, Robot
@@ -116,3 +117,18 @@ def test_a_motor_that_was_led_by_its_voltage(tmp_path: Path) -> None:
     said = [n for n in found.notes + found.questions if "goal_pwm is a voltage or duty cycle" in n]
     assert len(said) == 1
     assert "'scale:' the torque at rest" in said[0]
+
+
+@pytest.mark.parametrize(("demanded", "told"), [("position_demand", True), ("position_filtered", False)])
+def test_a_course_that_drives_make_of_their_goals_is_told(tmp_path: Path, demanded: str, told: bool) -> None:
+    """Steps are asked for; the drive makes gentle courses of them, which the joint follows far more closely."""
+    goals = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, 8), 100)
+    course = np.convolve(np.pad(goals, (40, 0), mode="edge"), np.ones(41) / 41, mode="valid")
+    read = course + 1e-4 * np.sin(50 * T)
+    frame = pd.DataFrame({"time_s": T, "target_position": goals, "actual_position": read, demanded: course})
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    proposal = proposal_for([tmp_path / "a.csv"], robot("position"), Hints(unit="rad"))
+    notes = [n for n in proposal.notes if OWN_COURSE in n]
+    assert [n.startswith(f"the positions follow {demanded} by 0 ms") for n in notes] == [True] * told
+    (asked,) = [c for c in proposal.choices if c.group == "commands"]
+    assert asked.entry["column"] == "target_position"

@@ -33,6 +33,12 @@ EXCHANGED = (
 )
 THERE = 0.1
 """Of the distance to its own command with its sign turned, that to another's at which a joint does what that one is told."""
+OWN_COURSE = (
+    "a course that the drives make of their goals? Taken as the commands it leaves out how they make it, and tells of the "
+    "controllers alone"
+)
+NEARER = 0.5
+"""Share of the lag behind the commands within which positions follow something else far more closely."""
 WHAT = {"position": POSITION, "speed": SPEED}
 """What is asked of a drive by what it obeys."""
 UNLESS = "put that right, or write unit and sign into the mapping if they are what was asked for"
@@ -83,6 +89,8 @@ def add_commands(v: View) -> None:
             v.out.choices.append(Choice("commands", n, {"column": "???"}, UNKNOWN, "not found"))
         return
     chosen.block.used = True
+    if kind == "position":
+        _tell_nearer(v, chosen.block)
     if kind == "torque":
         units = torque_units(v, chosen.block)
     else:
@@ -121,6 +129,19 @@ def _goals(v: View, kind: str) -> str:
                 "robot's description has 'command: position' with kp and kd"
             )
     return ""
+
+
+def _tell_nearer(v: View, chosen: Block) -> None:
+    """A note on what positions follow far more closely than the commands, as they do a course that drives make of their goals."""
+    mine = _lead(v, chosen, "position")
+    for b in v.blocks:
+        if b.used or not b.reading.command or b.reading.kind not in (POSITION, None) or not v.moves(b):
+            continue
+        ahead = _lead(v, b, "position")
+        if ahead.correlation < max(CLOSE, mine.correlation) or not 0 <= ahead.lead_s <= NEARER * mine.lead_s:
+            continue
+        how = f"{_why(ahead, f'the positions follow {b.name} by')}, and {chosen.name} by {1e3 * mine.lead_s:.0f} ms"
+        v.out.notes.append(f"{how}: {OWN_COURSE}")
 
 
 def _lead(v: View, b: Block, kind: str) -> signals.Lead:
