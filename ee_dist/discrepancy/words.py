@@ -169,9 +169,16 @@ def told_all(terms: Hypothesis, robot: Robot | None = None) -> str:
 def by_effect(terms: Hypothesis, robot: Robot | None = None) -> list[tuple[str, Hypothesis]]:
     """Terms in phrases: what acts at one place or two or is shared, then in a phrase for each effect what is at many."""
     places = [t for t in terms if robot is None or not members_of(robot, t.target, CATALOGUE[t.effect].targets(robot))]
-    own = {e: tuple(t for t in places if t.effect == e) for e in dict.fromkeys(t.effect for t in places)}
-    few = [(told(t, robot), (t,)) for t in terms if t not in places or len(own[t.effect]) < MANY]
-    return few + [(_range_of(mine, robot), mine) for mine in own.values() if len(mine) >= MANY]
+    own: dict[tuple[str, ...], list[Term]] = {}
+    for t in places:
+        own.setdefault(_alike(t, robot), []).append(t)
+    few = [(told(t, robot), (t,)) for t in terms if t not in places or len(own[_alike(t, robot)]) < MANY]
+    return few + [(_range_of(tuple(mine), robot), tuple(mine)) for mine in own.values() if len(mine) >= MANY]
+
+
+def _alike(term: Term, robot: Robot | None) -> tuple[str, ...]:
+    """What terms have in common whose values may stand in one range: the effect, and the units that it has at its place."""
+    return (term.effect, *(_unit(term, key, robot) for key, _ in term.values))
 
 
 def phrase(terms: Hypothesis, robot: Robot | None = None) -> str:

@@ -12,7 +12,8 @@ from way_samples import Sample, evaluator_for, measure, sines, two_joint_arm
 from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.effects.catalogue import term
+from ee_dist.discrepancy.words import phrase
+from ee_dist.effects.catalogue import CATALOGUE, term
 from ee_dist.robots.model import Robot
 
 NOISE = {"shoulder": 4e-3, "elbow": 4e-4}
@@ -73,3 +74,13 @@ def test_a_joint_at_rest_does_not_decide() -> None:
     resting = FreeRun(still, problem.robot, problem.evaluator)
     assert resting.noise[0] == problem.noise[0]
     assert resting.noise[1] == pytest.approx(0.4 * 2.0**-20)
+
+
+def test_values_of_two_units_are_no_range() -> None:
+    robot = turning_and_sliding()
+    slow = [term("command_acceleration", j, reluctance_s2_rad=v) for j, v in (("shoulder", 0.04), ("elbow", 17.0))]
+    text = phrase(tuple(slow), robot)
+    assert "shoulder" in text and "0.04 s^2/rad" in text and "17 s^2/m" in text and " to " not in text
+    alike = [term("coulomb_friction", "shoulder", torque_nm=v) for v in (0.1, 0.2, 0.3)]
+    assert "0.1 to 0.3 N.m" in phrase((*alike, slow[1]), robot)
+    assert not CATALOGUE["command_acceleration"].shared(robot), "what has two units is not shared"
