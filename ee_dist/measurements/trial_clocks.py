@@ -20,9 +20,10 @@ from ee_dist.trials.log import Array
 LEAST_SHARED = 0.5
 """Share of the main table's time that its other tables must cover."""
 
-STALE, LEAST_STALE, NEARLY, FIRST, ENOUGH = 5.0, 2e-3, 0.99, 3, 30
+STALE, LEAST_STALE, NEARLY, NEXT, FIRST, ENOUGH = 5.0, 2e-3, 0.99, 10, 3, 30
 """A first reading is of another moment where a joint would go so many times as fast to the next as in nearly all steps after,
-and at least so far, rad (m); their share; first rows that may be so, and steps by which that is judged."""
+and at least so far, rad (m); their share, and the next ones, of which it is all; first rows that may be so, and steps by which
+that is judged."""
 
 
 class TrialClocks:
@@ -193,13 +194,11 @@ class TrialClocks:
         steps = np.abs(np.diff(places))
         speeds = steps / np.diff(self.main.times_s)
         for k in range(FIRST, 0, -1):
-            after = speeds[k:]
-            known = np.isfinite(after)
-            if (
-                known.sum() >= ENOUGH
-                and steps[k - 1] > LEAST_STALE
-                and speeds[k - 1] > STALE * np.quantile(after[known], NEARLY)
-            ):
+            after = speeds[k:][np.isfinite(speeds[k:])]
+            if len(after) < ENOUGH or not steps[k - 1] > LEAST_STALE:
+                continue
+            # A joint that goes on as quickly was in motion, if it rests in all the rest of the record.
+            if speeds[k - 1] > STALE * max(float(np.quantile(after, NEARLY)), float(after[:NEXT].max())):
                 return k
         return 0
 

@@ -207,3 +207,11 @@ def test_first_readings_of_another_moment_are_left_out(tmp_path: Path, rows: int
     assert len(record.log) == len(table) - rows
     assert record.log.sensors[0, 0] == pytest.approx(table["x"][rows])
     assert any("left out: to the next a joint would go" in d for d in report.done) == bool(rows)
+
+
+def test_a_joint_that_moves_at_the_beginning_alone_was_in_motion(tmp_path: Path) -> None:
+    table = stage_table(4000)
+    table["x"] = 0.1 * np.minimum(np.arange(4000) / 30, 1.0)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    record, _ = import_file(tmp_path / "a.csv", stage_mapping(), STAGE)
+    assert len(record.log) == 4000
