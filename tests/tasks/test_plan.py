@@ -134,7 +134,7 @@ def test_what_no_trial_tells_apart_stands_in_the_first_line_and_leaves_the_quest
     summary = of_plan(found, tied_ones, Path(), [], Limits(2.0, 0.5), told)
     assert summary["best"]["enough"] and not summary["enough"] and len(summary["alike"]) == 1
     curves = np.array([np.linspace(0, 1, 50)] * 3)
-    page = plan_page(robot, found, tied_ones, Parting(0, 0.1, 0.3, np.linspace(0, 1, 50), curves), told, [], "")
+    page = plan_page(robot, found, tied_ones, Parting(0, 0.1, 0.3, np.linspace(0, 1, 50), curves), told, [])
     assert page.tone == "open" and page.tiles[0][1].endswith("the two most similar that can be told apart")
     assert page.sections[0].caption.endswith(
         "Shown are 1 of 12, of each motion and size the best; summary.json has all."
