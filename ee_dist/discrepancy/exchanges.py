@@ -144,7 +144,7 @@ def at_one_place(search: Search, current: Current, own: int) -> tuple[Current, R
 
 
 def _best_first(held: Sequence[HeldOut]) -> list[int]:
-    return sorted(range(len(held)), key=lambda i: float((held[i].residual ** 2).sum()))
+    return sorted(range(len(held)), key=lambda i: held[i].energy)
 
 
 def nearest(

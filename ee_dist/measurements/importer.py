@@ -79,7 +79,7 @@ class _Import:
         """``paces``: seconds between readings by table, of the trials in which that shows. Raises MeasurementError."""
         self.on.at_paces(paces)
         self.report.done += told_of(self.on.clocks, self.on.read_at)
-        self.report.suspicious += holes_told(self.mapping, self.on.clocks)
+        self.report.suspicious += holes_told(self.on.empty, self.on.clocks)
         positions = self._sensors()
         self.report.suspicious += repeats(self.mapping, self.on.clocks, self.on.paces())
         torques = self.led.torques()

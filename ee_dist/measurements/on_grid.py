@@ -32,8 +32,8 @@ DENSER = 1.1
 
 class OnGrid:
     """``at_s`` (T,) is the grid, every ``step_s`` from the first row of the ``main`` table, that of the first sensor; ``clocks``
-    are of all tables by name, ``read_at`` the rows in which sensors were read. Raises MeasurementError: see ``trial_clocks`` and
-    ``clocks``."""
+    are of all tables by name, ``read_at`` the rows in which sensors were read, ``empty`` the long runs of those in which one was
+    not. Raises MeasurementError: see ``trial_clocks`` and ``clocks``."""
 
     def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, report: Report) -> None:
         self.mapping, self.report, self.where = mapping, report, str(mapping.source)
@@ -50,7 +50,7 @@ class OnGrid:
         steps_s = (timing.median_s, length / (len(times_s) - 1))
         self.as_is = timing.even and all(abs(s / step - 1) < SAME_RATE for s in steps_s)
         self.at_s = np.arange(len(times_s)) * step if self.as_is else grid(times_s, step)
-        self.read_at = rows_read(mapping, self.clocks)
+        self.read_at, self.empty = rows_read(mapping, self.clocks), holes(mapping, self.clocks)
         self._tell()
 
     def _tell(self) -> None:
@@ -89,8 +89,7 @@ class OnGrid:
     def filled(self) -> Array | None:
         """(T,) which rows lie between readings; None where none does. Tells how many."""
         rows_s = self._rows_s() if self.as_is else None
-        empty = holes(self.mapping, self.clocks)
-        return between_readings(self.at_s, rows_s, self.main, self.clocks, self.read_at, self.report.done, empty)
+        return between_readings(self.at_s, rows_s, self.main, self.clocks, self.read_at, self.report.done, self.empty)
 
     def _rows_s(self) -> Array:
         """When the rows of the log were, (T,) s since the main table began. Rows that are taken sample by sample count as evenly

@@ -58,10 +58,10 @@ def holes(mapping: Mapping, clocks: AnyMapping[str, Clocked]) -> dict[str, list[
     return found
 
 
-def holes_told(mapping: Mapping, clocks: AnyMapping[str, Clocked]) -> list[str]:
-    """A line for each of the first holes."""
+def holes_told(empty: AnyMapping[str, Sequence[tuple[str, Rows]]], clocks: AnyMapping[str, Clocked]) -> list[str]:
+    """A line for each of the first ``holes``."""
     lines = []
-    for name, found in holes(mapping, clocks).items():
+    for name, found in empty.items():
         for channel, rows in found[:SHOWN]:
             times_s, row = clocks[name].times_s, clocks[name].table.line(int(rows[0]))
             lasting = (len(rows) + 1) * float(np.median(np.diff(times_s)))

@@ -345,7 +345,8 @@ class OpenLoop(Problem):
             log, of_blocks = part.run.log, len(measured) * self.block
             began = log.times_s[0] - (part.run.begun.after_s if part.run.begun else 0.0)
             times = log.times_s[log.readings][:of_blocks].reshape(-1, self.block).mean(axis=1) - began
-            found.append(Beside(times, measured, measured - self.raw_blocks(k, residual)[:, channel]))
+            gap = self.smooth(self.blocks(k, residual)[:, channel]) * self.weights.deviation[k][:, channel]
+            found.append(Beside(times, measured, measured - gap))
         return found
 
     def raw_grain(self, part: int, residual: Array) -> Array:
