@@ -22,6 +22,7 @@ from ee_dist.engines.compiled import compiled
 from ee_dist.engines.contract import EngineError
 from ee_dist.engines.delay import Delay
 from ee_dist.engines.friction import Friction
+from ee_dist.engines.goals import Goals
 from ee_dist.engines.per_robot import per_robot
 from ee_dist.engines.transmission import Transmission
 from ee_dist.robots.inertia import felt_inertia, steady_inertia
@@ -68,18 +69,13 @@ class DrivePath:
         self.motor = np.stack([derived[n] if n in derived else p[n] for n in MOTOR])
         self.shape, self.one = shape, np.ones(shape)
         self.integral = np.zeros(shape)
-        self.goal: Array | None = None
-        """Where a controller with limits of its own has let its commands (B, M) go so far,"""
-        self.pace = np.zeros(shape)
-        """and how fast these go, where their acceleration is limited, rad/s."""
         self.before: Array | None = None
         """Commands (B, M) in the step before, by which a controller that goes along with their speed knows it."""
         self.still = np.zeros(shape)
-        self.led = np.isfinite(p["command_speed"]) & (self.kind <= SPEED)
+        self.goals = Goals(p, self.kind == POSITION, self.kind == SPEED, self.dt)
+        self.leads = self.goals.any
         self.governed = np.isfinite(p["command_speed"]) & (self.kind == TORQUE)
         self.uses_governor = bool(self.governed.any())
-        self.eased = np.isfinite(p["command_acceleration"]) & (self.kind == POSITION)
-        self.leads = bool((self.led | self.eased).any())
         self.sag = np.array([[r.world.supply_sag] for r in robots])
         self.uses_sag = bool(np.any(self.sag != 0))
         limited = np.isfinite(p["torque_limit"]) & (self.kind != NONE)
@@ -163,7 +159,7 @@ class DrivePath:
         """
         wanted = self._command(command)
         if self.leads:
-            wanted = self._limited(wanted, q, enabled)
+            wanted = self.goals(wanted, q, enabled)
         position, speed = (q, qd) if self.transmission is None else self.transmission.motor_side(q, qd)
         for function, rows, columns, context in self.speeds:
             context.t_s = t_s
@@ -213,29 +209,6 @@ class DrivePath:
         before = wanted if self.before is None else self.before
         self.before = wanted.copy()
         return self.p["feed_forward"] * (wanted - before) / self.dt
-
-    def _limited(self, wanted: Array, q: Array, enabled: Array | None) -> Array:
-        """Commands under the limits of their controllers. A goal sets out from where the joint stands, and stays with it while
-        the drive is released."""
-        top, by_position = self.p["command_speed"], self.kind == POSITION
-        goal = q if self.goal is None else np.where(np.isnan(self.goal), q, self.goal)
-        if enabled is not None:
-            goal = np.where(enabled > 0, goal, q)
-        there = np.where(
-            by_position, np.clip(wanted, goal - top * self.dt, goal + top * self.dt), np.clip(wanted, -top, top)
-        )
-        if self.uses["command_acceleration"]:
-            if enabled is not None:
-                self.pace = np.where(enabled > 0, self.pace, 0.0)
-            most = np.where(self.eased, self.p["command_acceleration"], 1.0)
-            # The pace from which it can still stop where it is wanted.
-            aim = np.sign(wanted - goal) * np.minimum(
-                np.sqrt(2.0 * most * np.abs(wanted - goal)), np.abs(there - goal) / self.dt
-            )
-            self.pace = np.clip(aim, self.pace - most * self.dt, self.pace + most * self.dt)
-            there = np.where(self.eased, goal + self.pace * self.dt, there)
-        self.goal = there
-        return np.where(self.led | self.eased, there, wanted)
 
     def _motor(
         self,

@@ -57,7 +57,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     drive = DrivePath(robots, dt, bodies.gives)
     goals = _goals(rollouts)
     if goals is not None:
-        drive.goal, drive.pace = goals[:, 0], np.nan_to_num(goals[:, 1])
+        drive.goals.at, drive.goals.pace = goals[:, 0].copy(), np.nan_to_num(goals[:, 1])
     sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
     scales = per_robot(robots, scaling)
     control = Controllers(robots, [r.driver for r in rollouts], per_robot(robots, command_scaling), steps)

@@ -18,6 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.engines.compiled import compiled
 from ee_dist.trials.log import Array
 
 LIGHTEST_ROTOR = 0.05
@@ -38,6 +39,7 @@ class Transmission:
         self.side = np.zeros(inertia.shape)
         """Where the motor presses: on the upper (1) or lower (-1) side of the play, or nowhere (0)."""
         self.position: Array | None = None
+        """Of the motor (B, M), in units of the joint; with it before the first step."""
         self.speed = np.zeros(inertia.shape)
         self.carried = np.zeros(inertia.shape)
 
@@ -48,32 +50,95 @@ class Transmission:
 
     def motor_side(self, q: Array, qd: Array) -> tuple[Array, Array]:
         """Position and speed of the motor (B, M), in units of the joint."""
-        flying = self.loose & (self.side == 0)
         if self.position is None:
-            self.position = q
-        at = q + self.side * self.play + self.compliance * self.carried
-        self.position = np.where(self.elastic, np.where(flying, self.position, at), q)
-        self.speed = np.where(flying, self.speed, qd)
+            self.position = q.copy()
+        _follow(
+            self.elastic,
+            self.loose,
+            self.side,
+            self.play,
+            self.compliance,
+            self.carried,
+            q,
+            qd,
+            self.position,
+            self.speed,
+        )
         return self.position, self.speed
 
     def __call__(self, active: Array, stiffness: Array, damping: Array, q: Array, qd: Array) -> Array:
         """Torque at the joint from the motor's torque and how that falls with the motor's position and speed."""
         assert self.position is not None
-        dt = self.dt
-        give = (stiffness + damping / dt) * self.compliance
-        torque = (active + give * self.carried) / (1.0 + give)
-        if self.loose.any():
-            speed = self.speed + dt * active / (self.rotor + dt * damping + dt * dt * stiffness)
-            position = self.position + dt * speed
-            beyond = position - (q + dt * qd)
-            side = np.where(np.abs(beyond) > self.play, np.sign(beyond), 0.0)
-            brought = self.landing * (self.speed - qd) / dt
-            pressed = np.maximum(side * (torque + brought), 0.0) * side
-            torque = np.where(self.loose, pressed, torque)
-            self.side = np.where(self.loose, side, 0.0)
-            flying = self.loose & (side == 0)
-            self.position = np.where(flying, position, self.position)
-            self.speed = np.where(flying, speed, self.speed)
-        torque = np.where(self.elastic, torque, active)
-        self.carried = np.where(self.compliance > 0, torque, 0.0)
-        return torque
+        found = np.empty(active.shape)
+        _carry(
+            self.elastic, self.loose, self.play, self.compliance, self.rotor, self.landing, self.dt,
+            active, stiffness, damping, q, qd, self.side, self.position, self.speed, self.carried, found,
+        )  # fmt: skip
+        return found
+
+
+@compiled
+def _follow(
+    elastic: NDArray[np.bool_],
+    loose: NDArray[np.bool_],
+    side: Array,
+    play: Array,
+    compliance: Array,
+    carried: Array,
+    q: Array,
+    qd: Array,
+    position: Array,
+    speed: Array,
+) -> None:
+    """Bring ``position`` and ``speed`` of the motors to this step: with their joints, but for those that fly through the play."""
+    for i in range(q.shape[0]):
+        for j in range(q.shape[1]):
+            flying = loose[i, j] and side[i, j] == 0.0
+            if not flying:
+                speed[i, j] = qd[i, j]
+                at = q[i, j] + side[i, j] * play[i, j] + compliance[i, j] * carried[i, j]
+                position[i, j] = at if elastic[i, j] else q[i, j]
+
+
+@compiled
+def _carry(
+    elastic: NDArray[np.bool_],
+    loose: NDArray[np.bool_],
+    play: Array,
+    compliance: Array,
+    rotor: Array,
+    landing: Array,
+    dt: float,
+    active: Array,
+    stiffness: Array,
+    damping: Array,
+    q: Array,
+    qd: Array,
+    side: Array,
+    position: Array,
+    speed: Array,
+    carried: Array,
+    found: Array,
+) -> None:
+    """Write to ``found`` the torques at the joints; those from ``side`` to ``carried`` go on. All (B, M)."""
+    for i in range(found.shape[0]):
+        for j in range(found.shape[1]):
+            if not elastic[i, j]:
+                found[i, j] = active[i, j]
+                continue
+            give = (stiffness[i, j] + damping[i, j] / dt) * compliance[i, j]
+            torque = (active[i, j] + give * carried[i, j]) / (1.0 + give)
+            if loose[i, j]:
+                brought = landing[i, j] * (speed[i, j] - qd[i, j]) / dt
+                led = rotor[i, j] + dt * damping[i, j] + dt * dt * stiffness[i, j]
+                gone = speed[i, j] + dt * active[i, j] / led
+                there = position[i, j] + dt * gone
+                beyond = there - (q[i, j] + dt * qd[i, j])
+                pressing = np.sign(beyond) if abs(beyond) > play[i, j] else 0.0
+                pressed = pressing * (torque + brought)
+                torque = (0.0 if pressed < 0.0 else pressed) * pressing
+                side[i, j] = pressing
+                if pressing == 0.0:
+                    position[i, j], speed[i, j] = there, gone
+            found[i, j] = torque
+            carried[i, j] = torque if compliance[i, j] > 0.0 else 0.0

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ee_dist.engines import compiled as module
-from ee_dist.engines import drive, drivers, friction, loop
+from ee_dist.engines import drive, drivers, friction, goals, loop, transmission
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.robots.model import COMMANDS, RobotError, Sensor
@@ -65,6 +65,35 @@ def test_friction(robots: int, motors: int, loaded: bool, begun: bool, seed: int
     fading, of_load, enabled, give, last_give = rng.uniform(0, 1, (5, *shape))
     arrays = [torque, motor, speed, fading, of_load, enabled, give, last_speed, last_torque, last_give]
     assert_same_bits(friction._rub, [table, np.full(shape, 2.0), rubbing, loaded, *arrays, begun, np.empty(shape)])
+
+
+@settings(max_examples=30, deadline=None)
+@given(motors=st.integers(1, 9), **sizes)
+def test_goals_under_limits(robots: int, motors: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = (robots, motors)
+    by_position, led, eased = (rng.random((3, *shape)) < 0.7)[:]
+    top, most = (np.where(rng.random(shape) < 0.7, rng.uniform(0.1, 9, shape), np.inf) for _ in range(2))
+    wanted, q, pace = rng.normal(size=(3, *shape))
+    at = np.where(rng.random(shape) < 0.8, rng.normal(size=shape), np.nan)
+    closed = rng.integers(0, 2, shape).astype(float)
+    arrays = [wanted, q, closed, at, pace, np.empty(shape)]
+    assert_same_bits(goals._lead, [by_position, led, eased & by_position & np.isfinite(most), top, most, 0.01, *arrays])
+
+
+@settings(max_examples=30, deadline=None)
+@given(motors=st.integers(1, 9), **sizes)
+def test_transmissions(robots: int, motors: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = (robots, motors)
+    play, compliance = rng.uniform(0, 0.1, (2, *shape)) * rng.integers(0, 2, (2, *shape))
+    loose, elastic = play > 0, (play > 0) | (compliance > 0)
+    rotor, landing, stiffness, damping = rng.uniform(0.01, 1, (4, *shape))
+    active, q, qd, position, speed, carried = rng.normal(size=(6, *shape))
+    side = rng.integers(-1, 2, shape) * loose.astype(float)
+    assert_same_bits(transmission._follow, [elastic, loose, side, play, compliance, carried, q, qd, position, speed])
+    given_up = [active, stiffness, damping, q, qd, side, position, speed, carried, np.empty(shape)]
+    assert_same_bits(transmission._carry, [elastic, loose, play, compliance, rotor, landing, 0.01, *given_up])
 
 
 @settings(max_examples=30, deadline=None)
