@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from ee_dist.effects import CATALOGUE, Effect
-from ee_dist.effects.catalogue import FAMILIES, Parameter
+from ee_dist.effects.effect import FAMILIES, Parameter
 from ee_dist.robots.linear_stage import linear_stage
 from ee_dist.robots.model import Robot
 from ee_dist.robots.quadruped import quadruped

@@ -22,7 +22,8 @@ from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import as_slow
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
-from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.effects.effect import EffectError
 from ee_dist.effects.groups import name_of
 from ee_dist.effects.targets import uneven_rotors
 from ee_dist.robots.model import Robot

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.effects.catalogue import FAMILIES, Beside, Hypothesis
+from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.effects.effect import FAMILIES, Beside
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 

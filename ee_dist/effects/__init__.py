@@ -14,17 +14,8 @@ from ee_dist.effects import (  # noqa: F401
     wiring,
     world,
 )
-from ee_dist.effects.catalogue import (
-    CATALOGUE,
-    Effect,
-    EffectError,
-    Hypothesis,
-    Parameter,
-    Term,
-    apply,
-    effect,
-    term,
-)
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term, apply, effect, term
+from ee_dist.effects.effect import Effect, EffectError, Parameter
 from ee_dist.effects.laws import LawContext, drive_law
 from ee_dist.effects.plugins import load_plugin, loaded_plugins
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.scales import Range, always
 from ee_dist.effects.targets import carried_parts, is_arm, parts
 from ee_dist.robots.model import Robot

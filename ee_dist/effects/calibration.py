@@ -13,7 +13,8 @@ import numpy as np
 
 from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
-from ee_dist.effects.catalogue import Parameter, effect, find
+from ee_dist.effects.catalogue import effect, find
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import (
     Assumed,

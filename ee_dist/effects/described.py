@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ee_dist.basics.altered import altered
-from ee_dist.effects.catalogue import EffectError, Hypothesis, Parameter, Term, apply, find
+from ee_dist.effects.catalogue import Hypothesis, Term, apply, find
+from ee_dist.effects.effect import EffectError, Parameter
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Drive, Robot, RobotError
 from ee_dist.robots.numbers import checked

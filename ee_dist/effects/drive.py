@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
 from ee_dist.effects.described import with_more
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import (
     Assumed,

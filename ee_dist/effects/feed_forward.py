@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ee_dist.effects import scales
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
 from ee_dist.effects.described import with_more
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import is_arm
 from ee_dist.robots.model import Robot

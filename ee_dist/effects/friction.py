@@ -7,8 +7,9 @@ from collections.abc import Mapping
 
 from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
 from ee_dist.effects.described import with_more
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.scales import Range, always
 from ee_dist.effects.targets import motors
 from ee_dist.robots.model import Drive, Robot

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
+from ee_dist.effects.effect import Parameter
 from ee_dist.networks.model import GeneNetwork
 
 REFERENCE = "Marbach and others 2010, PNAS 107, 6286 (the knock-outs and knock-downs of the DREAM challenges)"

@@ -17,8 +17,9 @@ import yaml
 
 from ee_dist.basics.files import write_whole
 from ee_dist.basics.quoted import quoted
-from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, from_dict
+from ee_dist.effects.catalogue import Hypothesis, apply, from_dict
 from ee_dist.effects.described import check_written
+from ee_dist.effects.effect import EffectError
 from ee_dist.robots.describe import READERS, load_robot
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.ranges import drive_of

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from ee_dist.basics.files import real
-from ee_dist.effects.catalogue import EffectError, registered
+from ee_dist.effects.catalogue import registered
+from ee_dist.effects.effect import EffectError
 from ee_dist.effects.laws import LAWS, TEXTS
 
 MOST_BYTES = 2**24

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Beside, Parameter, effect
+from ee_dist.effects.catalogue import effect
+from ee_dist.effects.effect import Beside, Parameter
 from ee_dist.effects.scales import Range, always, longest_delay
 from ee_dist.effects.targets import continuous_sensors, sensor_groups, sensors, touch_sensors
 from ee_dist.robots.model import Robot, Sensor

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.scales import Range, drive_of
 from ee_dist.effects.targets import stopped_joints
 from ee_dist.robots.model import Robot

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from ee_dist.basics.altered import altered
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.scales import Range
 from ee_dist.effects.targets import controlled, motors, powered, sprung_joints, stopped_joints
 from ee_dist.robots.model import Drive, Robot

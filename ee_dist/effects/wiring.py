@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.targets import hidden_neurons, motor_pairs
 from ee_dist.robots.model import Robot
 

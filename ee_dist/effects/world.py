@@ -7,7 +7,8 @@ from collections.abc import Mapping
 
 from ee_dist.effects import scales
 from ee_dist.effects.body import PAPER
-from ee_dist.effects.catalogue import Parameter, effect
+from ee_dist.effects.catalogue import effect
+from ee_dist.effects.effect import Parameter
 from ee_dist.effects.scales import Range, always
 from ee_dist.effects.targets import base, floor, is_arm, mounting
 from ee_dist.robots.model import Robot

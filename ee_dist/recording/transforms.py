@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ee_dist.effects.catalogue import EffectError, apply
+from ee_dist.effects.catalogue import apply
+from ee_dist.effects.effect import EffectError
 from ee_dist.recording.clock import SECOND_NS, offsets_ns
 from ee_dist.recording.records import TrialRecord
 from ee_dist.recording.schemas import FrameTransform, FrameTransforms

@@ -11,7 +11,7 @@ from hydra.errors import HydraException, OverrideParseException
 
 from ee_dist.basics.names import listed_or, nearest
 from ee_dist.basics.quoted import quoted
-from ee_dist.effects.catalogue import EffectError
+from ee_dist.effects.effect import EffectError
 from ee_dist.effects.plugins import loaded_plugins
 from ee_dist.engines.contract import EngineError
 from ee_dist.engines.drivers import DriverError

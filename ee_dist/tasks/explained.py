@@ -10,7 +10,8 @@ from typing import Any
 from ee_dist.basics.quoted import one_line
 from ee_dist.discrepancy.accounts.of_improve import EACH
 from ee_dist.discrepancy.contenders import with_others_for
-from ee_dist.effects.catalogue import EffectError, Hypothesis, apply, term
+from ee_dist.effects.catalogue import Hypothesis, apply, term
+from ee_dist.effects.effect import EffectError
 from ee_dist.effects.plugins import load_plugin
 from ee_dist.robots.model import Robot
 from ee_dist.robots.untrusted import UntrustedError, json_of, text_of, yaml_of

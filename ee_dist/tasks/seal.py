@@ -14,7 +14,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ee_dist.effects.catalogue import EffectError, Hypothesis, from_dict
+from ee_dist.effects.catalogue import Hypothesis, from_dict
+from ee_dist.effects.effect import EffectError
 from ee_dist.robots.untrusted import LARGEST, json_of, text_of
 from ee_dist.tasks.config import ConfigError
 

@@ -18,8 +18,9 @@ from ee_dist.basics.names import listed
 from ee_dist.discrepancy.draw import draw
 from ee_dist.discrepancy.measured_trial import driver_of
 from ee_dist.discrepancy.search.candidates import candidate
-from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, apply, find, from_dict, term
+from ee_dist.effects.catalogue import Hypothesis, Term, apply, find, from_dict, term
 from ee_dist.effects.described import check_written
+from ee_dist.effects.effect import EffectError
 from ee_dist.effects.fixture import STAND
 from ee_dist.engines.drivers import Commands
 from ee_dist.evaluation.physical import PhysicalRobot

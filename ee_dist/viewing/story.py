@@ -6,7 +6,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, from_dict
+from ee_dist.effects.catalogue import Hypothesis, Term, from_dict
+from ee_dist.effects.effect import EffectError
 from ee_dist.recording.records import (
     EVOLVED,
     EVOLVING,

@@ -10,7 +10,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from ee_dist.effects.catalogue import EffectError, Hypothesis, apply
+from ee_dist.effects.catalogue import Hypothesis, apply
+from ee_dist.effects.effect import EffectError
 from ee_dist.robots.model import Robot
 from ee_dist.robots.pictured import reach
 from ee_dist.trials.log import Array

@@ -9,7 +9,8 @@ from typing import Any
 
 from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.search.candidates import known
-from ee_dist.effects.catalogue import EffectError, from_dict
+from ee_dist.effects.catalogue import from_dict
+from ee_dist.effects.effect import EffectError
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import ConfigError
 from ee_dist.workbench.bench import Bench, Entry, Step

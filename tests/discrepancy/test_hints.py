@@ -21,7 +21,8 @@ from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.effects.catalogue import CATALOGUE, EffectError, Hypothesis, term
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, term
+from ee_dist.effects.effect import EffectError
 from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.trials.excitation import Excitation
@@ -89,6 +90,15 @@ def test_what_a_user_s_own_reading_gets_wrong_is_said(seen_in: Callable[[Array],
     other = replace(CATALOGUE["upper_stop"], seen_at=lambda *_: seen_in(np.zeros(5)))
     with pytest.raises(EffectError, match=said.replace("seen_in", "seen_at")):
         other.shown_at(servo_pendulum(), "servo", np.zeros(5), np.zeros(5))
+
+
+def test_what_readings_show_is_checked_by_the_effect_that_says_so_whatever_is_registered() -> None:
+    known = CATALOGUE["sensor_quantisation"]
+    coarser = tuple(replace(p, lower=2.0, upper=3.0, neutral=2.0) for p in known.parameters)
+    own = replace(known, name="of_nobody_s", parameters=coarser, seen_in=lambda values: {"step": values[0]})
+    assert own.shown_in(np.full(5, 2.5)) == {"step": 2.5}
+    with pytest.raises(EffectError, match=r"of_nobody_s: step = 1 lies outside \[2, 3\]"):
+        own.shown_in(np.ones(5))
 
 
 def test_a_sensor_with_many_steps_gives_no_hint() -> None:

@@ -15,7 +15,8 @@ from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import seen_beside
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
-from ee_dist.effects.catalogue import CATALOGUE, Beside, term
+from ee_dist.effects.catalogue import CATALOGUE, term
+from ee_dist.effects.effect import Beside
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.evaluation.physical import PhysicalRobot
 from ee_dist.evaluation.serial import SerialEvaluator

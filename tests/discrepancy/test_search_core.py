@@ -27,7 +27,8 @@ from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import follow_slopes
 from ee_dist.discrepancy.search.trials import telling
-from ee_dist.effects.catalogue import EffectError, Hypothesis, Term, term
+from ee_dist.effects.catalogue import Hypothesis, Term, term
+from ee_dist.effects.effect import EffectError
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.trials.log import Array
 

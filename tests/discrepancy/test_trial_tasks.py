@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ee_dist.effects.catalogue import EffectError, term
+from ee_dist.effects.catalogue import term
+from ee_dist.effects.effect import EffectError
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.tasks import recover
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, RobotConfig

@@ -14,7 +14,8 @@ import pytest
 import yaml
 
 from ee_dist.effects import CATALOGUE, Effect, Term, apply, term
-from ee_dist.effects.catalogue import FAMILIES, from_dict
+from ee_dist.effects.catalogue import from_dict
+from ee_dist.effects.effect import FAMILIES
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Network, weight_count
 from ee_dist.engines.pybullet.engine import PyBulletEngine

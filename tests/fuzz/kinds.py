@@ -11,7 +11,7 @@ from typing import Any
 from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
 
-from ee_dist.effects.catalogue import EffectError
+from ee_dist.effects.effect import EffectError
 from ee_dist.engines.contract import EngineError
 from ee_dist.engines.drivers import DriverError
 from ee_dist.recording.errors import RecordingError

@@ -116,7 +116,8 @@ def test_a_transform_that_fails_is_one_line(body, said):
     """Whatever a user's own effect does, it ends as an error of effects that names it."""
     from dataclasses import replace
 
-    from ee_dist.effects.catalogue import CATALOGUE, EffectError, apply, registered, term
+    from ee_dist.effects.catalogue import CATALOGUE, apply, registered, term
+    from ee_dist.effects.effect import EffectError
     from ee_dist.robots.quadruped import quadruped
 
     name = "motor_weak"

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
-from ee_dist.effects.catalogue import EffectError, term
+from ee_dist.effects.catalogue import term
+from ee_dist.effects.effect import EffectError
 from ee_dist.tasks import compare, trial
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, EvaluatorConfig, RobotConfig
 from ee_dist.workbench import saved, verbs

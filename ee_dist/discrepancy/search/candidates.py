@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.basics.names import nearest
-from ee_dist.effects.catalogue import CATALOGUE, FAMILIES, Effect, EffectError, Hypothesis, Term, apply, find
+from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term, apply, find
+from ee_dist.effects.effect import FAMILIES, Effect, EffectError
 from ee_dist.effects.groups import groups, members_of
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array

@@ -15,7 +15,8 @@ import numpy as np
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import NARROWEST, follow_valley
-from ee_dist.effects.catalogue import EffectError, apply
+from ee_dist.effects.catalogue import apply
+from ee_dist.effects.effect import EffectError
 from ee_dist.robots.ranges import drive_of
 from ee_dist.trials.log import Array
 

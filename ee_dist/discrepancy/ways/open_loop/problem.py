@@ -48,7 +48,8 @@ from ee_dist.discrepancy.ways.open_loop.stretches import (
 from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
 from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, Weights, soften, weigh
-from ee_dist.effects.catalogue import Beside, Hypothesis, applied, apply, find
+from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
+from ee_dist.effects.effect import Beside
 from ee_dist.effects.groups import members_of
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
