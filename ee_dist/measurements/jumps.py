@@ -37,15 +37,17 @@ def jumps(position: Array, hinge: bool = True) -> tuple[Array, Array]:
 
 def hops(position: Array, times_s: Array) -> NDArray[np.intp]:
     """The rows (of T) in which a joint goes on as before, and several times as fast as in each of those around: time passed there
-    that the times (T,) do not count."""
-    speeds = np.diff(position) / np.diff(times_s)
-    reach = max(AROUND)
+    that the times (T,) do not count. Beside a gap in these they do: what was late is told there already."""
+    steps_s = np.diff(times_s)
+    speeds, reach = np.diff(position) / steps_s, max(AROUND)
     if len(speeds) < 10 * reach:
         return np.zeros(0, dtype=np.intp)
     rows = np.arange(reach, len(speeds) - reach)
     around = np.stack([speeds[rows + k] for k in AROUND])
     one_way = (np.sign(around) == np.sign(speeds[rows])).all(axis=0) & (speeds[rows] != 0)
-    found: NDArray[np.intp] = rows[one_way & (np.abs(speeds[rows]) > HOP * np.abs(around).max(axis=0))]
+    gap = steps_s > HOP * np.median(steps_s)
+    even = ~np.any([gap[rows + k] for k in range(-reach, reach + 1)], axis=0)
+    found: NDArray[np.intp] = rows[one_way & even & (np.abs(speeds[rows]) > HOP * np.abs(around).max(axis=0))]
     return found
 
 

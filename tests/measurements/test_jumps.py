@@ -95,3 +95,16 @@ def test_readings_whose_own_times_say_that_they_were_late_are_not_lost() -> None
     assert losing_time([("swing", log(read, ~kept))]) == []
     assert losing_time([("noise", log(np.random.default_rng(1).standard_normal(len(T))))]) == []
     assert losing_time([("stuck", log(np.floor(np.sin(0.3 * T) * 50) / 50))]) == []
+
+
+def test_rows_that_were_stamped_late_beside_a_gap_of_the_times_are_not_lost() -> None:
+    """The last reading before each gap was taken behind it: the times have the gap, one row later."""
+    kept = np.ones(len(T), dtype=bool)
+    for at in (100, 310, 520, 830):
+        kept[at : at + 9] = False
+    position = np.zeros(len(T))
+    position[kept] = np.sin(1.3 * np.r_[T[kept][1:], T[-1] + 0.01])
+    assert losing_time([("swing", log(position, ~kept))]) == []
+    evenly = np.r_[position[kept], np.full(int((~kept).sum()), position[kept][-1])]
+    (line,) = losing_time([("swing", log(evenly))])
+    assert "at 4 places, in swing at 0.9" in line
