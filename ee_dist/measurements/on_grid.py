@@ -13,7 +13,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.held_readings import written_late
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.reading import between_readings, holes, paces_of, rows_read
-from ee_dist.measurements.report import TORQUE, Report
+from ee_dist.measurements.report import COMMAND, TORQUE, Report
 from ee_dist.measurements.sampling import carried, grid, held, linear, smoothed
 from ee_dist.measurements.suspicious import clock_suspicion, rolled_over, spike_suspicion, suspicions, time_suspicion
 from ee_dist.measurements.table import Recorded
@@ -118,7 +118,7 @@ class OnGrid:
             raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty{spared}")
         if not quiet and not column.signed_bits:
             title = f"{name} ({column.column})"
-            said = suspicions(title, raw[good], _turn(column))
+            said = suspicions(title, raw[good], _turn(column), name.startswith(COMMAND))
             looked = reading and not (said or column.unwrap or column.rolls_over)
             over = rolled_over(title, raw[good], abs(column.scale) * size) if looked else None
             spike = spike_suspicion(title, raw[good]) if step_like else None

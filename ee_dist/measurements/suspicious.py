@@ -52,8 +52,9 @@ CLOCKS, MOST_APART = 1.03, 15.0
 """Times as long as another that a clock lasts from which one of the two is wrong, and up to which they tell of the same thing."""
 
 
-def suspicions(name: str, values: Array, turn: float = TURN) -> list[str]:
-    """Sentences about one series (T,): stuck, clipped, a wrapped counter or angle; ``turn`` is a whole turn in its numbers."""
+def suspicions(name: str, values: Array, turn: float = TURN, asked: bool = False) -> list[str]:
+    """Sentences about one series (T,): stuck, clipped, a wrapped counter or angle; ``turn`` is a whole turn in its numbers.
+    ``asked``: a command, which may well rest at its largest value, however it came there."""
     found: list[str] = []
     spread = float(np.ptp(values))
     if spread == 0:
@@ -61,7 +62,7 @@ def suspicions(name: str, values: Array, turn: float = TURN) -> list[str]:
     run, start = _longest_run(values)
     if run > STUCK_SHARE * len(values):
         found.append(f"{name}: does not change for {run} rows of {len(values)}, from row {start}")
-    for edge, what in ((values.max(), "highest"), (values.min(), "lowest")):
+    for edge, what in () if asked else ((values.max(), "highest"), (values.min(), "lowest")):
         at = values == edge
         share = float(np.mean(at))
         if share > CLIPPED_SHARE and len(np.unique(values)) > 20 and _cut_off(values, at, spread):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import small_logs as logs
 from scipy import signal
 
 from ee_dist.measurements.commanded import beyond_the_drive, disobeying, far_from_commands, torques_beside_commands
@@ -73,6 +74,21 @@ def test_a_goal_that_is_elsewhere_for_one_row_is_told() -> None:
 )
 def test_bad_signals_are_named(values: np.ndarray, word: str) -> None:
     assert any(word in s for s in suspicions("x", values))
+
+
+@pytest.mark.parametrize("way_s", [0.05, 0.5])
+def test_goals_that_rest_where_they_go_are_not_clipped(tmp_path: Path, way_s: float) -> None:
+    """Goals in steps, or at an even speed, now here and now there, and four times as far as they ever go. The joint stays where
+    its reading ends, which is told."""
+    to = np.array([0.9, -0.4, 0.9, 0.3, -0.9, 0.9, -0.2, -0.9, 0.9, 0.0])
+    goal = np.interp(
+        T[:1000], np.c_[np.arange(10), np.arange(10) + way_s + 1e-6].ravel(), np.c_[np.r_[0, to[:-1]], to].ravel()
+    )
+    follows = signal.lfilter([0.1], [1, -0.9], goal)
+    positions = np.stack([follows, np.clip(WAVE[:1000], -0.8, 0.8)], axis=1)
+    frame = logs.frame_of(T[:1000], positions, np.stack([goal, WAVE[:1000]], axis=1))
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, frame))
+    assert [s.split(" (")[0] for s in report.suspicious if "clipped" in s] == ["position_elbow", "position_elbow"]
 
 
 def test_units_and_signs() -> None:
