@@ -249,7 +249,7 @@ def test_what_noisy_speeds_do_to_a_start_is_noise() -> None:
         problem = OpenLoop(trials, robot, evaluator)
         residual = problem.residuals([()])[0]
         for k in range(len(trials)):
-            left = problem.blocks(k, residual) ** 2
+            left = problem.views.blocks(k, residual) ** 2
             floor = problem.floor[problem.slices[k]][: left.size].reshape(left.shape)
             first.append((left[:4, positions].mean(), floor[:4, positions].mean()))
     left_first, floor_first = np.mean(first, axis=0)

@@ -190,6 +190,6 @@ def test_the_beginning_of_trials_is_the_same_problem_cut_short() -> None:
     for hypothesis in ((), sample.hidden):
         (found,), (there,) = brief.residuals([hypothesis]), whole.residuals([hypothesis])
         for k in range(len(whole.trials)):
-            first = brief.raw_blocks(k, found)
-            np.testing.assert_allclose(first, whole.raw_blocks(k, there)[: len(first)], atol=1e-6)
+            first = brief.views.raw_blocks(k, found)
+            np.testing.assert_allclose(first, whole.views.raw_blocks(k, there)[: len(first)], atol=1e-6)
     assert whole.beginning(0.8 * seconds) is whole, "to save a fifth is not worth another look"

@@ -47,6 +47,7 @@ from ee_dist.discrepancy.ways.open_loop.stretches import (
 )
 from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
+from ee_dist.discrepancy.ways.open_loop.views import Views, command_scale
 from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, Weights, soften, weigh
 from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
 from ee_dist.effects.effect import Beside
@@ -54,7 +55,6 @@ from ee_dist.effects.groups import members_of
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.robots.model import Robot
-from ee_dist.robots.ranges import span
 from ee_dist.trials.log import Array, SensorLog
 
 BLOCK_S = 0.04
@@ -65,8 +65,6 @@ SAVED = 0.6
 """Share of the rows that the beginning of trials may have, to be worth a look by itself."""
 AT_ONCE = 16
 """Values that a contact or a reversal is in."""
-COMMAND_SHARE = 0.005
-"""Scale of a network's commands, as a share of the joint's range: they are computed, not measured."""
 
 
 class OpenLoop(Problem):
@@ -130,6 +128,9 @@ class OpenLoop(Problem):
         self.weights = self._weighed(before)
         imported = [self.measured[p.trial].log.filled is not None for p in self.parts]
         self.layout, self.slices = lay_out(robot, self.parts, imported, self.weights, self.soft)
+        self.views = Views(
+            robot, self.parts, tuple(self.slices), tuple(self._data), self.weights, block, window, self.soft
+        )
         self.error_definition = (
             "root mean square over channels and time of the residual in standard deviations of its noise "
             f"and of equally good models (means over {block * (spacing or robot.time_step_s):.3g} s, softened beyond "
@@ -310,11 +311,10 @@ class OpenLoop(Problem):
         return np.concatenate([soften(shape, self.soft).ravel(), soften(texture, self.soft).ravel()])
 
     def _command_residuals(self, trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
-        spans = _spans(self.robot)
         sent = predicted_commands(trial, models)
         rows = len(trial.log) // self.block * self.block
         gap = (trial.log.commands[:, None] - sent)[:rows].reshape(-1, self.block, *sent.shape[1:]).mean(axis=1)
-        values = soften(gap / (COMMAND_SHARE * spans), self.soft)
+        values = soften(gap / command_scale(self.robot), self.soft)
         return np.ascontiguousarray(np.moveaxis(values, 1, 0)).reshape(len(models), -1)
 
     def noise_floor(self) -> tuple[float, str]:
@@ -323,60 +323,19 @@ class OpenLoop(Problem):
 
     def smooth(self, residual: Array) -> Array:
         """Before softening."""
-        return np.asarray(self.soft * np.sinh(residual / self.soft))
-
-    # -- views of a residual -----------------------------------------------------------------------------------------
-
-    def blocks(self, part: int, residual: Array) -> Array:
-        """(R // block, S): the part of a residual (n,) that compares means, of one part with R readings."""
-        rows, s = self._rows[part] // self.block, len(self.robot.sensors)
-        return residual[self.slices[part]][: rows * s].reshape(rows, s)
-
-    def raw_blocks(self, part: int, residual: Array) -> Array:
-        """The same before softening, in the units of the channels."""
-        return np.asarray(self.smooth(self.blocks(part, residual)) * self.weights.deviation[part])
+        return self.views.smooth(residual)
 
     def beside(self, residual: Array, channel: int) -> list[Beside]:
         """By the means of blocks."""
-        found = []
-        for k, part in enumerate(self.parts):
-            if not np.isfinite(mine := residual[self.slices[k]]).all() or not mine.any():
-                continue
-            measured = self._data[k].means[:, channel].astype(float)
-            log, of_blocks = part.run.log, len(measured) * self.block
-            began = log.times_s[0] - (part.run.begun.after_s if part.run.begun else 0.0)
-            times = log.times_s[log.readings][:of_blocks].reshape(-1, self.block).mean(axis=1) - began
-            gap = self.smooth(self.blocks(k, residual)[:, channel]) * self.weights.deviation[k][:, channel]
-            found.append(Beside(times, measured, measured - gap))
-        return found
-
-    def raw_grain(self, part: int, residual: Array) -> Array:
-        """(R // window, S): differences of the log of roughness, before softening."""
-        rows, s = self._rows[part], len(self.robot.sensors)
-        first, windows = rows // self.block * s, rows // self.window
-        texture = residual[self.slices[part]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
-        return np.asarray(self.smooth(texture) * self.weights.grain_deviation[part])
+        return self.views.beside(residual, channel)
 
     def raw(self, residual: Array) -> Array:
         """(n,) in the units of the channels; NaN where the texture of a channel is compared."""
-        out = np.full(len(residual), np.nan)
-        for k, part in enumerate(self.slices):
-            values = self.raw_blocks(k, residual).ravel()
-            out[part.start : part.start + len(values)] = values
-            if isinstance(self.parts[k].run.driver, Network):
-                spans = COMMAND_SHARE * _spans(self.robot)
-                sent = residual[part][-len(self._data[k].means) * len(spans) :].reshape(-1, len(spans))
-                out[part.stop - sent.size : part.stop] = (self.smooth(sent) * spans).ravel()
-        return out
+        return self.views.raw(residual)
 
     def series(self, hypothesis: Hypothesis) -> list[Series]:
         """What every channel of every trial reported, and should have reported without noise."""
-        out = []
-        for part, values in zip(self.parts, self.predicted(hypothesis), strict=True):
-            log, read = part.run.log, part.run.log.readings
-            for c, sensor in enumerate(self.robot.sensors):
-                out.append(Series(part.trial, c, sensor.unit, log.times_s[read], log.sensors[read, c], values[read, c]))
-        return out
+        return self.views.series(self.predicted(hypothesis))
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         return [*self.other_errors(hypothesis), *self.spoiled(hypothesis)]
@@ -419,8 +378,3 @@ def _without_steps(found: Digest, values: Array, window: int) -> Digest:
     return replace(
         found, repeated=np.maximum(found.repeated - by_steps(values, window), 0.0).astype(found.repeated.dtype)
     )
-
-
-def _spans(robot: Robot) -> Array:
-    """(M,) ranges of the driven joints."""
-    return np.array([high - low for low, high in (span(robot.joint(d.joint)) for d in robot.drives)])
