@@ -120,7 +120,7 @@ def places(terms: Sequence[tuple[str, str]], robot: Robot | None) -> Places:
 
 def _of_explanation(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -> Score:
     """The best and what is tied with it are alternatives: right is one that is the truth, or, of a truth of several
-    effects, one of these."""
+    effects, one of these. A tied family says so of each of its places: there the truth may be one of them."""
     verdict = summary["verdict"]
     if not hidden or verdict != EFFECT:
         return Score(
@@ -133,15 +133,16 @@ def _of_explanation(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot
     said = [places([(t["effect"], t["target"]) for t in c["terms"]], robot) for c in ties]
     truth = [places([pair], robot) for pair in _pairs(hidden)]
     whole = frozenset().union(*truth)
-    right = any(s == whole or s in truth for s in said)
+    families = [s for c, s in zip(ties, said, strict=True) if c is not best and _is_family(c["terms"])]
+    right = any(s == whole or s in truth for s in said) or any(t <= s for t in truth for s in families)
     told = frozenset().union(*said)
     missed = tuple(p for p, t in zip(_pairs(hidden), truth, strict=True) if not t <= told)
     return Score(right, (tuple(c["name"] for c in ties),), missed)
 
 
 def _of_model(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | None) -> Score:
-    """A model is right that has every true effect, each at its place or tied with one that it has, and none besides that
-    was added."""
+    """A model is right that has every true effect, each at its place or tied with one that it has (by itself, or in a family of
+    which the values were kept), and none besides that was added."""
     terms = [(t["effect"], t["target"]) for t in summary["model_terms"]]
     steps = [s for s in summary["ladder"] if s["added"]]
     gone = {name for s in steps for name in s["dropped"]}
@@ -154,6 +155,8 @@ def _of_model(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | Non
     truth = {pair: places([pair], robot) for pair in _pairs(hidden)}
     ties = {_pair(name): s["added"] for s in steps for name in s["tied_with"]}
     ties |= {(t["effect"], t["target"]): [t["in_place_of"]] for t in summary.get("twins", ())}
+    others = [(s["added"], a.get("terms", [a])) for s in steps for a in s.get("alternatives", ())]
+    families = [(places([(t["effect"], t["target"]) for t in of], robot), old) for old, of in others if _is_family(of)]
     missed, used = [], set()
     for pair, where in truth.items():
         # One effect on a group is not one of its members, and one for each member is the group.
@@ -162,10 +165,17 @@ def _of_model(summary: Mapping[str, Any], hidden: Hypothesis, robot: Robot | Non
             used |= {t for t in terms if places([t], robot) in inside}
         elif pair in ties:
             used |= {(t["effect"], t["target"]) for t in ties[pair]}
+        elif old := next((old for family, old in families if where <= family), None):
+            used |= {(t["effect"], t["target"]) for t in old}
         else:
             missed.append(pair)
     invented = tuple(a for a in named if a not in used)
     return Score(not missed and not invented, _told(summary, named), tuple(missed), invented)
+
+
+def _is_family(terms: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether these are one effect at several places, each with a value of its own."""
+    return len(terms) > 1 and len({t["effect"] for t in terms}) == 1
 
 
 def _told(summary: Mapping[str, Any], named: Sequence[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:

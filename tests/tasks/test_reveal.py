@@ -88,6 +88,33 @@ def test_right_and_not(summary, truth, right):
         assert found.missed or found.invented
 
 
+FAMILY = f"coulomb_friction@each of {len(JOINTS)} joints"
+
+
+@pytest.mark.parametrize(
+    ("truth", "right"), [((KNEE,), True), ((KNEE, "supply_sag@"), True), (("speed_limit@knee_front_left",), False)]
+)
+def test_a_truth_that_lies_in_a_tied_family_is_within_the_names(truth, right):
+    """Each joint has a value of its own in it, so that one of them may be all that is wrong; not so where all share one number,
+    nor where the family was told first."""
+    found = explained((OTHER,), EACH, tied=(FAMILY,))
+    found["candidates"][1]["name"] = FAMILY
+    assert score(found, hidden(*truth), ROBOT).right is right
+    assert score(found, hidden(*truth), ROBOT).named == ((OTHER, FAMILY),)
+    assert not score(explained((OTHER,), (ALL,), tied=(ALL,)), hidden(*truth), ROBOT).right
+    found["candidates"].reverse()
+    found["candidates"][0]["tied_with"] = []
+    assert not score(found, hidden(*truth), ROBOT).right
+
+
+@pytest.mark.parametrize(("truth", "right"), [((KNEE,), True), (("speed_limit@knee_front_left",), False)])
+def test_so_it_is_with_what_a_step_of_improve_is_tied_with(truth, right):
+    found = improved((OTHER,), tied=(FAMILY,))
+    found["ladder"][1]["alternatives"] = [{**terms(EACH[0])[0], "name": FAMILY, "terms": terms(*EACH)}]
+    said = score(found, hidden(*truth), ROBOT)
+    assert said.right is right and said.named == ((OTHER, FAMILY),)
+
+
 def test_what_was_missed_and_invented_is_told():
     found = score(improved((ALL,)), hidden(KNEE), ROBOT)
     assert found.missed == (("coulomb_friction", "knee_front_left"),)
