@@ -12,23 +12,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.assumed import beside, puts_right
-from ee_dist.discrepancy.evidence.holdout import AWAY, PRIOR, Cut, cross_fit, held_by_slopes, travelling
+from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, travelling
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge
-from ee_dist.discrepancy.evidence.rule import least_energy
 from ee_dist.discrepancy.examine import FAR, Current
-from ee_dist.discrepancy.ladder import Rung
-from ee_dist.discrepancy.problem import Problem, error, per_segment
-from ee_dist.discrepancy.pruning import AGAIN, pruned, without_these
+from ee_dist.discrepancy.kinds import Everywhere, Kept, Steps, luck, values_at
+from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.pruning import AGAIN, pruned
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, possible
-from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.race import race
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.ridges import over_ridges
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.discrepancy.search.slopes import NEAR, slopes_at
-from ee_dist.discrepancy.search.slopes import WIDTHS as SLOPES
+from ee_dist.discrepancy.search.slopes import slopes_at
 from ee_dist.discrepancy.search.trials import calm_trials, telling, telling_values
 from ee_dist.discrepancy.search.valley import follow_valley
 from ee_dist.discrepancy.sharing import apart, distinct, shared, singles
@@ -53,20 +50,8 @@ BEGINNING_S, BUSY = 8.0, 0.5
 the whole has."""
 OF_DRIVES = ("coulomb", "viscous", "rotor_inertia")
 """What every drive has, and a description of it."""
-STEPS = 4
-"""Steps by which they come into the ladder at most: kinds that matter less come with the last."""
 MOST_OF_IT = 0.5
 """Share of what is above the noise that must be left at one joint for an effect to stand out there."""
-
-
-@dataclass(frozen=True, eq=False)
-class Everywhere:
-    """The model with all that earned its place, the steps that lead there, one a kind of effect, and its energy on held-out
-    data."""
-
-    current: Current
-    rungs: list[Rung]
-    held: float
 
 
 def looked_for_at_once(problem: Problem, pool: Sequence[Candidate]) -> list[Candidate]:
@@ -125,7 +110,7 @@ def everywhere(
                 found is None or other.held < found.held + (look.luck(other.held) if bare else 0.0)
             ):
                 found = other
-    return look.steps(found) if found is not None else None
+    return Steps(search, calm, own, current, look.cuts, len(pool)).of(found) if found is not None else None
 
 
 def _with_twins(
@@ -133,7 +118,7 @@ def _with_twins(
 ) -> Iterator[Current]:
     """Some parts of the model, and the same with one of them exchanged for its twin: which of two that look alike is there
     decides how all the rest is off, and beside the wrong one the rest looks right."""
-    yield Current(tuple(current.parts[k] for k in keep), _values(current.u, places, keep))
+    yield Current(tuple(current.parts[k] for k in keep), values_at(current.u, places, keep))
     for at, twin, u in twins:
         if at in keep:
             values = [u if k == at else current.u[places[k]] for k in keep]
@@ -171,18 +156,6 @@ def _brief(search: Search, residual: Array, current: Current) -> Search:
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
-    """A model that is worth its terms. ``held``: its energy on held-out data, under the cut that is the hardest for it;
-    ``ties``: what is as good as one of its effects; ``fitted``: energy that was left of what is fitted before any term left."""
-
-    model: Current
-    held: float
-    cut: Cut
-    ties: Mapping[str, list[str]]
-    fitted: float = np.inf
-
-
-@dataclass(frozen=True, eq=False)
 class _Look:
     """``cuts``: what is held out, each with the held-out residual (n,) of the ``current`` model; ``calm``: the search on
     predictable trials, ``brief``: on the beginning of these; ``seen`` as in ``everywhere``."""
@@ -198,10 +171,9 @@ class _Look:
 
     def luck(self, energy: float) -> float:
         """By how much held-out energy of about this size may differ for no reason."""
-        problem = self.search.problem
-        return least_energy(len(self.pool)) * max(float(problem.floor.mean()), energy / len(problem.floor))
+        return luck(self.search.problem, len(self.pool), energy)
 
-    def kept(self, base: Current, than: float, more: bool = True, beside_all: bool = False) -> _Kept | None:
+    def kept(self, base: Current, than: float, more: bool = True, beside_all: bool = False) -> Kept | None:
         """The base with all that is worth keeping, and (``more``), if need be, one effect beside; None where that is not worth
         more than the current model, or leaves more of what is fitted ``than`` another fit. ``beside_all``: the one
         effect is looked for also where much is left at one joint: small values that had to stand in for it are worth something
@@ -267,7 +239,7 @@ class _Look:
         at = np.bincount(np.array(joints)[problem.channel_of[own]], weights=above)
         return bool(at.max() > MOST_OF_IT * above.sum())
 
-    def _worth(self, fit: Fit, ties: Mapping[str, list[str]], than: float) -> _Kept | None:
+    def _worth(self, fit: Fit, ties: Mapping[str, list[str]], than: float) -> Kept | None:
         """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data. These
         are not asked where all its values leave more of what was fitted ``than`` those of another fit: that descent ended in
         another valley, which is no lower without some of them."""
@@ -293,9 +265,9 @@ class _Look:
                 return None
             if float(judged.held.sum()) > energy:
                 worst, energy = cut, float(judged.held.sum())
-        return _Kept(kept, energy, worst, ties, fit.energy)
+        return Kept(kept, energy, worst, ties, fit.energy)
 
-    def _beside(self, alone: Fit, start: Array, than: float) -> _Kept | None:
+    def _beside(self, alone: Fit, start: Array, than: float) -> Kept | None:
         """The model of a fit with one more effect, of those that promise most on top of it; all values from ``start`` (P,)."""
         search, model = self.calm, alone.model
         refit = Refit(slopes_at(search, alone.model, alone.u))
@@ -325,106 +297,3 @@ class _Look:
 
     def _others(self, model: Model) -> list[Candidate]:
         return not_said(self.search.problem.robot, model.parts, self.pool)
-
-    def steps(self, found: _Kept) -> Everywhere:
-        """One step a kind of effect, those that matter most first; kinds that help only together, or are better than the model
-        before only together, are one step."""
-        search, problem, kept, own = self.search, self.search.problem, found.model, self.own
-        places = Model(kept.parts).places
-        names = {c.name for c in self.current.parts}
-        stay = {p.name for p in kept.parts}
-        gone = tuple(c.name for c in self.current.parts[own:] if c.name not in stay)
-        # What the ladder has already is not shown as a step again.
-        chosen = [k for k, c in enumerate(kept.parts) if k < own or c.name in names]
-        shown, energy = set(chosen), next(float(r @ r) for cut, r in self.cuts if cut is found.cut)
-        rungs: list[Rung] = []
-        order, taken = self._order(kept), []
-        for kind in order:
-            chosen = sorted({*chosen, *(k for k, c in enumerate(kept.parts) if c.effect.name == kind)})
-            taken.append(chosen)
-        # Each is fitted anew in every turn, for nothing but to be shown.
-        taken = [*taken[: STEPS - 1], *taken[-1:]] if len(taken) > STEPS else taken
-        starts = [(Model(tuple(kept.parts[k] for k in some)), _values(kept.u, places, some)) for some in taken]
-        # Shown is how far each step comes, and most have many values. Where slopes that are known lead nowhere values that have
-        # seen all data would be told as held out, so that far from the noise each turn is fitted anew.
-        begun, left = self._better_starts(kept, starts, taken)
-        if left > NEAR * float(problem.floor.sum()):
-            fitted = cross_fit(search, begun, found.cut, short=AWAY)
-        else:
-            fitted = held_by_slopes(search, fit_all(search, begun, None, SLOPES[2:], PRIOR), found.cut)
-        energies = [held.energy for held in fitted]
-        last, model, held_energy = self._as_far(found, starts, energies)
-        for k in range(last + 1):
-            chosen, (part_of_it, start), held = taken[k], starts[k], fitted[k]
-            if energies[k] >= energy and k != last:
-                continue
-            mine = [m for m in chosen if m not in shown]
-            terms = part_of_it.hypothesis(start)
-            rungs.append(
-                Rung(
-                    _label([kept.parts[m] for m in mine]),
-                    tuple(t for m, t in zip(chosen, terms, strict=True) if m in mine),
-                    (*search.fixed, *terms),
-                    float(np.sqrt(held.seen)),
-                    error(held.residual),
-                    per_segment(problem, held.residual),
-                    found.cut.name,
-                    tied_with=[t for m in mine for t in found.ties.get(kept.parts[m].name, [])],
-                    dropped=() if rungs else gone,
-                )
-            )
-            shown, energy = set(chosen), energies[k]
-        return Everywhere(model, rungs, held_energy)
-
-    def _better_starts(
-        self, kept: Current, starts: Sequence[tuple[Model, Array]], taken: Sequence[Sequence[int]]
-    ) -> tuple[list[tuple[Model, Array]], float]:
-        """Parts of a model (those ``taken``), each with the values that these have in all of it, or with what the others were
-        making up for, as far as slopes tell, whichever leaves less; and what the last of them leaves."""
-        search, count = self.search, len(kept.parts)
-        both = [*starts]
-        if len(starts) > 1:
-            (whole,) = follow_valley(search, [(Model(kept.parts), kept.u)], search.everything, PRIOR, 1, (AGAIN,))
-            foretold = [without_these(whole, [k for k in range(count) if k not in some]) for some in taken]
-            both += [(f.model, f.u) for f in foretold]
-        rows = search.residuals([model.hypothesis(u) for model, u in both])
-        left = [float(r @ r) if np.isfinite(r).all() else np.inf for r in rows]
-        best = [min(range(k, len(both), len(starts)), key=lambda i: left[i]) for k in range(len(starts))]
-        return [both[i] for i in best], left[best[-1]]
-
-    def _as_far(
-        self, found: _Kept, starts: Sequence[tuple[Model, Array]], energies: Sequence[float]
-    ) -> tuple[int, Current, float]:
-        """The last of the steps to take, the model there, and its held-out energy: all of them, unless those beyond another make
-        what is held out worse by more than luck."""
-        last, best = len(starts) - 1, int(np.argmin(energies))
-        if energies[last] <= energies[best] + self.luck(energies[best]):
-            return last, found.model, found.held
-        (fit,) = follow_valley(self.calm, [starts[best]], self.calm.everything, PRIOR, widths=(AGAIN,))
-        return best, Current(fit.model.parts, fit.u), energies[best]
-
-    def _order(self, kept: Current) -> list[str]:
-        """Kinds of effect that are new, by what the model would lose without them."""
-        names, places = {c.name for c in self.current.parts}, Model(kept.parts).places
-        new = [k for k, c in enumerate(kept.parts) if k >= self.own and c.name not in names]
-        kinds = list(dict.fromkeys(kept.parts[k].effect.name for k in new))
-        rests = [[k for k, c in enumerate(kept.parts) if k not in new or c.effect.name != kind] for kind in kinds]
-        rows = self.search.residuals(
-            [Model(tuple(kept.parts[k] for k in rest)).hypothesis(_values(kept.u, places, rest)) for rest in rests]
-        )
-        costs = [float(r @ r) if np.isfinite(r).all() else np.inf for r in rows]
-        return [kinds[i] for i in np.argsort(costs, kind="stable")[::-1]]
-
-
-def _label(parts: Sequence[Candidate]) -> str:
-    """Names of effects, those at several places as ``effect@each of 3 joints``."""
-    names = []
-    for kind in dict.fromkeys(c.effect.name for c in parts):
-        mine = [c for c in parts if c.effect.name == kind]
-        where = "parts" if mine[0].effect.family == "body" else "joints"
-        names.append(mine[0].name if len(mine) == 1 else f"{kind}@each of {len(mine)} {where}")
-    return " + ".join(names)
-
-
-def _values(u: Array, places: Sequence[slice], chosen: Sequence[int]) -> Array:
-    return np.concatenate([*(u[places[k]] for k in chosen), np.zeros(0)])

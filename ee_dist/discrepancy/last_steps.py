@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
-from ee_dist.discrepancy.everywhere import AT_ONCE, Everywhere, everywhere, looked_for_at_once, stands_out
+from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, looked_for_at_once, stands_out
 from ee_dist.discrepancy.evidence.holdout import cross_fit, held_out_by, travelling
 from ee_dist.discrepancy.evidence.left import leftovers, settled
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.exchanges import at_one_place, nearest, refitted, strictest
+from ee_dist.discrepancy.kinds import Everywhere
 from ee_dist.discrepancy.ladder import Rung, Twin
 from ee_dist.discrepancy.plainer import in_plain_terms
 from ee_dist.discrepancy.pruning import without_neutral

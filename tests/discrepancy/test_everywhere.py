@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from way_samples import measured, problem_by, samples
 
-from ee_dist.discrepancy.everywhere import _Kept, _Look, everywhere, looked_for_at_once
+from ee_dist.discrepancy.everywhere import _Look, everywhere, looked_for_at_once
 from ee_dist.discrepancy.evidence.holdout import travelling, windows
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.kinds import Kept, Steps, luck
 from ee_dist.discrepancy.problem import Layout, Problem, error
 from ee_dist.discrepancy.pruning import pruned
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
@@ -121,7 +122,7 @@ def test_all_that_is_a_little_wrong_is_found_and_nothing_else(robot):
 def test_many_kinds_come_in_few_steps_those_that_matter_most_first(robot, monkeypatch):
     truth = {"coulomb_friction": 0.1, "viscous_friction": 0.2, "zero_offset": -0.15, "part_mass": 0.12}
     each = look(Curved(robot, truth), pool_of(robot))
-    monkeypatch.setattr("ee_dist.discrepancy.everywhere.STEPS", 2)
+    monkeypatch.setattr("ee_dist.discrepancy.kinds.STEPS", 2)
     few = look(Curved(robot, truth), pool_of(robot))
     assert names(few) == names(each) == set(truth)
     assert len(few.rungs) == 2 < len(each.rungs)
@@ -173,13 +174,13 @@ def test_kinds_that_make_what_is_held_out_worse_are_left_out_again(robot):
     problem, pool = Curved(robot, truth), pool_of(robot)[:2]
     search, cut = Search(problem), travelling(problem)[0]
     model = Current(tuple(pool), np.array([0.1, 0.2]))
-    looked = _Look(search, search, search, 0, tuple(pool), Current(), ((cut, search.base()),), ())
-    kept = _Kept(model, 5.0, cut, {})
+    steps = Steps(search, search, 0, Current(), ((cut, search.base()),), len(pool))
+    kept = Kept(model, 5.0, cut, {})
     starts = [(Model(tuple(pool[:k])), model.u[:k]) for k in (1, 2)]
-    assert looked._as_far(kept, starts, [9.0, 5.0]) == (1, model, 5.0)
-    luck = looked.luck(9.0)
-    assert looked._as_far(kept, starts, [9.0, 9.0 + 0.9 * luck])[0] == 1
-    last, less, energy = looked._as_far(kept, starts, [9.0, 9.0 + 1.1 * luck])
+    assert steps._as_far(kept, starts, [9.0, 5.0]) == (1, model, 5.0)
+    least = luck(problem, len(pool), 9.0)
+    assert steps._as_far(kept, starts, [9.0, 9.0 + 0.9 * least])[0] == 1
+    last, less, energy = steps._as_far(kept, starts, [9.0, 9.0 + 1.1 * least])
     assert (last, energy) == (0, 9.0) and less.parts == tuple(pool[:1])
 
 

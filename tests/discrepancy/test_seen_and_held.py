@@ -9,9 +9,9 @@ import pytest
 from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy import last_steps as ending
-from ee_dist.discrepancy.everywhere import Everywhere
 from ee_dist.discrepancy.evidence.holdout import PRIOR, cross_fit, held_by_slopes, prior_of, travelling
 from ee_dist.discrepancy.examine import Current, _families
+from ee_dist.discrepancy.kinds import Everywhere
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
