@@ -239,7 +239,7 @@ class _Look:
         at = np.bincount(np.array(joints)[problem.channel_of[own]], weights=above)
         return bool(at.max() > MOST_OF_IT * above.sum())
 
-    def _worth(self, fit: Fit, ties: Mapping[str, list[str]], than: float) -> Kept | None:
+    def _worth(self, fit: Fit, ties: Mapping[str, Sequence[Fit]], than: float) -> Kept | None:
         """What is left of a fit after pruning, if it is worth more than luck beside the current model, on held-out data. These
         are not asked where all its values leave more of what was fitted ``than`` those of another fit: that descent ended in
         another valley, which is no lower without some of them."""
@@ -292,7 +292,7 @@ class _Look:
         best, *ended = race(brief, starts, own, HEATS, PRIOR, heats_on=heats, same=len(start))
         best = over_ridges(brief, best, PRIOR)
         noise = max(float(problem.floor[own].mean()), best.energy / int(own.sum()))
-        ties = [f.model.parts[-1].name for f in ended if f.energy - best.energy < TIE_ENERGY * noise]
+        ties = [f for f in ended if f.energy - best.energy < TIE_ENERGY * noise]
         return self._worth(self._on_all_of_it(best), {best.model.parts[-1].name: ties}, than)
 
     def _others(self, model: Model) -> list[Candidate]:

@@ -13,9 +13,9 @@ from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import AGAIN, without_these
-from ee_dist.discrepancy.search.candidates import Candidate
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal
 from ee_dist.discrepancy.search.fit import fit_all
-from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import NEAR
 from ee_dist.discrepancy.search.slopes import WIDTHS as SLOPES
@@ -39,12 +39,13 @@ class Everywhere:
 @dataclass(frozen=True, eq=False)
 class Kept:
     """A model that is worth its terms. ``held``: its energy on held-out data, under the cut that is the hardest for it;
-    ``ties``: what is as good as one of its effects; ``fitted``: energy that was left of what is fitted before any term left."""
+    ``ties``: by one of its effects the fits that end with another that is as good; ``fitted``: energy that was left of what is
+    fitted before any term left."""
 
     model: Current
     held: float
     cut: Cut
-    ties: Mapping[str, list[str]]
+    ties: Mapping[str, Sequence[Fit]]
     fitted: float = np.inf
 
 
@@ -94,18 +95,22 @@ class Steps:
             if energies[k] >= energy and k != last:
                 continue
             mine = [m for m in chosen if m not in shown]
+            ties = [(kept.parts[m].name, f) for m in mine for f in found.ties.get(kept.parts[m].name, ())]
+            news = [kept.parts[m] for m in mine]
             terms = part_of_it.hypothesis(start)
             rungs.append(
                 Rung(
-                    _label([kept.parts[m] for m in mine]),
+                    _label(news),
                     tuple(t for m, t in zip(chosen, terms, strict=True) if m in mine),
                     (*search.fixed, *terms),
                     float(np.sqrt(held.seen)),
                     error(held.residual),
                     per_segment(problem, held.residual),
                     found.cut.name,
-                    tied_with=[t for m in mine for t in found.ties.get(kept.parts[m].name, [])],
+                    tied_with=[f.model.parts[-1].name for _, f in ties],
                     dropped=() if rungs else gone,
+                    # Of a step of one effect the search goes by them; these it has compared here already.
+                    alternatives=[_instead(news, name, f) for name, f in ties] if len(mine) > 1 else [],
                 )
             )
             shown, energy = set(chosen), energies[k]
@@ -154,6 +159,14 @@ class Steps:
 def luck(problem: Problem, tried: int, energy: float) -> float:
     """By how much held-out energy of about this size may differ for no reason, the best of so many that were ``tried``."""
     return least_energy(tried) * max(float(problem.floor.mean()), energy / len(problem.floor))
+
+
+def _instead(news: Sequence[Candidate], gone: str, other: Fit) -> tuple[Proposal, Array]:
+    """What comes with a step, with the last effect of the ``other`` fit in the place of the one that is ``gone``, called by that
+    effect as ties are; and the values that suited."""
+    parts, stay = other.model.parts, {c.name for c in news} - {gone}
+    chosen = [k for k, c in enumerate(parts) if c.name in stay or k == len(parts) - 1]
+    return Proposal(tuple(parts[k] for k in chosen), parts[-1].name), values_at(other.u, other.model.places, chosen)
 
 
 def _label(parts: Sequence[Candidate]) -> str:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from way_samples import measured, problem_by, samples
 
+from ee_dist.discrepancy.accounts.of_improve import rivals
+from ee_dist.discrepancy.contenders import with_others_for
 from ee_dist.discrepancy.everywhere import _Look, everywhere, looked_for_at_once
 from ee_dist.discrepancy.evidence.holdout import travelling, windows
 from ee_dist.discrepancy.examine import Current
@@ -189,6 +191,25 @@ def test_what_stands_out_beside_it_is_found_too(robot):
     found = improve(Curved(robot, truth), pool_of(robot))
     assert {t.effect for t in found.terms} == set(truth)
     assert found.ladder[-1].error_heldout < 1.2 * NOISE
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_what_a_step_of_several_effects_is_tied_with_keeps_its_values(robot, monkeypatch, together):
+    """A plan needs them. Of a step of one effect a search goes by them, which compared these already: there they are names."""
+    truth = {"coulomb_friction": 0.3, "viscous_friction": 0.2, "zero_offset": -0.15, "load_friction": 0.5}
+    monkeypatch.setattr("ee_dist.discrepancy.everywhere.TIE_ENERGY", 1e9)
+    if together:
+        monkeypatch.setattr("ee_dist.discrepancy.kinds.STEPS", 1)
+    found = improve(Curved(robot, truth), pool_of(robot))
+    rung = next(r for r in found.ladder if "load_friction" in {t.effect for t in r.added})
+    assert rung.tied_with and (len(rung.added) > 1) == together
+    kept = rivals(found, rung, robot)
+    assert [p.name for p, _ in kept] == (rung.tied_with if together else [])
+    for proposal, u in kept:
+        terms = Model(proposal.parts).hypothesis(u)
+        rest = [t.name for t in rung.added if t.effect != "load_friction"]
+        assert len(rest) > 1 and {t.name for t in terms} == {*rest, proposal.name}
+        assert with_others_for(found.terms, rung.added, terms)
 
 
 def test_what_stands_out_is_looked_for_though_the_rest_alone_is_worth_something(robot):
