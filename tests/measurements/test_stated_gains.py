@@ -134,3 +134,38 @@ def test_gains_in_rows_of_a_list_are_read_and_told_once(tmp_path: Path) -> None:
     vouched = robot_of(tmp_path, "kp: 20, kd: 1", "kp: 20, kd: 1")
     told = [n for n in listed_gains(tmp_path, vouched, (0, 1), kp=[20.0, 20.0]).notes if "kp" in n]
     assert told == [n for n in told if n.startswith("kp is 20 in all trials")] and len(told) == 1
+
+
+def of_two_trials(folder: Path, robot: Robot, *kp: float) -> list[tuple[str, dict[str, float], str]]:
+    """(target, factor by trial's gain, why) of the settings that two trials with such gains are proposed."""
+    files = []
+    for k, gain in enumerate(kp):
+        proposed(folder, robot, kp=gain)
+        files.append((folder / "log.csv").rename(folder / f"run{k}.csv"))
+    found = [c for c in proposal_for(files, robot, Hints()).choices if c.group == "settings"]
+    scales = [(c.name.split(" at ")[1], (c.entry or {})["factor"]["scale"], c.why) for c in found]
+    return [(target, {g: g * scale for g in kp}, why) for target, scale, why in scales]
+
+
+@pytest.mark.parametrize(
+    ("drive", "kp", "at", "said"),
+    [
+        ("kp: 80, kd: 4", (40, 60, 80), 80, "the description's gain, 80, is one of these, and taken for the same unit"),
+        ("kp: 70, kd: 4", (40, 120), 70, "the description's gain, 70, is between these"),
+        (ASSUMED, (40, 120), 240, "the description only assumes 240, taken for the same unit"),
+        ("kp: 240, kd: 8", (40, 120), 40, "the description's gain, 240, which need not be in one unit with it"),
+        ("kp: 5, assumed: [kp]", (400, 800), 400, "is taken for that at 400: where it is that of another"),
+    ],
+)
+def test_gains_that_differ_are_held_against_that_of_the_description(
+    tmp_path: Path, drive: str, kp: tuple[float, ...], at: float, said: str
+) -> None:
+    ((target, factors, why),) = of_two_trials(tmp_path, robot_of(tmp_path, drive, drive), *kp)
+    assert target == "all_joints" and factors == pytest.approx({k: k / at for k in kp})
+    assert said in why
+
+
+def test_gains_that_differ_are_held_against_that_of_each_drive(tmp_path: Path) -> None:
+    shoulder, elbow = of_two_trials(tmp_path, robot_of(tmp_path, "kp: 80, kd: 4", "kp: 50, kd: 4"), 40, 80)
+    assert shoulder[:2] == ("shoulder", pytest.approx({40: 0.5, 80: 1.0})) and "80, is one of these" in shoulder[2]
+    assert elbow[:2] == ("elbow", pytest.approx({40: 0.8, 80: 1.6})) and "50, is between these" in elbow[2]

@@ -67,7 +67,7 @@ def add_stated(proposal: Proposal, files: Sequence[Path], first: Recorded, robot
         elif found is None or not LEAST <= min(values) <= max(values) <= MOST or (place == HEADER and _AT.search(name)):
             differ.append(f"{name} ({_listed(values)})")
         else:
-            proposal.choices.append(_setting(found, place, name, values))
+            proposal.choices += _settings(found, place, name, values, robot)
     if known:
         known = _together(known, robot)
         proposal.head["gains"] = known
@@ -134,16 +134,39 @@ def _offered(known: dict[str, dict[str, float]], robot: Robot) -> str:
     )
 
 
-def _setting(found: tuple[str, str], place: str, name: str, values: Sequence[float]) -> Choice:
-    """The usual value, of those as usual the smallest, stands for the description's gain."""
+def _settings(found: tuple[str, str], place: str, name: str, values: Sequence[float], robot: Robot) -> Iterator[Choice]:
+    """A factor on the description's gain of each trial: on that of all its drives at once, where it is the same of all."""
     effect, target = found
-    usual, _ = min(Counter(values).items(), key=lambda item: (-item[1], item[0]))
-    why = (
-        f"called a gain, and differs between trials ({_listed(values)}); the description's gain is taken for that at "
-        f"{usual:g}: where it is that of another, change the scale"
-    )
-    entry = {"effect": effect, "target": target, "factor": {place: name, "scale": 1.0 / usual}}
-    return Choice("settings", f"{effect} at {target}", entry, LIKELY, why)
+    described = {d.joint: getattr(d, KEYS[effect]) for d in robot.drives if target in (ALL_JOINTS, d.joint)}
+    known = {j: _in_the_unit(g, (j, KEYS[effect]) in robot.assumed, values) for j, g in described.items()}
+    if not all(known.values()):
+        # The usual value, of those as usual the smallest, stands for the description's gain.
+        usual, _ = min(Counter(values).items(), key=lambda item: (-item[1], item[0]))
+        how = (
+            f"the description's gain, {_listed([*described.values()])}, which need not be in one unit with it, is taken for that "
+            f"at {usual:g}: where it is that of another, change the scale"
+        )
+        alike = {target: (usual, how)}
+    elif len({(g, known[j]) for j, g in described.items()}) == 1:
+        alike = {target: next((g, known[j]) for j, g in described.items())}
+    else:
+        alike = {j: (g, known[j]) for j, g in described.items()}
+    for whose, (reference, how) in alike.items():
+        entry = {"effect": effect, "target": whose, "factor": {place: name, "scale": 1.0 / reference}}
+        why = f"called a gain, and differs between trials ({_listed(values)}); {how}"
+        yield Choice("settings", f"{effect} at {whose}", entry, LIKELY, why)
+
+
+def _in_the_unit(gain: float, guessed: bool, values: Sequence[float]) -> str:
+    """Why a description's ``gain`` is in the unit of the stated ``values``, so that each is so many times that; empty where
+    nothing tells."""
+    taken = "taken for the same unit: the factor is the stated gain over that"
+    if min(values) <= gain <= max(values):
+        place = "one of these" if gain in values else "between these"
+        return f"the description's gain, {gain:g}, is {place}, and {taken}"
+    if guessed and all(FARTHEST[0] <= v / gain <= FARTHEST[1] for v in values):
+        return f"the description only assumes {gain:g}, {taken}; where they are in other units, change the scale"
+    return ""
 
 
 def _numbers(recorded: Recorded) -> Iterator[tuple[tuple[str, str], float]]:
