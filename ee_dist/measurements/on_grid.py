@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping as AnyMapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.clocks import Clocked, check_grid, other_clocks
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.frozen import frozen
 from ee_dist.measurements.held_readings import written_late
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.reading import between_readings, holes, paces_of, rows_read
@@ -33,7 +35,7 @@ DENSER = 1.1
 class OnGrid:
     """``at_s`` (T,) is the grid, every ``step_s`` from the first row of the ``main`` table, that of the first sensor; ``clocks``
     are of all tables by name, ``read_at`` the rows in which sensors were read, ``empty`` the long runs of those in which one was
-    not. Raises MeasurementError: see ``trial_clocks`` and ``clocks``."""
+    not, ``frozen`` those in which all repeat a reading. Raises MeasurementError: see ``trial_clocks`` and ``clocks``."""
 
     def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, report: Report) -> None:
         self.mapping, self.report, self.where = mapping, report, str(mapping.source)
@@ -51,6 +53,12 @@ class OnGrid:
         self.as_is = timing.even and all(abs(s / step - 1) < SAME_RATE for s in steps_s)
         self.at_s = np.arange(len(times_s)) * step if self.as_is else grid(times_s, step)
         self.read_at, self.empty = rows_read(mapping, self.clocks), holes(mapping, self.clocks)
+        self.frozen: dict[str, NDArray[np.intp]] = {}
+        for name, own in self.clocks.items():
+            for run in frozen(mapping, own, name, robot):
+                rows = np.arange(run.rows.start, run.rows.stop)
+                self.frozen[name] = np.concatenate([self.frozen.get(name, rows[:0]), rows])
+                report.suspicious.append(f"{run.said(own.table.line(run.rows.start))}: nothing there is compared")
         self._tell()
 
     def _tell(self) -> None:
@@ -89,7 +97,10 @@ class OnGrid:
     def filled(self) -> Array | None:
         """(T,) which rows lie between readings; None where none does. Tells how many."""
         rows_s = self._rows_s() if self.as_is else None
-        return between_readings(self.at_s, rows_s, self.main, self.clocks, self.read_at, self.report.done, self.empty)
+        none = {t: [rows for _, rows in self.empty.get(t, ())] for t in self.clocks}
+        for table, rows in self.frozen.items():
+            none[table].append(rows)
+        return between_readings(self.at_s, rows_s, self.main, self.clocks, self.read_at, self.report.done, none)
 
     def _rows_s(self) -> Array:
         """When the rows of the log were, (T,) s since the main table began. Rows that are taken sample by sample count as evenly
@@ -110,6 +121,10 @@ class OnGrid:
         ``reading``, are joined by lines. ``quiet``: what looks wrong in it is not told."""
         own = self.clocks[column.table]
         raw = own.table.numbers(column.column, gaps=column.gaps == "interpolate")
+        if column.table in self.frozen and (reading or name.startswith(TORQUE)):
+            # What moved went on meanwhile; it did not stand still and jump.
+            known = np.setdiff1d(np.flatnonzero(np.isfinite(raw)), self.frozen[column.table])
+            raw = raw if len(known) < 2 else np.interp(np.arange(len(raw)), known, raw[known])
         size = factor(column.unit, unit, f"{self.where}: {name}")
         good = np.flatnonzero(np.isfinite(raw))
         # A goal that was sent once holds from then on.

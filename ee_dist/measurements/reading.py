@@ -99,14 +99,11 @@ def between_readings(
     clocks: AnyMapping[str, Clocked],
     read_at: AnyMapping[str, Rows],
     done: list[str],
-    empty: AnyMapping[str, Sequence[tuple[str, Rows]]] = MappingProxyType({}),
+    none: AnyMapping[str, Sequence[Rows]] = MappingProxyType({}),
 ) -> Array | None:
     """(T,) whether nothing was read at the times ``at_s`` (T,) of the grid, by the table that is read the most seldom; None where
-    all may be readings. ``rows_s`` (T,): when rows that are taken sample by sample were; ``empty``: rows that are none."""
-    read_at = {
-        t: np.setdiff1d(rows, np.concatenate([some for _, some in empty.get(t, ())] or [rows[:0]]))
-        for t, rows in read_at.items()
-    }
+    all may be readings. ``rows_s`` (T,): when rows that are taken sample by sample were; ``none``: rows that are not."""
+    read_at = {t: np.setdiff1d(rows, np.concatenate(none.get(t) or [rows[:0]])) for t, rows in read_at.items()}
     read = [clocks[t].times_s[rows] for t, rows in read_at.items() if len(rows) > 1] or [main.times_s]
     # The grid begins where the main table does.
     read_s = max(read, key=lambda times_s: float(np.median(np.diff(times_s)))) - main.times_s[0]

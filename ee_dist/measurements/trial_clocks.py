@@ -10,6 +10,7 @@ from ee_dist.basics.names import counted
 from ee_dist.measurements.alignment import Match, match, one_clock
 from ee_dist.measurements.clocks import clocked, loosely_clocked
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.frozen import frozen
 from ee_dist.measurements.mapping import Column, Even, Mapping
 from ee_dist.measurements.robot_channels import command_kind
 from ee_dist.measurements.table import Recorded, Table
@@ -134,6 +135,7 @@ class TrialClocks:
         the motion; what is held needs no end."""
         self._cut_to_shared()
         self._cut_to_commands()
+        self._cut_frozen()
         self._cut_stale()
 
     def _cut_to_shared(self) -> None:
@@ -174,6 +176,13 @@ class TrialClocks:
         if inside[0] > 0:
             self.done.append(f"{int(inside[0])} rows left out that are before the first command of {latest}")
             self._keep(slice(int(inside[0]), None))
+
+    def _cut_frozen(self) -> None:
+        """Cuts rows at either end in which the logger repeated one reading."""
+        for run in reversed(frozen(self.mapping, self.main, self.first, self.robot)):
+            if run.rows.start == 0 or run.rows.stop == len(self.main.times_s):
+                self.done.append(f"left out: {run.said(self.main.table.line(run.rows.start))}")
+                self._keep(slice(run.rows.stop, None) if run.rows.start == 0 else slice(run.rows.start))
 
     def _cut_stale(self) -> None:
         """Cuts first rows that were read before the motion, from a buffer or before the controller was on: a simulation would
