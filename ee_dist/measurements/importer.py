@@ -81,7 +81,7 @@ class _Import:
         self.report.done += told_of(self.on.clocks, self.on.read_at)
         self.report.suspicious += holes_told(self.on.empty, self.on.clocks)
         positions = self._sensors()
-        self.report.suspicious += repeats(self.mapping, self.on.clocks, self.on.paces())
+        self.report.suspicious += repeats(self.robot, self.mapping, self.on.clocks, self.on.paces())
         torques = self.led.torques()
         commands = self.led.commands(torques, positions)
         self.report.suspicious = in_one_line(self.report.suspicious)

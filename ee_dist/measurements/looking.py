@@ -22,6 +22,7 @@ from ee_dist.measurements.mapping import Column, Estimated, Mapping
 from ee_dist.measurements.need import torques_beside_need
 from ee_dist.measurements.report import TORQUE
 from ee_dist.measurements.robot_channels import torque_units
+from ee_dist.measurements.signals import HARDLY
 from ee_dist.measurements.speeds_beside import (
     exchanged_suspicions,
     pace_suspicion,
@@ -39,12 +40,15 @@ from ee_dist.measurements.suspicious import (
     unlike_suspicion,
 )
 from ee_dist.measurements.taking import power_suspicion, takers
+from ee_dist.measurements.units import factor
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.robots.reached import told
 from ee_dist.trials.log import Array
 
 BEYOND_THE_DRIVE = 10.0
 """Times the limit of its drive that no measured torque is."""
+SHAKES = 0.05
+"""Share of the way of the joint of its kind that goes farthest below which another one may only shake with it."""
 TURNED = 1.05
 """Times half a turn beyond which the tilt of a base is in another unit."""
 
@@ -75,7 +79,8 @@ class Looked:
                 yield from self._tilt(s)
             elif s.kind == "velocity" and s.target in self._positions:
                 flaw = speed_suspicion(s.name, self.channels[s.name], self._positions[s.target], self.step_s)
-                yield from self._judged(flaw, self.mapping.sensors[s.name])
+                if flaw is not None and (flaw[1] or s.target in movers(self.robot, self._positions, HARDLY)):
+                    yield from self._judged(flaw, self.mapping.sensors[s.name])
         yield from self._speeds()
         for name, flaw in command_flaws(self.robot, self.mapping, self.commands, self._positions, self.step_s):
             yield from self._judged(flaw, self.mapping.commands.get(name))
@@ -139,14 +144,17 @@ class Looked:
             return
         speed = np.stack([self.channels[s.name] for s in read], axis=1)
         position = np.stack([positions[s.target] for s in read], axis=1)
+        far = movers(self.robot, positions)
+        moving = [k for k, s in enumerate(read) if s.target in far]
+        going, gone = speed[:, moving], position[:, moving]
         # Where it stood still speeds are off for that.
-        note = stall_suspicion(speed, position, self.step_s)
+        note = stall_suspicion(going, gone, self.step_s)
         # Lines between readings are slower than what moved: the change of what was read is that from one reading to the next.
         stride = max(1, round(self.every_s / self.step_s))
         pace = stride * self.step_s, self.rate_read_hz
         joints = [s.target for s in read]
-        note = note or pace_suspicion(speed[::stride], position[::stride], *pace)
-        if note := note or scales_suspicion(joints, speed[::stride], position[::stride], pace[0]):
+        note = note or pace_suspicion(going[::stride], gone[::stride], *pace)
+        if note := note or scales_suspicion([joints[k] for k in moving], going[::stride], gone[::stride], pace[0]):
             yield note
         if len(read) > 1:
             names = [s.name for s in read]
@@ -187,16 +195,26 @@ class Looked:
         yield note
 
 
-def repeats(mapping: Mapping, clocks: AnyMapping[str, Clocked], seldom: Container[str]) -> Iterator[str]:
+def movers(robot: Robot, positions: AnyMapping[str, Array], least: float = SHAKES) -> set[str]:
+    """The joints that go at least that share of the way of the one of their kind that goes farthest. What only shakes with it
+    shows how links bend and encoders round, and says nothing of speeds and times."""
+    spans = {joint: (robot.joint(joint).kind, float(np.ptp(at))) for joint, at in positions.items()}
+    most = {kind: max(span for k, span in spans.values() if k == kind) for kind, _ in spans.values()}
+    return {joint for joint, (kind, span) in spans.items() if span > 0 and span >= least * most[kind]}
+
+
+def repeats(robot: Robot, mapping: Mapping, clocks: AnyMapping[str, Clocked], seldom: Container[str]) -> Iterator[str]:
     """Rows in which nothing was read anew: what sensors say in one table, as the file has it. Of tables that were read ``seldom``
     such rows count as none already."""
-    by_table: dict[str, list[str]] = {}
-    for column in mapping.sensors.values():
-        if isinstance(column, Column):
-            by_table.setdefault(column.table, []).append(column.column)
-    for table, names in by_table.items():
-        own = clocks[table].table
-        if table in seldom:
-            continue
-        if note := repeat_suspicion(np.stack([own.numbers(n, gaps=True) for n in names], axis=1)):
+    sensors = {s.name: s for s in robot.sensors}
+    by_table: dict[str, dict[str, Array]] = {}
+    for name, c in mapping.sensors.items():
+        if isinstance(c, Column) and c.table not in seldom:
+            size = c.scale * factor(c.unit, sensors[name].unit, str(mapping.source))
+            by_table.setdefault(c.table, {})[name] = size * clocks[c.table].table.numbers(c.column, gaps=True)
+    for read in by_table.values():
+        placed = {sensors[n].target: at for n, at in read.items() if sensors[n].kind == "position"}
+        going = movers(robot, placed)
+        moving = np.stack([placed[j] for j in going], axis=1) if going else None
+        if note := repeat_suspicion(np.stack([*read.values()], axis=1), moving):
             yield note

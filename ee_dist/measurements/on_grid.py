@@ -134,7 +134,9 @@ class OnGrid:
         if not quiet and not column.signed_bits:
             title = f"{name} ({column.column})"
             said = suspicions(title, raw[good], _turn(column), name.startswith(COMMAND))
-            looked = reading and not (said or column.unwrap or column.rolls_over)
+            # A speed does not begin anew, however it jumps.
+            placed = reading and UNITS[unit][0] in ("angle", "length")
+            looked = placed and not (said or column.unwrap or column.rolls_over)
             over = rolled_over(title, raw[good], abs(column.scale) * size) if looked else None
             spike = spike_suspicion(title, raw[good]) if step_like else None
             self.report.suspicious += [*said, *filter(None, (over, spike))]

@@ -54,13 +54,13 @@ def stall_suspicion(speed: Array, position: Array, step_s: float) -> str | None:
     mean = np.abs(way)
     quick = mean > QUICK * np.quantile(mean, 0.95, axis=0)
     gone = np.diff(position[:, moving], axis=0) * np.sign(way)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # A position that rolls over jumps against the motion: that is no time that went by.
-        ratio = np.where(quick & (gone > 0), gone / (mean * step_s), np.nan)
-    rows = np.isfinite(ratio).any(axis=1)
+    # A position that rolls over jumps against the motion: that is no time that went by.
+    with_it = gone > 0
+    rows = (quick & with_it).any(axis=1)
     if not rows.any():
         return None
-    times = np.nanmedian(ratio[rows], axis=1)
+    # Time passes for all joints alike, and what goes far tells it best.
+    times = np.sum(gone, axis=1, where=with_it)[rows] / (np.sum(mean, axis=1, where=with_it)[rows] * step_s)
     late = times > STALLED
     if late.sum() < FEW_STALLS or late.mean() > MOST_STALLS or not 1 / ALIKE < np.median(times) < ALIKE:
         return None

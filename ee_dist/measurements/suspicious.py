@@ -38,6 +38,8 @@ ROUNDED = 0.15
 """Of a step that is large, by how much a round may be off the plain number that it is taken for."""
 STALE, SELDOM = 0.03, 0.45
 """Share of rows that repeat the one before by themselves from which that is told, and up to which it is no slower rate."""
+SLOW, CREEPING = 0.1, 1.5
+"""Share of the steps of quick rows, and times the step of its encoder, up to which a joint stands or creeps."""
 MANY, OFTEN, FEW_SPIKES = 10, 0.98, 10
 """Different numbers that a goal which moves has, share of all steps that are usual, and rows at which it may be elsewhere by
 accident;"""
@@ -176,14 +178,20 @@ def hardly_moves(values: Array, low: float, high: float, unit: str) -> bool:
     return float(np.ptp(values)) < STILL * (min(reach, TURNS_ON) if UNITS[unit][0] == "angle" else reach)
 
 
-def repeat_suspicion(readings: Array) -> str | None:
+def repeat_suspicion(readings: Array, moving: Array | None = None) -> str | None:
     """Whether now and then a row (of T, S) of readings that move before and after is the one before, in each of two columns or
-    more: it was written before anything new was read."""
+    more: it was written before anything new was read. ``moving``: positions (T, J) of joints that move far, by which it is told
+    that they move; a robot that stands, or creeps from one step of its encoder to the next, repeats its readings too."""
     if readings.shape[1] < 2 or len(readings) < 10:
         return None
     same = np.all(np.diff(readings, axis=0) == 0, axis=1)
     # At rest, and where sensors are read seldom, rows repeat for longer, or nearly always.
     alone = same[1:-1] & ~same[:-2] & ~same[2:]
+    if moving is not None:
+        steps = np.abs(np.diff(moving, axis=0))
+        finest = np.min(steps, axis=0, initial=np.inf, where=steps > 0)
+        least = np.maximum(SLOW * np.nanquantile(steps, OFTEN, axis=0), CREEPING * finest)
+        alone &= (np.minimum(steps[:-2], steps[2:]) > least).any(axis=1)
     share = float(alone.mean())
     if not STALE < share < SELDOM:
         return None

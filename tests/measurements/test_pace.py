@@ -10,6 +10,9 @@ import pandas as pd
 import pytest
 import small_logs as logs
 
+from ee_dist.measurements.importer import import_file
+from ee_dist.measurements.mapping_file import read_mapping
+from ee_dist.measurements.proposal.write import as_yaml
 from ee_dist.measurements.speeds_beside import pace_suspicion, stall_suspicion
 
 STEP_S = 0.01
@@ -82,6 +85,28 @@ def test_a_logger_that_stood_still_is_told_and_not_its_speeds() -> None:
     assert stall_suspicion(1.2 * SPEED, POSITION, STEP_S) is None
     noisy = POSITION + 1e-3 * np.random.default_rng(0).standard_normal(POSITION.shape)
     assert stall_suspicion(SPEED, noisy, STEP_S) is None
+
+
+def test_a_joint_that_goes_far_and_agrees_is_believed_before_those_that_shake() -> None:
+    at = T + 0.08 * np.floor(T / 0.5)
+    late = [0.05 * np.stack([np.interp(at, T, c) for c in v[:, 1:].T], axis=1)[:1600] for v in (SPEED, POSITION)]
+    assert stall_suspicion(*late, STEP_S) is not None, "by themselves they say that it stood still"
+    speed, position = (np.hstack([v[:1600, :1], shaking]) for v, shaking in zip((SPEED, POSITION), late, strict=True))
+    assert stall_suspicion(speed, position, STEP_S) is None
+
+
+@pytest.mark.parametrize(("way", "told"), [(0.0015, False), (0.2, True)])
+def test_a_joint_that_shakes_with_another_tells_nothing_of_its_speeds(tmp_path: Path, way: float, told: bool) -> None:
+    """Links bend: what the other end of a joint does is not what its encoder says."""
+    m = samples.motion()
+    q, w = m["q"].copy(), m["w"].copy()
+    q[:, 1], w[:, 1] = way * np.cos(9 * m["t"]), -0.4 * way * 9 * np.sin(9 * m["t"])
+    frame = {"t": m["t"]} | {f"{k}{j}": v[:, j] for k, v in (("q", q), ("w", w), ("g", m["g"])) for j in (0, 1)}
+    robot, proposal = logs.proposed(tmp_path, samples.csv(tmp_path))
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, None, "log"))
+    file = logs.written(tmp_path, pd.DataFrame(frame))
+    _, report = import_file(file, read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert any("times the change of its position" in s for s in report.suspicious) == told
 
 
 def test_speeds_that_are_off_in_quick_motion_alone_are_no_other_pace() -> None:

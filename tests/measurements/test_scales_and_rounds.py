@@ -67,6 +67,18 @@ def imported(folder: Path, rolls_over: float, torque: float = 0.0) -> tuple[np.n
     return record.log.channel("position"), report.suspicious
 
 
+def test_a_speed_does_not_begin_anew(tmp_path: Path) -> None:
+    table = {"t": T, "q": np.sin(T), "w": wrapped(25.0) / 100, "u": np.sin(T + 0.1)}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    mapping = {
+        "robot": {"robot": "servo_pendulum"}, "format": "csv", "time": {"column": "t", "unit": "s"}, "rate_hz": 50,
+        "sensors": {"position": {"column": "q", "unit": "rad"}, "speed": {"column": "w", "unit": "rad/s"}},
+        "commands": {"servo": {"column": "u", "unit": "rad"}},
+    }  # fmt: skip
+    _, report = import_file(tmp_path / "log.csv", mapping_of(mapping, tmp_path / "map.yaml"), servo_pendulum())
+    assert not any("rolls_over" in s for s in report.suspicious)
+
+
 @pytest.mark.parametrize(("times", "said"), [(300.0, True), (2.0, False)])
 def test_a_torque_that_no_drive_gives_is_told(tmp_path: Path, times: float, said: bool) -> None:
     most = servo_pendulum().drives[0].torque_limit

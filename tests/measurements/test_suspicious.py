@@ -177,6 +177,21 @@ def test_rest_steps_and_a_slower_rate_are_no_stale_rows() -> None:
     assert repeat_suspicion(moving()[:, :1]) is None
 
 
+def test_a_robot_that_stands_or_creeps_repeats_its_readings() -> None:
+    """Between the steps of its encoder nothing changes now and then, and beside what it does at other times it does not move."""
+    t = np.arange(600) * 0.01
+    way = np.where(t < 2, np.sin(np.pi * t / 2) ** 2, 0) + 1.3e-4 * np.maximum(t - 2, 0) / 0.01
+    readings = np.stack([np.round(way / 1e-4) * 1e-4, 0.2 * way], axis=1)
+    readings[200:, 1] = np.round(readings[200:, 1] / 2e-5) * 2e-5
+    stale = np.arange(205, 595, 5)
+    readings[stale] = readings[stale - 1]
+    assert repeat_suspicion(readings) is not None
+    assert repeat_suspicion(readings, readings[:, :1]) is None
+    quick = moving()
+    quick[5:295:8] = quick[4:294:8]
+    assert repeat_suspicion(quick, quick[:, :1]) is not None
+
+
 def test_what_rounding_left_of_a_range_is_nothing() -> None:
     report = Report(
         "a.csv", "a", ranges={"q": (-1.4e-16, 1.2, "rad"), "w": (-1e-13, 2e-13, "rad/s"), "z": (0.0, 0.0, "m")}
