@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import os
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,10 @@ from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
 
 MAPPING = "mapping.yaml"
+MOST_ASKED = 5
+"""Questions that the terminal shows; the mapping has all."""
+_SETTING = re.compile(r"task\.\w+=")
+"""A setting of the command line that answers a question."""
 
 
 @dataclass
@@ -192,14 +197,18 @@ def written(proposal: Proposal, config: Config, files: list[Path], out: Path, co
     shown = os.path.relpath(path)
     console.print(f"wrote {shown}", highlight=False, markup=False, soft_wrap=True)
     if proposal.questions:
-        more = f" (and {len(proposal.questions) - 1} more)" if len(proposal.questions) > 1 else ""
-        first = proposal.questions[0]
+        first, *others = proposal.questions
+        for question in others[: MOST_ASKED - 1]:
+            console.print(f"to be said, too: {question}", highlight=False, markup=False, soft_wrap=True)
+        beyond = len(others) - (MOST_ASKED - 1)
+        unseen = f", {beyond} of them in {shown} alone" if beyond > 0 else ""
+        more = f" (and {len(others)} more, above{unseen})" if others else ""
         # What a description is to say first makes another proposal.
         then = "then the same again" if "fixed_joints" in first else f"then again with task.mapping={shown}"
         raise MeasurementError(
-            f"{names}: what the file cannot say{more}: {first}; {then}"
-            if "task." not in first
-            else f"{names}: what the file cannot say{more}: {first} (the rest is in {shown})"
+            f"{names}: what the file cannot say{more}: {first} (the rest is in {shown})"
+            if _SETTING.search(first)
+            else f"{names}: what the file cannot say{more}: {first}; {then}"
         )
     return read_mapping(path)
 

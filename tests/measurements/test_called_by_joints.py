@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import measurement_files as samples
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -39,3 +40,23 @@ def test_what_a_file_is_called_goes_before(tmp_path: Path, name: str, known: boo
     frame.to_csv(tmp_path / f"{name}.csv", index=False)
     proposal = proposal_for([tmp_path / f"{name}.csv"], robot, Hints())
     assert any(q.startswith("no columns can be told to be the positions") for q in proposal.questions) != known
+
+
+@pytest.mark.parametrize("several", [False, True])
+@pytest.mark.parametrize("order", [None, samples.JOINTS])
+def test_columns_without_names_that_are_no_runs_of_all_joints_are_named_by_number(
+    tmp_path: Path, order: tuple[str, ...] | None, several: bool
+) -> None:
+    """A counter beside them: the order of the joints, which is asked for of others, cannot tell them, and that is said."""
+    m = samples.motion()
+    table = np.column_stack([m["t"], np.arange(samples.ROWS) * 8007 % 65536, m["q"], m["w"], m["g"]])
+    files = [tmp_path / f"run{k}.txt" for k in range(1 + several)]
+    for file in files:
+        np.savetxt(file, table)
+    robot, _ = load_robot(samples.robot_file(tmp_path))
+    (question,) = (q for q in proposal_for(files, robot, Hints(joints=order)).questions if q.startswith("positions"))
+    assert "the order of the joints (task.joints) tells them only where they come in runs of all 2 joints" in question
+    assert ": 7 beside the time are no multiple of 2; write which is which into the mapping" in question
+    assert "such as 'position_shoulder: {column: \"3\", unit: rad}'" in question
+    np.savetxt(files[0], np.delete(table, 1, axis=1))
+    assert not any("no multiple" in q for q in proposal_for(files[:1], robot, Hints(joints=samples.JOINTS)).questions)

@@ -102,6 +102,21 @@ def test_what_no_file_can_say_is_asked_in_one_line(tmp_path: Path, command: Comm
     assert (tmp_path / "again" / "measured.mcap").exists()
 
 
+def test_all_that_is_to_be_said_stands_in_the_terminal_once(tmp_path: Path, command: Command) -> None:
+    """No time, and drives that obey positions where the description has torques."""
+    m = samples.motion()
+    names = ("pos_{}", m["q"]), ("vel_{}", m["w"]), ("goal_{}", m["g"])
+    frame = pd.DataFrame({n.format(j): v[:, k] for n, v in names for k, j in enumerate(samples.JOINTS)})
+    robot = samples.robot_file(tmp_path)
+    robot.write_text(robot.read_text().replace("kp: 20", "command: torque"))
+    given = (f"measured={logs.written(tmp_path, frame)}", "robot=urdf", f"robot.drives={robot}")
+    status, said, complaint = command(*given, f"hydra.run.dir={tmp_path / 'out'}")
+    assert status == 2 and len(complaint.strip().splitlines()) == 1
+    assert "what the file cannot say (and 1 more, above): no column rises like a time" in complaint
+    (line,) = (x for x in said.splitlines() if x.startswith("to be said, too: "))
+    assert "the robot's description has 'command: position' with kp and kd" in line and line not in complaint
+
+
 @pytest.mark.skipif(not (DATA / "double_pendulum").is_dir(), reason="the public data are not here")
 def test_a_real_log_needs_no_mapping(tmp_path: Path, command: Command) -> None:
     """The double pendulum, with a robot that is not it: measured before filtered, nothing turned round in silence."""

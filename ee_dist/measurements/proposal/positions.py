@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 
+import numpy as np
+
 from ee_dist.basics.names import listed
 from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, in_full, series_of
 from ee_dist.measurements.proposal.by_sensor import said_of_base
@@ -99,6 +101,8 @@ def ask_for_positions(v: View) -> None:
                 f"still are written into the description of the robot, each with its place (rad, m): 'fixed_joints: "
                 f"{{{', '.join(f'{m}: 0.0' for m in rest)}}}'; one that moved unrecorded leaves the motion of the others unknown"
             )
+    elif n > 1 and (count := _nameless(v)) and (v.hints.joints is not None or count % n):
+        v.out.ask(_by_their_numbers(v, count))
     elif v.hints.joints is None and n > 1 and (called := _other_joints(v)):
         none = ", and '-' for what is none of them" if len(called) > n else ""
         v.out.ask(
@@ -120,6 +124,30 @@ def ask_for_positions(v: View) -> None:
         )
     for m in v.robot.sensors:
         v.out.choices.append(Choice("sensors", m.name, {"column": "???"}, UNKNOWN, "not found"))
+
+
+def _nameless(v: View) -> int:
+    """How many columns beside the time have numbers for names, where all have."""
+    for table in v.timed.tables:
+        if all(a.isdigit() for a in table.addresses()):
+            return len([a for a in series_of(table, filled=True) if a != v.times[table.name].column])
+    return 0
+
+
+def _by_their_numbers(v: View, count: int) -> str:
+    """Why the order of the joints does not tell which columns without names are theirs, and how a mapping names them."""
+    size = len(v.hints.joints or v.joints)
+    why = f"{count} beside the time are no multiple of {size}" if count % size else "none of these goes as positions do"
+    table, sensor, joint = v.timed.tables[0], v.sensor_names("position")[0], v.joints[0]
+    low, high = joint.stops
+    series = {a: at for a, at in series_of(table, filled=True).items() if a != v.times[table.name].column}
+    able = [a for a, at in series.items() if np.ptp(at) > 0 and low <= at.min() and at.max() <= high]
+    unit = "rad" if joint.kind == "hinge" else "m"
+    line = f'{sensor}: {{column: "{able[0] if able else 3}", unit: {unit}}}'
+    return (
+        "positions: the columns have no names, and the order of the joints (task.joints) tells them only where they come in runs "
+        f"of all {size} joints: {why}; write which is which into the mapping, by its number from 1, such as '{line}'"
+    )
 
 
 def _fewer(v: View) -> str:
