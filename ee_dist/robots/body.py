@@ -34,6 +34,8 @@ class Body:
     free_base: bool | None = None
     has_floor: bool | None = None
     gravity_m_s2: float | None = None
+    weight_carried: bool = False
+    """The file itself carries the weight of all that moves, which is why its gravity is 0."""
     time_step_s: float | None = None
     start_position_m: Vec3 = ZERO3
     start_rotation: Quat = NO_TURN

@@ -62,8 +62,13 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
     if body.time_step_s is not None:
         line(f"time_step_s: {body.time_step_s:g}", None)
     gravity = GRAVITY_M_S2 if body.gravity_m_s2 is None else body.gravity_m_s2
+    why = (
+        "  # the file compensates the weight of all bodies that move; 9.81 where the robot does not"
+        if body.weight_carried
+        else ""
+    )
     line(
-        f"gravity_m_s2: {gravity:g}",
+        f"gravity_m_s2: {gravity:g}{why}",
         None if body.gravity_m_s2 is not None else "straight down, in the frame of the root",
     )
     inertia = _inertia(body)
@@ -208,16 +213,26 @@ def _row(robot: Robot, joint: Joint) -> tuple[str, ...]:
 
 
 def _trusted(robot: Robot) -> tuple[str, ...]:
-    """What only the user knows of gains that the file states: each file that is simulated states some."""
+    """What only the user knows of drives that the file states: each file that is simulated states some."""
     led = [d.joint for d in robot.drives if d.command in ("position", "speed")]
+    told = [d.joint for d in robot.drives if d.command == "torque"]
     stated = [j for j in led if j not in robot.assumed_joints("kp")]
-    if not stated:
-        return ()
-    more = f" and {len(stated) - 3} more" if stated[3:] else ""
-    return (
-        f"whether the file's gains of {', '.join(stated[:3])}{more} are the robot's: guesses that are marked so, "
-        "'assumed: [kp, kd]', are looked for first",
-    )
+    found = []
+    if told:
+        found.append(
+            f"whether the robot's own drives obey torques, as the file's actuators of {_first(told)} do: where a controller "
+            "leads them to positions, it is 'command: position' with its kp and kd"
+        )
+    if stated:
+        found.append(
+            f"whether the file's gains of {_first(stated)} are the robot's: guesses that are marked so, 'assumed: [kp, kd]', are "
+            "looked for first"
+        )
+    return tuple(found)
+
+
+def _first(joints: Sequence[str]) -> str:
+    return ", ".join(joints[:3]) + (f" and {len(joints) - 3} more" if joints[3:] else "")
 
 
 def _shapes(robot: Robot) -> tuple[str, ...]:

@@ -97,6 +97,8 @@ def test_gains_that_a_file_states_are_asked_about(tmp_path: Path) -> None:
         file = written(tmp_path, CART, f'<actuator><{kind} joint="x"{gain}/></actuator>')
         made = starter(read_mjcf(file), "mjcf", file.name, str(file))
         assert any(m.startswith("whether the file's gains of x are the robot's") for m in made.missing) == asked
+        torques = "whether the robot's own drives obey torques, as the file's actuators of x do"
+        assert any(m.startswith(torques) for m in made.missing) != asked
 
 
 def test_joints_that_the_file_leaves_undriven_swing_from_where_they_start(tmp_path: Path) -> None:
@@ -233,6 +235,22 @@ def test_gravity_that_is_switched_off_is_off(tmp_path: Path) -> None:
     robot, notes = load_robot(hinged(tmp_path, '<motor joint="j"/>', rest=flags))
     assert robot.world.gravity_m_s2 == 0.0
     assert notes == ("switched off in the file, but not here: limit, damper",)
+
+
+@pytest.mark.parametrize(("carried", "gravity"), [(("cart", "pole"), 0.0), (("pole",), 9.81)])
+def test_weight_that_the_file_compensates_is_none_where_it_is_that_of_all(
+    tmp_path: Path, carried: tuple[str, ...], gravity: float
+) -> None:
+    bodies = CART
+    for name in carried:
+        bodies = bodies.replace(f'<body name="{name}">', f'<body name="{name}" gravcomp="1">')
+    file = written(tmp_path, bodies, '<actuator><motor joint="x"/></actuator>')
+    made = starter(read_mjcf(file), "mjcf", file.name, str(file))
+    assert made.robot.world.gravity_m_s2 == gravity
+    (line,) = (x for x in made.text.splitlines() if x.startswith("gravity_m_s2"))
+    assert ("the file compensates the weight of all bodies that move" in line) == (not gravity)
+    assert ("1 gravity compensation left out" in made.read) == bool(gravity)
+    assert not any("gravity compensations" in r for r in made.read)
 
 
 LIMITED = '<{} name="a" joint="j" {}/>'

@@ -19,7 +19,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.engines.mujoco.mjcf_bare import MjcfError, bare_model
 from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
 from ee_dist.engines.mujoco.mjcf_floor import floor_of
-from ee_dist.engines.mujoco.mjcf_left_out import left_out
+from ee_dist.engines.mujoco.mjcf_left_out import carries_all, left_out
 from ee_dist.robots.body import Body
 from ee_dist.robots.fold import DUMMY_KG, entries, folded, posed
 from ee_dist.robots.kinematics import quat_multiply, quat_rotate
@@ -121,6 +121,9 @@ class _Reader:
         gravity = np.zeros(3) if weightless else np.array(m.opt.gravity)
         if gravity[:2].any():
             self.notes.append("gravity is not straight down: only its vertical share is taken")
+        carried = bool(gravity.any()) and carries_all(m)
+        if carried:
+            self.notes.append("the file compensates the weight of all bodies that move (gravcomp): gravity_m_s2 is 0")
         return Body(
             name=m.names[: m.names.index(b"\0")].decode() or self.file.stem,
             parts=tuple(parts),
@@ -131,7 +134,8 @@ class _Reader:
             root_without_mass=parts[0].name in given,
             free_base=bool(free),
             has_floor=has_floor,
-            gravity_m_s2=float(-gravity[2]) + 0.0,
+            gravity_m_s2=0.0 if carried else float(-gravity[2]) + 0.0,
+            weight_carried=carried,
             time_step_s=float(m.opt.timestep),
             start_position_m=start[0],
             start_rotation=start[1],

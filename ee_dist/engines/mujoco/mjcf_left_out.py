@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from ee_dist.basics.names import counted, listed
 
@@ -22,6 +23,16 @@ _SWITCHES = {
     "actuation": _OFF.mjDSBL_ACTUATION,
 }
 """Flags that change a motion; that of gravity is taken."""
+HARDLY = 1e-3
+"""Share of the mass that moves whose weight nothing compensates, of links that stand for none, at which all is."""
+
+
+def carries_all(m: Any) -> bool:
+    """Whether the file compensates all weight of all bodies that move: they go as if gravity was none. Of some alone, or in part,
+    a robot here has no place for it."""
+    moving = m.body_weldid != 0
+    mass, left = m.body_mass[moving], np.abs(1.0 - m.body_gravcomp[moving])
+    return bool(mass.sum() > 0 and mass @ left <= HARDLY * mass.sum())
 
 
 def left_out(m: Any) -> Iterator[str]:
@@ -30,7 +41,10 @@ def left_out(m: Any) -> Iterator[str]:
         (int(m.neq), ("equality constraint",)),
         (int(m.ntendon), ("tendon",)),
         (int(m.nflex), ("flexible body", "flexible bodies")),
-        (int((m.jnt_actgravcomp != 0).sum() + (m.body_gravcomp != 0).sum()), ("gravity compensation",)),
+        (
+            0 if carries_all(m) else int((m.jnt_actgravcomp != 0).sum() + (m.body_gravcomp != 0).sum()),
+            ("gravity compensation",),
+        ),
     ):
         if count:
             yield f"{counted(count, *what)} left out"

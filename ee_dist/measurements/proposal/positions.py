@@ -138,7 +138,8 @@ def _by_their_numbers(v: View, count: int) -> str:
     """Why the order of the joints does not tell which columns without names are theirs, and how a mapping names them."""
     size = len(v.hints.joints or v.joints)
     why = f"{count} beside the time are no multiple of {size}" if count % size else "none of these goes as positions do"
-    table, sensor, joint = v.timed.tables[0], v.sensor_names("position")[0], v.joints[0]
+    table, joint = v.timed.tables[0], v.joints[0]
+    sensor = v.sensor_names("position")[0] or f"position_{joint.name}"
     low, high = joint.stops
     series = {a: at for a, at in series_of(table, filled=True).items() if a != v.times[table.name].column}
     able = [a for a, at in series.items() if np.ptp(at) > 0 and low <= at.min() and at.max() <= high]
