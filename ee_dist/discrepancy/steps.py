@@ -48,20 +48,30 @@ def between_steps(robot: Robot) -> Robot:
     which engines take at the end of a step, is as much too much.
 
     Of damping that stops a joint in half a step or less so much is put on it that it stops in one, whatever the engine. Such a
-    joint goes as fast as damping lets it be pushed, whatever its inertia is: the step of an implicit method."""
+    joint goes as fast as damping lets it be pushed, whatever its inertia is: the step of an implicit method. Likewise a joint
+    whose controller would swing it by more than a radian in a step gets the rotor with which it swings by one: it is at its
+    goal within a few steps all the same."""
+    dt, felt = robot.time_step_s, felt_inertia(robot)
     slopes = np.array([_active(d) for d in robot.drives])
-    looks = np.any(slopes * robot.time_step_s > LOOK_SHARE * felt_inertia(robot))
-    stopped = (steady_inertia(robot) / robot.time_step_s).tolist() if looks else [math.inf] * len(slopes)
-    drives = [_made_up(d, robot.time_step_s / 2, most) for d, most in zip(robot.drives, stopped, strict=True)]
+    looks = np.any(slopes * dt > LOOK_SHARE * felt)
+    stopped = (steady_inertia(robot) / dt).tolist() if looks else [math.inf] * len(slopes)
+    short = [max(0.0, _stiffness(d) * dt**2 - own) for d, own in zip(robot.drives, felt.tolist(), strict=True)]
+    drives = [_made_up(d, dt / 2, most, more) for d, most, more in zip(robot.drives, stopped, short, strict=True)]
     return altered(robot, drives=tuple(drives))
 
 
+def _stiffness(drive: Drive) -> float:
+    """N.m/rad of the controller that holds the joint at its goal."""
+    return drive.kp * drive.strength if drive.command == "position" else 0.0
+
+
 @lru_cache(4096)
-def _made_up(drive: Drive, half_s: float, stopped: float) -> Drive:
-    """``stopped``: the damping (N.m.s/rad) that stops the joint in a step."""
+def _made_up(drive: Drive, half_s: float, stopped: float, short: float) -> Drive:
+    """``stopped``: the damping (N.m.s/rad) that stops the joint in a step; ``short``: the inertia (kg.m^2) that it
+    lacks to be held by its controller."""
     active = _active(drive)
     begin, end = max(active, 2 * (active - stopped)), drive.viscous + drive.back_emf * drive.strength
-    return replace(drive, rotor_inertia=max(0.0, drive.rotor_inertia + half_s * (begin - end)))
+    return replace(drive, rotor_inertia=max(0.0, drive.rotor_inertia + half_s * (begin - end)) + short)
 
 
 @lru_cache(4096)

@@ -139,9 +139,7 @@ GAIN_KNOWN, GAIN_ASSUMED = (0.2, 5.0), (0.02, 20.0)
 def _gains(robot: Robot, target: str) -> dict[str, Range]:
     if (target, "kp") not in robot.assumed:
         return {"factor": GAIN_KNOWN}
-    low, high = GAIN_ASSUMED
-    most = scales.firmest(robot, target) / scales.drive_of(robot, target).kp
-    return {"factor": (low, min(high, max(GAIN_KNOWN[1], most)))}
+    return {"factor": GAIN_ASSUMED}
 
 
 @effect(
@@ -189,9 +187,8 @@ def _damping(robot: Robot, target: str) -> dict[str, Range]:
     """As far as damping stays steady in the robot's time step. A guess that a log shows to be short of it goes farther: models of
     measured robots hold any (``discrepancy.steps``), and a servo that follows as a filter does has far more than a soft one."""
     drive = scales.drive_of(robot, target)
-    lag = robot.joint(target).lag_s if (target, "kd") in robot.assumed else 0.0
-    if lag > 0:
-        return {"factor": (NEXT_TO_NONE, STEEPER * max(1.0, lag * drive.kp / drive.kd))}
+    if (target, "kd") in robot.assumed:
+        return {"factor": (NEXT_TO_NONE, STEEPER * max(1.0, robot.joint(target).lag_s * drive.kp / drive.kd))}
     own, most = _steepest(robot, drive)
     return {"factor": (NEXT_TO_NONE, min(STEEPER, max(1.02, (most - own) / drive.kd)))}
 

@@ -99,6 +99,25 @@ def test_a_joint_may_be_damped_far_more_than_a_step_of_explicit_damping_holds(en
     assert np.sqrt(np.mean((angles(robot, found) - angles(robot, log)) ** 2)) < 0.03 * late
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("turned", [1.5, 2.5, 6.0])
+def test_a_controller_may_be_far_stiffer_than_a_step_resolves(engine: str, turned: float) -> None:
+    """An industrial arm that is where it is told to be: its controller would swing the joint ``turned`` radians in a step."""
+    runs, robot = ENGINES[engine](), coarse()
+    inertia = float(steady_inertia(robot)[0])
+    kp = inertia * (turned / STEP_S) ** 2
+    # As much damping as leaves it half of each swing.
+    drive = replace(robot.drives[0], kp=kp, kd=np.sqrt(kp * inertia), torque_limit=1e6, speed_limit=np.inf)
+    robot = replace(robot, drives=(drive,))
+    log = in_continuous_time(robot, motion(1, robot), runs)
+    trial = MeasuredTrial("m", log, Commands(log.commands), commands_held=True)
+    (found,) = runs.rollout([rollout_of(trial, robot)])
+    runs.close()
+    assert found.finite
+    way = np.sqrt(np.mean(np.diff(log.commands[:, 0]) ** 2))
+    assert np.sqrt(np.mean((angles(robot, found) - angles(robot, log)) ** 2)) < way
+
+
 def test_a_held_command_is_met_in_the_middle_and_a_released_drive_stays_released() -> None:
     nan = np.nan
     found = held(np.array([[1.0], [3.0], [nan], [nan], [5.0], [7.0]]))
