@@ -32,7 +32,7 @@ from ee_dist.discrepancy.ways.open_loop.prediction import (
     report,
     rollout_of,
 )
-from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale
+from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale, no_more_than_places
 from ee_dist.discrepancy.ways.open_loop.stretches import (
     SETTLED_S,
     STRETCH_S,
@@ -65,6 +65,8 @@ SAVED = 0.6
 """Share of the rows that the beginning of trials may have, to be worth a look by itself."""
 AT_ONCE = 16
 """Values that a contact or a reversal is in."""
+NOTED = 1.2
+"""Times that channels count less, from which it is told."""
 
 
 class OpenLoop(Problem):
@@ -125,6 +127,8 @@ class OpenLoop(Problem):
             moving(values, window) if t.commands_held else np.ones_like(d.repeated, dtype=bool)
             for t, values, d in zip(trials, read, self._data, strict=True)
         ]
+        if scale is None and self._touches_nothing:
+            self.scale = no_more_than_places(self.scale, robot, self._off(robot))
         self.weights = self._weighed(before)
         imported = [self.measured[p.trial].log.filled is not None for p in self.parts]
         self.layout, self.slices = lay_out(robot, self.parts, imported, self.weights, self.soft)
@@ -207,6 +211,12 @@ class OpenLoop(Problem):
             found._whole = self.whole
         return found
 
+    def _off(self, model: Robot) -> Array:
+        """(S,) root mean squares of what a model misses, in the units of the channels."""
+        found = self.predictor.digests([(k, self._held([model], k)[0]) for k in range(len(self.parts))])
+        gaps = [d.means.astype(float) - p.means for d, p in zip(self._data, found, strict=True)]
+        return np.asarray(np.sqrt(np.mean(np.concatenate(gaps) ** 2, axis=0)))
+
     def _weighed(self, before: Hypothesis) -> Weights:
         models = [apply(self.robot, before)]
         models += ensemble(models[0], self._members)
@@ -242,6 +252,11 @@ class OpenLoop(Problem):
             begun = f"{counted(len(moving), 'trial')} that begin in motion ({listed(moving)})"
             why = "nobody knows what the controllers were told before"
             lines.append(f"The first {SETTLED_S:g} s of {begun} is simulated and not compared: {why}.")
+        if self.scale.loosened > NOTED:
+            lines.append(
+                "What joints report beside their positions is to count no more than these do, and the robot as described is off "
+                f"by {self.scale.loosened:.3g} times more in it than in positions: so many times more of it counts as one."
+            )
         if self._whole is not None:
             compared = sum(self._rows) * (reading_s(self.measured) or self.robot.time_step_s)
             lasting = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,17 +16,25 @@ from ee_dist.trials.noise import channel_range
 
 RESOLUTION = 0.002
 """Share of a channel's range below which no difference counts: models are not better than that, noise or not."""
+PLACES = ("position", "angle")
+"""Kinds of sensors that say where a joint is."""
+BESIDE = ("velocity", "torque", "motor_torque")
+"""What a joint may report beside that."""
 TOUCH_SCALE = 0.2
 """A touch channel jumps by 2 when a contact comes a row early: its scale must not make one such row decide everything."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """``noise`` and ``scale``: (S,) in the units of the channels. ``source`` says where the noise figures come from."""
+    """``noise`` and ``scale``: (S,) in the units of the channels; ``least`` (S,) is what no model is better than. ``source`` says
+    where the noise figures come from. ``loosened``: how many times less than ``least`` asks for counts what joints report beside
+    their positions."""
 
     noise: Array
     scale: Array
+    least: Array
     source: str
+    loosened: float = 1.0
 
 
 def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
@@ -46,7 +54,27 @@ def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
             source = f"estimated: {'divided' if seldom else 'second'} differences of the logs"
     scale = np.maximum(noise, RESOLUTION * spans)
     scale = np.where(touch, np.maximum(scale, TOUCH_SCALE), scale)
-    return Scale(noise, scale, source)
+    return Scale(noise, scale, scale, source)
+
+
+def no_more_than_places(scale: Scale, robot: Robot, off: Array) -> Scale:
+    """The scale by which speeds and torques count no more than the positions that are measured beside them. ``off``: (S,) root
+    mean squares by which the robot as described misses each channel, in its own unit.
+
+    By shares of their ranges speeds count many times as much: what is late or too soft is quick, and a speed is off by
+    it as many times more as it is quick. Then positions, for which people look at a model, decide nothing. Within what no model
+    is better than positions ask for nothing more."""
+    kinds = np.array([s.kind for s in robot.sensors])
+    places = np.isin(kinds, PLACES)
+    seen = {s.target for s, place in zip(robot.sensors, places, strict=True) if place}
+    beside = np.isin(kinds, BESIDE) & np.array([s.target in seen for s in robot.sensors])
+    if not beside.any() or not np.isfinite(off).all():
+        return scale
+    squares = (off / scale.least) ** 2
+    times = float(np.sqrt(squares[beside].mean() / max(1.0, squares[places].mean())))
+    if times <= 1.0:
+        return scale
+    return replace(scale, scale=np.where(beside, times * scale.least, scale.least), loosened=times)
 
 
 def _variance(log: SensorLog) -> Array:

@@ -115,7 +115,7 @@ def weigh(
 
 
 def _tiny(scale: Scale) -> Array:
-    return (TINY * scale.scale) ** 2
+    return (TINY * scale.least) ** 2
 
 
 def _rough(predicted: Digest, undeclared: Array, tiny: Array) -> Array:
