@@ -9,8 +9,12 @@ import pytest
 from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.draw import draw
+from ee_dist.discrepancy.evidence.holdout import held_out_by
+from ee_dist.discrepancy.evidence.rule import MISTAKEN, WORTH, least_share
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import EFFECT, explain
+from ee_dist.discrepancy.problem import per_segment
+from ee_dist.discrepancy.search.candidates import Proposal, candidate
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.effects.catalogue import CATALOGUE, term
 
@@ -42,6 +46,17 @@ def test_no_sign_is_turned_where_a_heavy_part_is_what_is_missing(way: str) -> No
     found = explain(p, pool_of(p, only=RIVALS), effort=QUICK)
     assert found.best is not None and found.best.name == "part_mass@lower"
     assert not any(mistake in name for name in found.best.tied_with for mistake in MISTAKES)
+
+
+def test_people_are_sent_to_mend_a_file_for_no_little() -> None:
+    """What shook with another joint is foretold a little better with its axis reversed, whatever is wrong there."""
+    sample = samples()["arm"]
+    p = problem_by("open_loop", measure(sample, (term("part_mass", "lower", change=0.8),), seed=6), sample.robot)
+    turned, plain = (Proposal((candidate(p.robot, name, "elbow"),)) for name in ("axis_reversed", "viscous_friction"))
+    (cut,) = held_out_by(p)
+    left = 9.0 * per_segment(p, np.sqrt(p.floor))
+    assert least_share(p, cut, turned, left) >= MISTAKEN > least_share(p, cut, plain, left)
+    assert least_share(p, cut, turned, left / 9.0) <= WORTH
 
 
 def test_whether_a_motor_turns_round_is_asked_of_those_that_are_told_torques() -> None:
