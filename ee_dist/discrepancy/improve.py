@@ -122,8 +122,8 @@ def improve(
         stopped = f"{most} effect{'s were' if most > 1 else ' was'} added, which is as many as task.most allows"
         while sum(bool(r.added) for r in ladder) < most:
             has = (*search.fixed, *current.hypothesis)
-            no_better = {c.name for p in worse for c in p.parts}
-            others = [c for c in _offered(problem.robot, pool, current, ladder) if c.name not in no_better]
+            refused_too = {c.name for p in worse for c in p.parts}
+            others = [c for c in _offered(problem.robot, pool, current, ladder) if c.name not in refused_too]
             others = on_top_of(problem.robot, has, others)
             last = examine(search.doing(ONE_MORE), current, others, effort)
             if own and len(current.parts) == own:
@@ -182,14 +182,16 @@ def improve(
             cut = best.outcome.cut
             current, rung.dropped = without_useless(search, current, own, len(best.proposal.parts), cut, len(pool))
             _as_it_stands(search, current, cut, rung)
-            if rung.held_out == ladder[-1].held_out and rung.error_heldout >= ladder[-1].error_heldout:
-                # Beside a model that only goes along it was worth its place, and not where all values may follow the motions that
-                # are fitted.
+            no_better = rung.held_out == ladder[-1].held_out and rung.error_heldout >= ladder[-1].error_heldout
+            # Beside a model that only goes along it was worth its place, and not where all values may follow the motions that
+            # are fitted.
+            why = WORSE if no_better else _falls_silent(search, before_it, current)
+            if why:
                 worse.append(best.proposal)
                 current = before_it
                 if len(worse) < REFUSALS:
                     continue
-                stopped = NO_MORE.format(why=WORSE)
+                stopped = NO_MORE.format(why=why)
                 break
             climb(rung)
         current, twins = last_steps(
@@ -245,6 +247,12 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
 def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:
     e = error(residual)
     return Rung(name, (), terms, e, e, per_segment(problem, residual), UNFITTED)
+
+
+def _falls_silent(search: Search, before: Current, after: Current) -> str:
+    """Why a step leads to a model that says next to nothing of the motion, from one that did."""
+    says = search.problem.says_nothing((*search.fixed, *after.hypothesis))
+    return says if says and not search.problem.says_nothing((*search.fixed, *before.hypothesis)) else ""
 
 
 def _as_it_stands(search: Search, current: Current, cut: Cut, rung: Rung) -> None:

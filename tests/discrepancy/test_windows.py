@@ -12,8 +12,9 @@ from way_samples import evaluator_for, measure, samples
 
 from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.evidence.holdout import windows as windows_cut
+from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.explain import UNEXPLAINED, explain
-from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.improve import _falls_silent, improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import candidate
@@ -199,6 +200,28 @@ def test_what_explains_by_standing_still_is_not_what_is_missing() -> None:
     account = improve_account(problem, improved, also=also)
     assert "says next to nothing of the motion" in account.words[1] and not account.good
     assert sum("says next to nothing of the motion" in line for line in account.words) == 1
+
+
+def test_a_motor_that_cannot_overcome_its_friction_is_told_run_through() -> None:
+    """In windows it goes on with the speed that it is given, as far as a good model does; by itself it never sets out."""
+    stage = samples()["stage"].robot
+    joint = stage.drives[0].joint
+    robot = quiet(stage).map_drive(joint, lambda d: replace(d, kp=2000.0, kd=400.0, torque_limit=100.0))
+    times = np.arange(0.0, 6.0, robot.time_step_s)
+    sent = Commands(np.where(times > 1, 0.1 * np.sin(np.pi * times / 2), 0.0)[:, None])
+    (log,) = evaluator_for(robot).engine.rollout([Rollout(robot, sent, len(times), pose=True)])  # type: ignore[attr-defined]
+    problem = FreeRun((MeasuredTrial("sine", log, sent),), robot, evaluator_for(robot), windows_s=RESTART_S)
+    parts = tuple(candidate(robot, name, joint) for name in ("torque_limit", "coulomb_friction"))
+    ends = [
+        Current(parts, np.concatenate([parts[0].shares({"loss": 0.5}), parts[1].shares({"torque_nm": n})]))
+        for n in (30.0, 50.2)
+    ]
+    rubs, stuck = (end.hypothesis for end in ends)
+    assert not problem.says_nothing(()) and not problem.says_nothing(rubs)
+    told = problem.says_nothing(stuck)
+    assert told.startswith("run through") and "never moves" in told, "by windows it is not told"
+    assert [_falls_silent(Search(problem), Current(), end) for end in ends] == ["", told]
+    assert not _falls_silent(Search(problem), ends[1], ends[1]), "it was so before"
 
 
 def test_a_right_model_of_a_robot_at_rest_is_not_told_to_stand_still() -> None:

@@ -353,16 +353,27 @@ class FreeRun(Problem):
         return [*out, f"{rest[0].upper()}{rest[1:]}. {ASTRAY + ' ' if worse else ''}{MOVES}"]
 
     def says_nothing(self, model: Hypothesis) -> str:
-        """One with enough friction stands still, and most of a record is often rest."""
+        """One with enough friction stands still, and most of a record is often rest. In windows it goes on with the speed that it
+        is given; run through it never moves, where the robot as it is described does."""
         if self.windows_s is None:
             return ""
         off = error(self.residuals([model])[0])
         least = max(AT_NOISE * self.noise_floor()[0], math.sqrt(HARDLY_BETTER) * self._at_rest)
-        if not least <= off < math.inf:
+        if least <= off < math.inf:
+            return (
+                f"a robot that stays where each window begins would be off by {self.told(self._at_rest)}, this model is by "
+                f"{self.told(off)}: it says next to nothing of the motion"
+            )
+        if not led(self.robot) or not model:
+            return ""
+        whole = self._whole
+        described, through = (error(r) for r in whole.residuals([(), model]))
+        rest = whole._at_rest
+        if not described < math.sqrt(HARDLY_BETTER) * rest <= through < math.inf:
             return ""
         return (
-            f"a robot that stays where each window begins would be off by {self.told(self._at_rest)}, this model is by "
-            f"{self.told(off)}: it says next to nothing of the motion"
+            f"run through without starting anew a robot that never moves would be off by {whole.told(rest)}, this model is by "
+            f"{whole.told(through)}, and as it is described by {whole.told(described)}: it says next to nothing of the motion"
         )
 
     @cached_property
