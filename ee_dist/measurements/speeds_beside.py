@@ -21,6 +21,8 @@ SHORT_S, LONGER_S = 0.04, 0.5
 PACE, CLEAR, ALIKE = 0.05, 0.95, 1.15
 """Share by which speeds must be off the change of their positions to be told (clocks and encoders are ten times as good);
 correlation from which a joint tells it, and the largest ratio between two joints that are off by the same."""
+MOST_OFF = 5.0
+"""Times that a rate may be off: by more it is a unit (9.5 for turns in a minute, 57 for degrees)."""
 
 
 def speed_suspicion(name: str, speed: Array, position: Array, step_s: float) -> tuple[str, bool] | None:
@@ -150,7 +152,7 @@ def _pace(speed: Array, position: Array, step_s: float, over_s: float) -> dict[i
     least, most = min(x * r for x, r in fits.values()), max(x / r for x, r in fits.values())
     low, high, ratio = min(ratios.values()), max(ratios.values()), float(np.median([*ratios.values()]))
     surely = least > 1 + PACE or most < 1 / (1 + PACE)
-    return ratios if surely and high / low <= ALIKE and 0.5 < ratio < 2 else {}
+    return ratios if surely and high / low <= ALIKE and 1 / MOST_OFF < ratio < MOST_OFF else {}
 
 
 def _fits(speed: Array, position: Array, step_s: float, over_s: float) -> dict[int, tuple[float, float]]:

@@ -93,7 +93,7 @@ def test_it_comes_in_without_a_question(tmp_path: Path) -> None:
 def test_joints_that_all_go_as_one_factor_are_still_asked_about(tmp_path: Path) -> None:
     proposal, _ = proposed(tmp_path, write(tmp_path / "run", shared=(0, 1, 2, 3)))
     (question,) = [q for q in proposal.questions if "could not be checked" in q]
-    assert "at all joints alike: the times may be" in question and "another rate" in question
+    assert "at all joints alike: the times may be" in question and "another rate: say task.rate_hz=" in question
 
 
 def test_torques_with_a_sign_are_kept(tmp_path: Path) -> None:

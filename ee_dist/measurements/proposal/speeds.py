@@ -174,7 +174,7 @@ def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
             return UnitChoice((), UNKNOWN, f"the name says {stated}, but beside the positions it is {seen}")
         if seen is None:
             sure = LIKELY if stated else UNKNOWN
-            alike = _one_factor([relations[j].slope for j in telling if j not in odd])
+            alike = _one_factor([relations[j].slope for j in telling if j not in odd], 1 / v.step(v.position.block))
             why = f"{stated or 'its unit'} could not be checked: {r.slope:.3g} times the change of the positions{alike}"
         entry: dict[str, Any] = {"unit": seen or stated or "???"}
         if r.correlation < -AGREES:
@@ -186,13 +186,18 @@ def speed_units(v: View, block: Block, odd: Collection[int] = ()) -> UnitChoice:
     )
 
 
-def _one_factor(slopes: list[float]) -> str:
-    """What else it may be where the speeds of several joints are one number times the change of their positions."""
+def _one_factor(slopes: list[float], rate_hz: float) -> str:
+    """What else it may be where the speeds of several joints are one number times the change of their positions, in rows that are
+    said to come so often."""
     least, most = (f(map(abs, slopes), default=0.0) for f in (min, max))
     if len(slopes) < 2 or most > (1 + OFF) * least:
         return ""
-    long = "longer" if statistics.median(map(abs, slopes)) > 1 else "shorter"
-    return f", at all joints alike: the times may be {long} than they were by that (another rate), or the speeds scaled"
+    ratio = statistics.median(map(abs, slopes))
+    long, right = "longer" if ratio > 1 else "shorter", f"task.rate_hz={rate_hz * ratio:.4g}"
+    return (
+        f", at all joints alike: the times may be {long} than they were by that (another rate: say {right} if rows came so "
+        "often), or the speeds scaled"
+    )
 
 
 def _checks_time(v: View, entries: list[dict[str, Any]], sure: str, slopes: list[float]) -> None:
