@@ -449,5 +449,7 @@ def test_a_factor_on_a_guess_that_ended_at_its_bound_says_how_to_go_on() -> None
     assert (
         line.startswith("Position gain at all joints ended") and "multiply what the description assumes by 5," in line
     )
+    (line,) = beyond_a_guess(guessed, stiffer, [at_end], alone=True)
+    assert "improve puts it right together" in line and "multiply" not in line
     assert not beyond_a_guess(guessed, stiffer, [within])
     assert not beyond_a_guess(robot, stiffer, [at_end]), "nobody guessed"

@@ -131,7 +131,7 @@ def explain_account(
         turned = " Here the other way round: the model has too much of it." if less else ""
         lines += [] if guessed else [f"Its mark in a residual: {entry.signature}{turned}"]
         lines += [GUESS] if best.proposal.guess and not guessed else []
-        lines += beyond_a_guess(robot, found.after, found.parameters)
+        lines += beyond_a_guess(robot, found.after, found.parameters, alone=True)
         if best.tied_with:
             lines.append(tie_text("it", best.tied_with))
     else:

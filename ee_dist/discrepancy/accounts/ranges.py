@@ -78,12 +78,18 @@ def flag_texts(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list
     ]
 
 
-def beyond_a_guess(robot: Robot, terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
+def beyond_a_guess(
+    robot: Robot, terms: Hypothesis, parameters: Sequence[ParameterReport], alone: bool = False
+) -> list[str]:
     """A line for each factor on something that a description only guessed, which ended where it may not go farther: from a better
-    guess it may."""
+    guess it may. ``alone``: nothing else that was guessed was put right with it, which may be off as far."""
     return [
-        f"{placed(terms[p.term].name).capitalize()} ended where it may not go farther from a guess: multiply what the "
-        f"description assumes by {p.value:.3g}, and begin anew from there."
+        f"{placed(terms[p.term].name).capitalize()} ended where it may not go farther from a guess: "
+        + (
+            "what else was guessed of these drives may be off with it, and improve puts it right together."
+            if alone
+            else f"multiply what the description assumes by {p.value:.3g}, and begin anew from there."
+        )
         for p in parameters
         if p.flag.startswith(BOUND) and p.name == "factor" and _guessed(robot, terms[p.term])
     ]
