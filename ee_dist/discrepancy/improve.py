@@ -185,7 +185,7 @@ def improve(
             no_better = rung.held_out == ladder[-1].held_out and rung.error_heldout >= ladder[-1].error_heldout
             # Beside a model that only goes along it was worth its place, and not where all values may follow the motions that
             # are fitted.
-            why = WORSE if no_better else _falls_silent(search, before_it, current)
+            why = WORSE if no_better else problem.never_moves((*search.fixed, *current.hypothesis))
             if why:
                 worse.append(best.proposal)
                 current = before_it
@@ -247,12 +247,6 @@ def _many(search: Search, found: Examined, added: int, spread: bool) -> bool:
 def _start(name: str, terms: Hypothesis, residual: Array, problem: Problem) -> Rung:
     e = error(residual)
     return Rung(name, (), terms, e, e, per_segment(problem, residual), UNFITTED)
-
-
-def _falls_silent(search: Search, before: Current, after: Current) -> str:
-    """Why a step leads to a model that says next to nothing of the motion, from one that did."""
-    says = search.problem.says_nothing((*search.fixed, *after.hypothesis))
-    return says if says and not search.problem.says_nothing((*search.fixed, *before.hypothesis)) else ""
 
 
 def _as_it_stands(search: Search, current: Current, cut: Cut, rung: Rung) -> None:

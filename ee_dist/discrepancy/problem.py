@@ -197,6 +197,11 @@ class Problem(ABC):
         """Why a model that leaves little says next to nothing of what was measured; empty: it does say something."""
         return ""
 
+    def never_moves(self, model: Hypothesis) -> str:
+        """Why a model, run through, does not move where the robot did and its description does; empty: it does. In windows it
+        goes on with the speed that it is given."""
+        return ""
+
     def other_errors(self, *models: Hypothesis) -> list[str]:
         """Errors of a model, or of one and another made from it, as this way counts them elsewhere, in lines for people."""
         return []

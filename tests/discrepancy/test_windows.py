@@ -14,14 +14,14 @@ from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.evidence.holdout import windows as windows_cut
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.explain import UNEXPLAINED, explain
-from ee_dist.discrepancy.improve import _falls_silent, improve
+from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import SAME, tells_nothing
 from ee_dist.discrepancy.ways.free_run.problem import ASTRAY, RESTART_S, FreeRun
-from ee_dist.effects.catalogue import term
+from ee_dist.effects.catalogue import apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
 from ee_dist.robots.linear_stage import linear_stage
@@ -220,8 +220,10 @@ def test_a_motor_that_cannot_overcome_its_friction_is_told_run_through() -> None
     assert not problem.says_nothing(()) and not problem.says_nothing(rubs)
     told = problem.says_nothing(stuck)
     assert told.startswith("run through") and "never moves" in told, "by windows it is not told"
-    assert [_falls_silent(Search(problem), Current(), end) for end in ends] == ["", told]
-    assert not _falls_silent(Search(problem), ends[1], ends[1]), "it was so before"
+    assert [problem.never_moves(m) for m in ((), rubs, stuck)] == ["", "", told]
+    # What a description does not do either is nobody's loss.
+    itself = FreeRun(problem.measured, apply(robot, stuck), evaluator_for(robot), windows_s=RESTART_S)
+    assert not itself.never_moves((term("viscous_friction", joint, damping_nm_s_rad=1.0),))
 
 
 def test_a_right_model_of_a_robot_at_rest_is_not_told_to_stand_still() -> None:

@@ -353,8 +353,7 @@ class FreeRun(Problem):
         return [*out, f"{rest[0].upper()}{rest[1:]}. {ASTRAY + ' ' if worse else ''}{MOVES}"]
 
     def says_nothing(self, model: Hypothesis) -> str:
-        """One with enough friction stands still, and most of a record is often rest. In windows it goes on with the speed that it
-        is given; run through it never moves, where the robot as it is described does."""
+        """One with enough friction stands still, and most of a record is often rest."""
         if self.windows_s is None:
             return ""
         off = error(self.residuals([model])[0])
@@ -364,7 +363,11 @@ class FreeRun(Problem):
                 f"a robot that stays where each window begins would be off by {self.told(self._at_rest)}, this model is by "
                 f"{self.told(off)}: it says next to nothing of the motion"
             )
-        if not led(self.robot) or not model:
+        return self.never_moves(model)
+
+    def never_moves(self, model: Hypothesis) -> str:
+        """By the whole record, of a robot that controllers lead."""
+        if self.windows_s is None or not led(self.robot) or not model:
             return ""
         whole = self._whole
         described, through = (error(r) for r in whole.residuals([(), model]))
