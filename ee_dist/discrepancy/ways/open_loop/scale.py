@@ -10,6 +10,7 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.slow_noise import MEDIAN_OF_SQUARES, slow_noise, without_motion
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
+from ee_dist.robots.described import OF_JOINT
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 from ee_dist.trials.noise import channel_range
@@ -18,8 +19,6 @@ RESOLUTION = 0.002
 """Share of a channel's range below which no difference counts: models are not better than that, noise or not."""
 PLACES = ("position", "angle")
 """Kinds of sensors that say where a joint is."""
-BESIDE = ("velocity", "torque", "motor_torque")
-"""What a joint may report beside that."""
 TOUCH_SCALE = 0.2
 """A touch channel jumps by 2 when a contact comes a row early: its scale must not make one such row decide everything."""
 
@@ -67,7 +66,7 @@ def no_more_than_places(scale: Scale, robot: Robot, off: Array) -> Scale:
     kinds = np.array([s.kind for s in robot.sensors])
     places = np.isin(kinds, PLACES)
     seen = {s.target for s, place in zip(robot.sensors, places, strict=True) if place}
-    beside = np.isin(kinds, BESIDE) & np.array([s.target in seen for s in robot.sensors])
+    beside = np.isin(kinds, OF_JOINT) & ~places & np.array([s.target in seen for s in robot.sensors])
     if not beside.any() or not np.isfinite(off).all():
         return scale
     squares = (off / scale.least) ** 2
