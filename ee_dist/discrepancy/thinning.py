@@ -11,6 +11,12 @@ GOLDEN = (math.sqrt(5) - 1) / 2
 T = TypeVar("T")
 
 
-def one_of_each(slots: Iterable[Sequence[T]]) -> list[T]:
-    """One of each slot of neighbours, at places that no period of a motion falls together with."""
-    return [own[int((k * GOLDEN) % 1.0 * len(own))] for k, own in enumerate(slots)]
+def one_of_each(slots: Iterable[Sequence[T]], first: int = 0) -> list[T]:
+    """One of each slot of neighbours, at places that no period of a motion falls together with; ``first``: how many slots, of
+    other trials, went before: of one slot each they would all give what comes first."""
+    return [own[int(place(k) * len(own))] for k, own in enumerate(slots, first)]
+
+
+def place(number: int) -> float:
+    """Where in its slot, from 0 to 1, that of this number is taken."""
+    return (number * GOLDEN) % 1.0

@@ -17,7 +17,7 @@ import numpy as np
 from ee_dist.discrepancy.measured_trial import Begun, MeasuredTrial, reading_s, released
 from ee_dist.discrepancy.past import Past
 from ee_dist.discrepancy.starting import starting_speeds
-from ee_dist.discrepancy.thinning import one_of_each
+from ee_dist.discrepancy.thinning import one_of_each, place
 from ee_dist.effects.scales import longest_delay
 from ee_dist.engines.drivers import Commands, Network
 from ee_dist.robots.model import Robot
@@ -27,6 +27,8 @@ STRETCH_S, SETTLED_S = 4.0, 0.5
 """How much of a record is compared in one go, and how much before is simulated alone, for joints to come to where they go."""
 MOVING, SPARED = 0.1, 0.3
 """Share of the highest speed in a trial from which it begins in motion, and what of it may be left out for that at most."""
+STOOD, STOOD_S = 3, 0.05
+"""Readings, and the time, that a robot which begins at rest stands for at least."""
 MOST, FEWEST = 36_000, 15
 """Steps of a simulation, times joints, that a search takes for each model at most: three trials of 20 s of six joints in steps of
 10 ms; but so many stretches, and one of each trial."""
@@ -54,7 +56,7 @@ def unsettled(trial: MeasuredTrial, robot: Robot) -> int:
     if not trial.real or len(log) < 2:
         return 0
     speeds = np.abs(starting_speeds(trial, robot))
-    if not speeds[0].max() > MOVING * speeds.max():
+    if _stood(trial) or not speeds[0].max() > MOVING * speeds.max():
         return 0
     rows = int(np.searchsorted(log.times_s, log.times_s[0] + SETTLED_S))
     return rows if rows < SPARED * len(log) else 0
@@ -77,6 +79,15 @@ def forgets(robot: Robot, trials: Sequence[MeasuredTrial]) -> bool:
     return led and known and not robot.free_base
 
 
+def _stood(trial: MeasuredTrial) -> bool:
+    """Whether the first readings are one number at each joint: an encoder with coarse steps makes a speed of what comes next."""
+    log = trial.log
+    assert log.joints is not None
+    count = max(STOOD, int(np.searchsorted(log.times_s[log.readings], log.times_s[0] + STOOD_S)))
+    first = log.joints[log.readings[:count]]
+    return len(first) == count and not np.ptp(first, axis=0).any()
+
+
 def stretches(
     robot: Robot, trials: Sequence[MeasuredTrial], window: int, seconds: float = STRETCH_S
 ) -> tuple[Stretch, ...]:
@@ -96,7 +107,7 @@ def _of_trial(number: int, trial: MeasuredTrial, robot: Robot, count: int) -> li
     commands, enabled = released(trial.obeyed(log.commands, robot))
     run_up = math.ceil((SETTLED_S + longest_delay(robot)) / step)
     found = []
-    for first in range(0, len(read) - count + 1, count):
+    for first in _firsts(number, len(read), count):
         begin, last = int(max(0, read[first] - run_up)), int(read[first + count - 1]) + 1
         part = log.part(begin, last)
         filled = np.zeros(len(part), dtype=bool) if part.filled is None else part.filled.copy()
@@ -109,6 +120,14 @@ def _of_trial(number: int, trial: MeasuredTrial, robot: Robot, count: int) -> li
         run = replace(trial, log=replace(part, filled=filled), driver=driver, begun=begun)
         found.append(Stretch(number, run))
     return found
+
+
+def _firsts(number: int, rows: int, count: int) -> list[int]:
+    """The first rows of as many stretches of ``count`` rows as a trial of so many has. What is left over lies between them, and
+    before or behind one that is alone: the end of a motion is as good as its beginning."""
+    some, over = rows // count, rows % count
+    before = np.linspace(0, over, some) if some > 1 else np.array([place(number) * over])
+    return [k * count + int(b) for k, b in enumerate(before)]
 
 
 def too_long(robot: Robot, trials: Sequence[MeasuredTrial]) -> bool:
@@ -130,5 +149,5 @@ def at_most(of: Sequence[Stretch], count: int) -> tuple[Stretch, ...]:
     for number in dict.fromkeys(s.trial for s in of):
         own = [s for s in of if s.trial == number]
         edges = np.round(np.linspace(0, len(own), min(count, len(own)) + 1)).astype(int)
-        found += one_of_each(own[a:b] for a, b in pairwise(edges.tolist()))
+        found += one_of_each((own[a:b] for a, b in pairwise(edges.tolist())), len(found))
     return tuple(found)
