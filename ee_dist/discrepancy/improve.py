@@ -345,6 +345,7 @@ def _finish(
         worth=worth,
         unsure=may_be_noise(problem, residual),
         twins=twins,
+        judged_on=ladder[-1].held_out,
     )
 
 

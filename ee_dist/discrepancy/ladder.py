@@ -49,9 +49,10 @@ class Twin:
 class Improvement:
     """``terms``: the final model, fitted on all data. ``verdict``: ``explained`` (nothing is left above the noise),
     ``better_not_explained``, ``unexplained`` (nothing could be added) or ``nothing_missing``; ``explained``: the share of the
-    squared error above the noise that the model takes off held-out data; ``worth``: what goes with each effect. ``last``: what
-    was tried on top of it. ``odd``: of a calibration, the joints whose values stand out from those of like joints (see
-    calibrated_away.py). ``unsure``: channels in which what is left may be noise or not; ``twins``: what does as well as an effect
+    squared error above the noise that the model takes off what it is ``judged_on``; ``all_rows``: errors before and after on all
+    rows of records of which the search took stretches; ``worth``: what goes with each effect. ``last``: what was tried on
+    top of it. ``odd``: of a calibration, the joints whose values stand out from those of like joints (see calibrated_away.py).
+    ``unsure``: channels in which what is left may be noise or not; ``twins``: what does as well as an effect
     of the model, if other values follow."""
 
     verdict: str
@@ -70,6 +71,8 @@ class Improvement:
     worth: Worth | None = None
     unsure: list[str] = field(default_factory=list)
     twins: list[Twin] = field(default_factory=list)
+    judged_on: str = ""
+    all_rows: tuple[float, float] | None = None
 
     @property
     def cuts(self) -> list[str]:

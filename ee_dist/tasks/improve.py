@@ -24,6 +24,7 @@ from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import to_entries
+from ee_dist.discrepancy.weighed_up import weighed_up
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
@@ -102,6 +103,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
     also = (*also, *problem.spoiled(found.terms), *way.instead(bool(found.left)))
     word = None if apart is None else told_of(apart, way, config, found.terms, problem)
+    found = weighed_up(found, problem, word)
     first, last = found.ladder[0], found.ladder[-1]
     fell = last.error_heldout < first.error_heldout
     farther = problem.farther_off(first.terms, found.terms, fell) if len(found.ladder) > 1 else ""

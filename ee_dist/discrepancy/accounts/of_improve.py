@@ -48,6 +48,7 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Proposal
 from ee_dist.discrepancy.torque_scale import torques_compared
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
+from ee_dist.discrepancy.weighed_up import ALL_ROWS, TRIALS_APART
 from ee_dist.discrepancy.words import by_effect, much, percent, phrase, placed, plain, without_values
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.effects.groups import members_of
@@ -56,7 +57,6 @@ from ee_dist.trials.log import Array
 
 NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
 EACH = "each of "
-TRIALS_APART = "trials that were held out from all of it"
 NAMED = 3
 """Effects that a headline names."""
 
@@ -157,12 +157,15 @@ def improve_account(
     else:
         what = _listed(found, parts) if parts else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
-        where = "" if found.left or settled else f" on {TRIALS_APART if more_there else last.held_out}"
+        where = "" if found.left or settled else f" on {TRIALS_APART if more_there else found.judged_on}"
         head += f" {BEYOND if unsure else NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
-        sure = f"How sure: {share}, judged on {last.held_out}{unexplained_rest(found.explained, settled)}"
+        sure = f"How sure: {share}, judged on {found.judged_on}{unexplained_rest(found.explained, settled)}"
         one_each = [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1]
         sure += f"{ranges(found.terms, found.parameters, one_each, robot, len(added(found)) > 1)}{_told_from(ties)}"
         sure += f"{unsure_of(unsure)}."
+    if found.all_rows is not None:
+        before, after = map(problem.told, found.all_rows)
+        error = f"{error} On {ALL_ROWS}: model {before}, improved model {after}."
     if word is not None:
         error = f"{error} {word.text}"
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK

@@ -184,6 +184,8 @@ def of_improvement(
         **common(problem, account, found.noise_floor, found.floor_source, found.terms),
         "verdict": found.verdict,
         "explained": found.explained,
+        "judged_on": found.judged_on,
+        "all_rows": found.all_rows and {"error_before": found.all_rows[0], "error_after": found.all_rows[1]},
         "ladder": [of_rung(problem, found, r) for r in found.ladder],
         "model": path,
         "last_word": of_last_word(word),
