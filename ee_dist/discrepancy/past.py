@@ -39,7 +39,7 @@ class Past:
         times = np.arange(rows) * self.step_s
         wanted = np.stack(
             [
-                np.interp(times - d.delay_s, times, self.commands[:rows, k]) * d.command_gain
+                np.interp(times + model.wiring.early_s - d.delay_s, times, self.commands[:rows, k]) * d.command_gain
                 for k, d in enumerate(drives)
             ],
             axis=1,

@@ -183,6 +183,18 @@ def _dot(a: Array, b: Array) -> float:
     return even + odd
 
 
+def advanced(values: Array, early_s: float, step_s: float) -> Array:
+    """Values (T, M) of every ``step_s`` as they are ``early_s`` later, on lines between the steps; the last one stays."""
+    if not early_s:
+        return values
+    at, last = np.arange(len(values)) + early_s / step_s, len(values) - 1
+    # Whole steps must not become one less and nearly a whole one by rounding.
+    whole = np.floor(at + 1e-9).astype(np.intp)
+    part = np.clip(at - whole, 0.0, 1.0)[:, None]
+    near, far = values[np.minimum(whole, last)], values[np.minimum(whole + 1, last)]
+    return np.where(part > 1e-9, near * (1.0 - part) + far * part, near)
+
+
 class _Series:
     def __init__(self, robots: Sequence[System], drivers: Sequence[Commands], steps: int) -> None:
         longest = max(1, steps)
@@ -192,7 +204,8 @@ class _Series:
             if values.ndim != 2 or values.shape[1] != len(robot.drives) or not len(values):
                 raise ValueError(f"commands have shape {values.shape}, expected (T, {len(robot.drives)})")
             index = np.minimum(np.arange(longest), len(values) - 1)
-            rows.append(values[index][:, list(robot.wiring.source)])
+            given = advanced(values[index], robot.wiring.early_s, robot.time_step_s)
+            rows.append(given[:, list(robot.wiring.source)])
         self.values = np.ascontiguousarray(np.stack(rows, axis=1))
 
     def step(self, step: int, t_s: float, sensors: Array) -> Array:

@@ -117,6 +117,8 @@ def _wiring(old: Any, new: Any, to: str) -> tuple[str, str]:
         return NATIVE, ""
     if old.hidden_gain != new.hidden_gain:
         return NOT, "it is inside the network that controls the robot"
+    if old.early_s != new.early_s:
+        return NOT, "it is of the log, and none of the robot: set lead_s in its mapping"
     return SHIM, "which output drives which motor"
 
 

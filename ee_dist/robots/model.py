@@ -222,10 +222,12 @@ class World:
 
 @dataclass(frozen=True)
 class Wiring:
-    """Between controller and drives. Motor m obeys controller output ``source[m]``; hidden neuron k is scaled."""
+    """Between controller and drives. Motor m obeys controller output ``source[m]``; hidden neuron k is scaled; commands that are
+    known beforehand, as those of a log are, act ``early_s`` before their time."""
 
     source: tuple[int, ...]
     hidden_gain: tuple[float, ...] = ()
+    early_s: float = 0.0
 
 
 @dataclass(frozen=True)

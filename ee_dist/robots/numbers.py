@@ -161,6 +161,7 @@ def _connected(robot: Robot, where: str) -> None:
     for d in robot.drives:
         if d.joint not in moving:
             raise RobotError(f"{where}: drives: no moving joint named {quoted(d.joint)}")
+    _within(robot.wiring.early_s, (0.0, 2.0), f"{where}: wiring: early_s")
     if len(robot.wiring.source) != len(robot.drives) or any(
         not 0 <= k < len(robot.drives) for k in robot.wiring.source
     ):

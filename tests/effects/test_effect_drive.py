@@ -11,7 +11,9 @@ from effect_robots import ARM_M, MASS_KG, Bench, G, block, lever, slider
 
 from ee_dist.effects import CATALOGUE, apply, term
 from ee_dist.effects.catalogue import Term, find
+from ee_dist.engines.delay import Delay
 from ee_dist.engines.drive import DrivePath
+from ee_dist.engines.drivers import advanced
 from ee_dist.export.plan import parameters
 from ee_dist.export.shim import Shim
 from ee_dist.robots.model import CONTINUOUS_M, Robot
@@ -412,3 +414,22 @@ def test_speed_feed_forward_adds_to_what_is_described_and_does_nothing_at_rest(b
         "a step at the beginning has no speed"
     )
     assert CATALOGUE["speed_feed_forward"].targets(slider(**{**SERVO, "kd": 0.0})) == ()
+
+
+def test_commands_stamped_late_act_before_their_time(bench: Bench) -> None:
+    """A ramp is followed sooner by as long, until its last value, which stays."""
+    ramp = 0.05 * 0.001 * np.arange(2001)
+    robot, early = slider(**SERVO), term("commands_stamped_late", "log", late_s=0.0125)
+    plain = bench.run(robot, steps=2001, command=ramp).channel("position")
+    sooner = bench.run(robot, early, steps=2001, command=ramp).channel("position")
+    assert (sooner - plain)[1000] == pytest.approx(0.05 * 0.0125, rel=1e-3)
+    assert sooner[-1] < ramp[-1] + 1e-6
+
+
+def test_what_is_early_by_as_much_as_it_is_late_is_neither() -> None:
+    """Commands early by 12.5 ms behind a delay of 12.5 ms, but for the first and last rows, where nobody knows them."""
+    values = np.cumsum(np.random.default_rng(0).standard_normal((60, 2)), axis=0)
+    again = advanced(values, 0.010, 0.005)
+    late = np.stack([Delay(np.full((1, 2), 0.010), 0.005).over(again[:, None])[:, 0]])[0]
+    np.testing.assert_allclose(late[2:-2], values[2:-2])
+    assert advanced(values, 0.0, 0.005) is values

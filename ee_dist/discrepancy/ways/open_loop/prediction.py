@@ -19,7 +19,7 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial, released
 from ee_dist.discrepancy.starting import start_of, starts_beside
 from ee_dist.discrepancy.steps import centred
 from ee_dist.engines.contract import Rollout
-from ee_dist.engines.drivers import Commands, Controllers, Network, command_scaling
+from ee_dist.engines.drivers import Commands, Controllers, Network, advanced, command_scaling
 from ee_dist.engines.sensing import SensingPath
 from ee_dist.evaluation.jobs import Evaluator, Job
 from ee_dist.robots.limbs import Limb, limbs, whole
@@ -31,6 +31,8 @@ _SENSOR_FAULTS: dict[str, Any] = {
 }
 
 
+KEPT = 100
+"""Commands as drives obey them that are kept, of trials and wirings."""
 DRAWS = 8
 """Draws of the noise of a faulty channel, whose mean roughness is compared with the measured one."""
 DRAWN = 5_000_000
@@ -144,7 +146,8 @@ def wired_commands(trial: MeasuredTrial, model: Robot) -> Commands:
     if isinstance(trial.driver, Network):
         return Commands(trial.log.commands)
     planned = trial.driver.values if isinstance(trial.driver, Commands) else trial.log.commands
-    return Commands(np.ascontiguousarray(trial.obeyed(planned[: len(trial.log)], model)[:, list(model.wiring.source)]))
+    given = advanced(trial.obeyed(planned[: len(trial.log)], model), model.wiring.early_s, model.time_step_s)
+    return Commands(np.ascontiguousarray(given[:, list(model.wiring.source)]))
 
 
 Obeyed = tuple[Commands, Array | None]
@@ -181,7 +184,7 @@ class Predictor:
         self.trials, self.base, self.evaluator = trials, base, evaluator
         self.block, self.window = block, window
         self.rows = [rows_read(t.log) for t in trials]
-        self._obeyed: dict[tuple[int, tuple[int, ...]], Obeyed] = {}
+        self._obeyed: dict[tuple[int, tuple[float, ...]], Obeyed] = {}
         self._told: dict[tuple[int, tuple[int, ...]], tuple[Commands, Commands]] = {}
         """What drives of a limb obey, by what those of all of the robot do."""
         self._only_noisy = [replace(s, noise=0.0) == _faultless(s) for s in base.sensors]
@@ -246,8 +249,12 @@ class Predictor:
 
     def _given(self, trial: int, model: Robot) -> Obeyed:
         """Models of one wiring share the very array, which so goes to a worker once."""
-        key = trial, tuple(model.wiring.source)
+        key = trial, (*model.wiring.source, model.wiring.early_s)
         if key not in self._obeyed:
+            if len(self._obeyed) > KEPT:
+                # A search tries ever other times.
+                self._obeyed.clear()
+                self._told.clear()
             self._obeyed[key] = obeyed(self.trials[trial], model)
         return self._obeyed[key]
 
