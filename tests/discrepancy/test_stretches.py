@@ -73,7 +73,7 @@ def test_motions_stay_the_evidence_and_people_are_told() -> None:
     whole, some = cut("friction")
     assert [c.name for c in held_out_by(some)] == [MOTIONS] == [c.name for c in held_out_by(whole)]
     (note,) = set(some.notes) - set(whole.notes)
-    assert "14 stretches of 80 s" in note and "compare takes all of it" in note
+    assert "of the 80 s, in 14 stretches" in note and "compare takes all of it" in note
     assert some.whole is whole is whole.whole, "what is drawn is all of it"
     assert some.as_searched is some and whole.as_searched is whole
     brief = some.beginning(8.0)

@@ -25,7 +25,10 @@ def test_what_a_search_goes_by_is_told_everywhere(cli, monkeypatch: pytest.Monke
     summary = (run / "summary.json").read_text()
     for text in (found.out, summary, (run / "report.html").read_text()):
         said = " ".join(text.split())
-        assert "So that the search ends, it goes by 4 stretches of 48 s" in said and "compare takes all of it" in said
+        assert (
+            "So that the search ends, it goes by 16 of the 48 s, in 4 stretches" in said
+            and "compare takes all of it" in said
+        )
     assert json.loads(summary)["verdict"] == "effect"
     apart = cli(*asked, "evaluator=ray", "evaluator.workers=2", "task.rerun=false")
     assert apart.status == 0, apart.err

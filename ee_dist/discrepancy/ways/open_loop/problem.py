@@ -263,9 +263,10 @@ class OpenLoop(Problem):
         if self._whole is not None:
             compared = sum(self._rows) * (reading_s(self.measured) or self.robot.time_step_s)
             lasting = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)
+            parts = counted(len(self.parts), "stretch", "stretches")
             lines.append(
-                f"So that the search ends, it goes by {counted(len(self.parts), 'stretch', 'stretches')} of {lasting:.0f} s, "
-                f"{compared:.0f} s together, each begun from the measured positions; compare takes all of it."
+                f"So that the search ends, it goes by {compared:.0f} of the {lasting:.0f} s, in {parts}, each begun from the "
+                "measured positions; compare takes all of it."
             )
         return lines
 
