@@ -283,7 +283,8 @@ def deadband(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 
 LIGHTER, LIGHTER_AT_LEAST, LIGHTER_GUESS = 0.9, 0.25, 0.98
 """Shares of the described rotor's inertia that may not be there: files often carry what keeps a simulation steady. More than
-the smaller share only where the joint stays slow enough for its controller; most of all of one that was guessed at."""
+the smaller share only where the joint stays slow enough for its controller; most of all of one that was guessed at, and, where
+the controller was guessed too, whatever that would do: models of measured robots hold any (``discrepancy.steps``)."""
 
 
 GEARED = 10.0
@@ -297,8 +298,11 @@ is 6 to 40 times what else the joint feels."""
 def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     drive, felt, dt = scales.drive_of(robot, target), scales.inertia(robot, target), robot.time_step_s
     rotor = drive.rotor_inertia
-    most = LIGHTER_GUESS if (target, "rotor_inertia") in robot.assumed else LIGHTER
-    less = max(LIGHTER_AT_LEAST * rotor, min(most * rotor, scales.spare_inertia(robot, target)))
+    guessed = (target, "rotor_inertia") in robot.assumed
+    most = (LIGHTER_GUESS if guessed else LIGHTER) * rotor
+    if not (guessed and (target, "kp") in robot.assumed):
+        most = min(most, scales.spare_inertia(robot, target))
+    less = max(LIGHTER_AT_LEAST * rotor, most)
     times = WEIGHED if dt < INSTANT_S else GEARED if drive.command == "torque" else 1.0
     more = times * felt
     return {"added_kg_m2": (0.0 - less, max(4.0 * rotor, more))}
