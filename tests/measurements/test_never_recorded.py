@@ -141,3 +141,14 @@ def test_the_report_counts_no_more_readings_than_there_are(tmp_path: Path, rate_
     _, report = logs.imported(tmp_path, logs.written(tmp_path, frame))
     (line,) = (d for d in report.done if "rows are readings" in d or "lie in gaps" in d)
     assert said in line and (said.startswith("lie") or int(line.split()[0]) <= len(t))
+
+
+def test_joints_that_were_told_something_and_not_read_are_named(tmp_path: Path) -> None:
+    """Commands name all joints; the one whose cells are empty was taken for one that the columns call otherwise."""
+    joints = ("hip_joint", "knee_joint", "ankle_joint")
+    goals = np.stack([0.3 * np.sin((2 + k) * T) for k in range(3)], axis=1)
+    frame = logs.frame_of(T, goals, goals, "{what}_{joint}_rad", joints)
+    frame[["pos_knee_joint_rad", "pos_ankle_joint_rad"]] = np.nan
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, frame), joints)
+    (question,) = proposal.questions
+    assert "the columns name hip_joint alone; of knee_joint, ankle_joint nothing was recorded" in question

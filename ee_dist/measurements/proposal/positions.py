@@ -171,7 +171,9 @@ def _recorded(v: View, kind: str = POSITION) -> list[str]:
     for table in v.timed.tables:
         for address in series_of(table, filled=True):
             joint = in_full(address, v.robot.motor_names)
-            if read_name(address, frozenset(tokens(joint)) if joint else frozenset()).kind == kind:
+            said = read_name(address, frozenset(tokens(joint)) if joint else frozenset())
+            # That a joint was told something does not say that it was read.
+            if said.kind == kind and not said.command:
                 found |= {joint} if joint else set()
                 other += joint is None
     return [m for m in v.robot.motor_names if m in found] if other <= len(found) < len(v.joints) else []
