@@ -18,6 +18,7 @@ from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.led import Led
 from ee_dist.measurements.looking import Looked, repeats
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
+from ee_dist.measurements.not_recorded import Stood, with_those_that_stood
 from ee_dist.measurements.on_grid import OnGrid
 from ee_dist.measurements.reading import holes_told, told_of
 from ee_dist.measurements.report import Report, in_one_line
@@ -42,7 +43,8 @@ def import_file(path: str | Path, mapping: Mapping, robot: Robot, index: int = 0
 def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[tuple[TrialRecord, Report]]:
     """Every trial of the files. Raises MeasurementError: see ``readers``, ``trials``, ``clocks`` and ``check_names``."""
     check_names(mapping, robot)
-    begun = [_Import(r, mapping, robot, i) for i, r in enumerate(trials_of(files, mapping))]
+    trials = with_those_that_stood(trials_of(files, mapping), mapping, robot)
+    begun = [_Import(r, mapping, robot, i, stood) for i, (r, stood) in enumerate(trials)]
     # One logger reads its sensors at one pace; of a trial in which hardly anything moves only others tell it.
     paces: dict[str, float] = {}
     for each in begun:
@@ -52,7 +54,7 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
         # One controller leads all trials: of a slow one only others tell how it goes from point to point.
         for i, each in enumerate(begun):
             if not each.led.goes_on:
-                found[i] = _Import(each.recorded, mapping, robot, i, goes_on=True).run(paces)
+                found[i] = _Import(each.recorded, mapping, robot, i, each.stood, goes_on=True).run(paces)
     names = [report.trial for _, report in found]
     for i, setting in enumerate(mapping.settings):
         for wanted in setting.trials:
@@ -64,14 +66,18 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
 
 
 class _Import:
-    def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, index: int, goes_on: bool = False) -> None:
-        """``goes_on``: commands go on by lines from row to row, as in other trials. Raises MeasurementError."""
-        self.recorded, self.mapping, self.robot, self.index = recorded, mapping, robot, index
+    def __init__(
+        self, recorded: Recorded, mapping: Mapping, robot: Robot, index: int, stood: Stood, goes_on: bool = False
+    ) -> None:
+        """``stood``: the joints that were not recorded; ``goes_on``: commands go on by lines from row to row, as in other
+        trials. Raises MeasurementError."""
+        self.recorded, self.mapping, self.robot, self.index, self.stood = recorded, mapping, robot, index, stood
         self.where = str(mapping.source)
         self.header = {k: v for t in reversed(recorded.tables) for k, v in t.header.items()}
         self.report = Report(str(recorded.tables[0].path), self._name())
         for table in recorded.tables:
             self.report.done += list(table.notes)
+        self.report.done += [stood.line] * bool(stood.line)
         self.on = OnGrid(recorded, mapping, robot, self.report)
         self.led = Led(self.on, mapping, robot, goes_on)
 

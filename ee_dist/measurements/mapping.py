@@ -30,6 +30,7 @@ class Column:
     a reading begins anew, where these are no turn. ``gaps: interpolate`` fills empty cells from
     their neighbours, or with the last command. ``lead_s``: how long before its time stamp a command took effect.
     ``smooth_s``: centred mean over that time. ``sure``: the unit is right although the numbers look as if it were not.
+    ``held``: the value (in ``unit``) of a channel that stood still in trials that have no such column, or an empty one.
     """
 
     column: str
@@ -45,6 +46,7 @@ class Column:
     smooth_s: float = 0.0
     table: str = ""
     sure: bool = False
+    held: float | None = None
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,8 @@ class Mapping:
     tables: Dictionary[str, Clock] = field(default_factory=dict)
     side_by_side: Dictionary[str, str] = field(default_factory=dict)
     """Names of the files that are one table, row by row, by what goes before the names of their columns, with {trial}."""
+    one_joint_each: Dictionary[str, str] = field(default_factory=dict)
+    """Names of the files that hold one joint each, every one a trial, by what goes before the names of their columns, with *."""
     split: Split | None = None
     rate_hz: float | None = None
     commands_between: str | None = None

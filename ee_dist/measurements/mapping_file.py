@@ -27,8 +27,9 @@ UNKNOWN = "???"
 
 
 _KEYS = (
-    "robot", "format", "records", "separator", "header", "decimal", "tables", "side_by_side", "split", "time", "rate_hz",
-    "sensors", "commands", "commands_between", "torques", "external", "supply", "enabled", "settings", "gains", "trial",
+    "robot", "format", "records", "separator", "header", "decimal", "tables", "side_by_side", "one_joint_each", "split", "time",
+    "rate_hz", "sensors", "commands", "commands_between", "torques", "external", "supply", "enabled", "settings", "gains",
+    "trial",
 )  # fmt: skip
 
 
@@ -87,6 +88,7 @@ def mapping_of(data: Any, file: Path) -> Mapping:
             for k, v in _table(data.get("tables") or {}, f"{where}: tables").items()
         },
         side_by_side=_side_by_side(data.get("side_by_side"), f"{where}: side_by_side"),
+        one_joint_each=_one_joint_each(data.get("one_joint_each"), f"{where}: one_joint_each"),
         split=_split(data.get("split"), f"{where}: split"),
         rate_hz=_rate(data.get("rate_hz"), f"{where}: rate_hz"),
         commands_between=_between(data.get("commands_between"), f"{where}: commands_between"),
@@ -134,10 +136,11 @@ def _same(mapping: Mapping, column: Column, one: tuple[str, str], two: tuple[str
 def _check_files(mapping: Mapping) -> None:
     """Where one table has a file of its own, every table and every channel has one. Raises MeasurementError."""
     filed = [k for k, c in mapping.tables.items() if c.file]
-    if mapping.side_by_side and mapping.tables:
+    ways = [k for k in ("tables", "side_by_side", "one_joint_each") if getattr(mapping, k)]
+    if len(ways) > 1:
         raise MeasurementError(
-            f"{mapping.source}: tables, and side_by_side: files are either tables with a time each or stand side by side; leave "
-            "one of the two out"
+            f"{mapping.source}: {ways[0]}, and {ways[1]}: files are either tables with a time each, or stand side by side, or "
+            "are trials of one joint each; leave one of the two out"
         )
     if not filed:
         return
@@ -206,6 +209,14 @@ def _side_by_side(value: Any, where: str) -> dict[str, str]:
         _check_shape(shape, name, f"{where}: {name}: expected the name of a file")
     if len(found) == 1:
         raise MeasurementError(f"{where}: expected two files or more, not {quoted(next(iter(found)))} alone")
+    return found
+
+
+def _one_joint_each(value: Any, where: str) -> dict[str, str]:
+    found = {} if value is None else {str(k): str(v) for k, v in _table(value, where, "name of its file").items()}
+    for name, shape in found.items():
+        if not shape:
+            raise MeasurementError(f"{where}: {name}: expected the name of a file such as '{name}.csv' or '*{name}*'")
     return found
 
 
@@ -310,7 +321,7 @@ def _made(kind: Any, value: Any, where: str) -> Any:
             if not isinstance(entry, bool):
                 raise MeasurementError(f"{where}: {key}: cannot be {shown(entry)}; expected true or false")
             made[str(key)] = entry
-        elif isinstance(default, (int, float)):
+        elif isinstance(default, (int, float)) or default is None:
             number = _number(entry, f"{where}: {key}")
             if isinstance(default, int) and number != int(number):
                 raise MeasurementError(f"{where}: {key}: cannot be {shown(entry)}; expected a whole number")

@@ -129,7 +129,10 @@ class OnGrid:
         good = np.flatnonzero(np.isfinite(raw))
         # A goal that was sent once holds from then on.
         if len(good) < min(len(raw), 1 if step_like else 2):
-            spared = f": leave out the {name}, which may stay unknown" if name.startswith(TORQUE) else ""
+            stood = (
+                "; where a joint that stood still was not recorded, 'held: PLACE' at its columns says where it stood"
+            )
+            spared = f": leave out the {name}, which may stay unknown" if name.startswith(TORQUE) else stood
             raise MeasurementError(f"{own.table}: column {quoted(column.column)}: nearly all cells are empty{spared}")
         if not quiet and not column.signed_bits:
             title = f"{name} ({column.column})"

@@ -14,6 +14,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.folders import own_names
 from ee_dist.measurements.mapping import Mapping
+from ee_dist.measurements.one_joint_each import labelled, of_joints
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.side_by_side import side_by_side
 from ee_dist.measurements.table import Recorded, Table
@@ -33,10 +34,11 @@ def trials_of(files: Sequence[Path], mapping: Mapping) -> list[Recorded]:
         found = _joined(files, mapping, {name: c.file for name, c in mapping.tables.items()})
     else:
         found = []
+        files = of_joints(files, mapping) if mapping.one_joint_each else files
         names = own_names(files)
         for file in files:
             several = read(file, mapping.reading)
-            for r in several:
+            for r in [labelled(r, file, mapping) for r in several] if mapping.one_joint_each else several:
                 found += _split(_named(r, names[file], len(files) > 1 and bool(r.name)), mapping)
     if len(found) > MOST_TRIALS:
         raise MeasurementError(f"{files[0]}: {len(found)} trials; at most {MOST_TRIALS} at once: name fewer files")
