@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
@@ -21,9 +22,10 @@ from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.not_recorded import Stood, with_those_that_stood
 from ee_dist.measurements.on_grid import OnGrid
 from ee_dist.measurements.reading import holes_told, told_of
-from ee_dist.measurements.report import Report, in_one_line
+from ee_dist.measurements.report import COMMAND, Report, in_one_line, without_rest
 from ee_dist.measurements.robot_channels import check_names
 from ee_dist.measurements.sampling import LowPass
+from ee_dist.measurements.standing import told_to_rest
 from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.measurements.trials import trials_of
 from ee_dist.recording.records import HARDWARE, TrialRecord
@@ -90,6 +92,7 @@ class _Import:
         self.report.suspicious += repeats(self.robot, self.mapping, self.on.clocks, self.on.paces())
         torques = self.led.torques()
         commands = self.led.commands(torques, positions)
+        self._tell_of_rest(commands, positions)
         self.report.suspicious = in_one_line(self.report.suspicious)
         self.led.on_one_turn(commands, self.channels)
         supply = None
@@ -160,6 +163,14 @@ class _Import:
                     f"differences behind a {low_pass}"
                 )
         return positions
+
+    def _tell_of_rest(self, commands: Array, positions: AnyMapping[str, Array]) -> None:
+        """One line on all joints that nobody moved in this trial, in place of two suspicious ones on each."""
+        rest = told_to_rest(self.robot, commands, positions)
+        still = [s.name for s in self.robot.sensors if s.target in rest]
+        self.report.suspicious = without_rest(self.report.suspicious, [*still, *(f"{COMMAND} {j}" for j in rest)])
+        if read := [j for j in rest if j not in self.stood.joints]:
+            self.report.done.append(f"not moved in this trial, as told: {listed(read)}")
 
     def _settings(self) -> Hypothesis:
         found = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -45,6 +45,11 @@ def in_one_line(suspicious: Sequence[str]) -> list[str]:
         return list(suspicious)
     line = f"commands of {len(still)} joints stay as they are for the whole record, first {still[0].partition(' (')[0]}"
     return [line if s == still[0] else s for s in suspicious if s == still[0] or s not in still]
+
+
+def without_rest(suspicious: Sequence[str], channels: Collection[str]) -> list[str]:
+    """The lines, without those on ``channels`` that never change because nobody moved them."""
+    return [s for s in suspicious if STUCK_AT not in s or not s.startswith(tuple(f"{c} (" for c in channels))]
 
 
 def describe(reports: Sequence[Report]) -> str:

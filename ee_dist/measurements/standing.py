@@ -1,13 +1,15 @@
-"""Joints that stand still although they are commanded: no unit explains it, and what they do tells nothing of units."""
+"""Joints that stand still: although they are commanded, which no unit explains and which tells nothing of units; or because they
+are told to rest, which is nothing to suspect."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from ee_dist.measurements.units import TURNS_ON
-from ee_dist.robots.model import Joint
+from ee_dist.robots.model import Joint, Robot
 from ee_dist.trials.log import Array
 
 PART = 0.1
@@ -32,3 +34,13 @@ def reach_of(joint: Joint) -> float:
     """How far from zero a joint gets; of one that turns without an end, by a few turns."""
     reach = max(abs(joint.lower), abs(joint.upper))
     return reach if reach > 0 and math.isfinite(reach) else TURNS_ON if joint.kind == "hinge" else math.inf
+
+
+def told_to_rest(robot: Robot, commands: Array, position_of: Mapping[str, Array]) -> tuple[str, ...]:
+    """The joints that rest as they are told to, ``commands`` (T, M) one number all the time, while others go somewhere; none of a
+    robot of which nothing moves."""
+    at_rest = {j: float(np.ptp(at)) < REST * reach_of(robot.joint(j)) for j, at in position_of.items()}
+    if all(at_rest.values()):
+        return ()
+    told = [d.joint for k, d in enumerate(robot.drives) if d.command != "none" and np.ptp(commands[:, k]) == 0]
+    return tuple(j for j in told if at_rest.get(j, False))

@@ -17,6 +17,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.measurements.proposal.torque_scale import _in_thousandths
+from ee_dist.measurements.standing import told_to_rest
 from ee_dist.robots.describe import load_robot
 
 JOINTS = ("shoulder", "elbow", "wrist")
@@ -77,3 +78,18 @@ def test_torques_of_one_family_have_one_unit() -> None:
     relations = [signals.Relation(0.9, size) for size in (1.1, 0.8, 900.0)]
     assert not _in_thousandths(relations, [0, 1, 2], block), "at one joint alone it is friction"
     assert _in_thousandths([signals.Relation(0.9, s) for s in (1100.0, 800.0, 3.0)], [0, 1, 2], block)
+
+
+def test_what_nobody_moved_is_one_line_and_nothing_to_suspect(tmp_path: Path) -> None:
+    table = frame()
+    table[[f"{j}_{what}" for j in JOINTS[1:] for what in ("pos", "goal")]] = [0.1, 0.1, -0.2, -0.2]
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, table), JOINTS)
+    assert not report.suspicious and "not moved in this trial, as told: elbow, wrist" in report.done
+    # One that is told to go is another matter, and so is a log in which nothing moves.
+    table["wrist_goal"] = frame()["wrist_goal"]
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, table), JOINTS)
+    assert any("position_wrist" in s and "stuck" in s for s in report.suspicious)
+    assert not any("elbow" in s for s in report.suspicious)
+    still = {"elbow": np.full(9, 0.1), "wrist": np.full(9, 0.2)}
+    robot, _ = load_robot(samples.robot_file(tmp_path, JOINTS))
+    assert not told_to_rest(robot, np.zeros((9, 3)), still)
