@@ -19,7 +19,9 @@ SHARED = 0.5
 ALIKE = 1e-3
 """Share of a row by which the times of the same moment differ at most;"""
 APART = 0.5
-"""and those of the same row, from file to file."""
+"""and those of the same row, from file to file;"""
+ONE_STAMP = 0.02
+"""and those of a row that one logger wrote into the file of each joint."""
 _NUMBERED = re.compile(r"#?\d+")
 _TIME = re.compile(r"(^|[^a-z])(t|time|times|timestamps?|stamp|seconds?|secs?|elapsed|clock)([^a-z]|$)", re.IGNORECASE)
 
@@ -69,13 +71,20 @@ def side_by_side(tables: Mapping[str, Table]) -> Table:
     )  # fmt: skip
 
 
-def _at_other_times(tables: Mapping[str, Table]) -> bool:
-    """Whether all tables, of one length, say when their rows were, and these were not the same."""
+def one_recording(tables: Mapping[str, Table]) -> bool | None:
+    """Whether the rows of files of one joint each were stamped together; None where they have as many rows and nothing says."""
+    if len({len(t) for t in tables.values()}) > 1 or _at_other_times(tables, ONE_STAMP):
+        return False
+    return True if all(_own_time(t) is not None for t in tables.values()) else None
+
+
+def _at_other_times(tables: Mapping[str, Table], share: float = APART) -> bool:
+    """Whether all tables, of one length, say when their rows were, and these were not the same, to a share of a row."""
     times = [found[1] for t in tables.values() if (found := _own_time(t)) is not None]
     if len(times) < len(tables) or len(times) < 2:
         return False
     step = float(np.median(np.diff(times[0])))
-    return any(float(np.abs(t - times[0]).max()) > APART * step for t in times[1:])
+    return any(float(np.abs(t - times[0]).max()) > share * step for t in times[1:])
 
 
 def _by_their_times(tables: Mapping[str, Table]) -> dict[str, Table]:

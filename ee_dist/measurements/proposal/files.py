@@ -12,9 +12,12 @@ import numpy as np
 
 from ee_dist.basics.names import listed
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.not_recorded import recorded_in
 from ee_dist.measurements.proposal.by_sensor import tilt_of
 from ee_dist.measurements.proposal.layouts import put_together
 from ee_dist.measurements.proposal.model import Hints, Proposal
+from ee_dist.measurements.proposal.of_all_trials import tell_of_all_trials
+from ee_dist.measurements.proposal.one_by_one import behind_one_another, one_by_one
 from ee_dist.measurements.proposal.stated import add_stated
 from ee_dist.measurements.proposal.time import TimeChoice, time_of
 from ee_dist.measurements.proposal.words import TIME, read_name, role_of, tokens
@@ -31,19 +34,27 @@ _TRIALS = frozenset(["episode", "episodes", "trial", "trials", "run", "runs", "d
 
 
 def gathered(
-    files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints, joints: Sequence[str], notes: list[str]
-) -> Recorded:
+    files: Sequence[Path], proposal_head: dict[str, Any], hints: Hints, joints: Sequence[str], notes: list[str],
+    places: dict[str, float],
+) -> Recorded:  # fmt: skip
     """One trial to look at, and into ``proposal_head`` what the mapping must say to get all: ``tables`` or ``side_by_side`` for
-    trials of several files, ``split`` for several trials of one; into ``notes`` what is left out. Raises MeasurementError."""
+    trials of several files, ``one_joint_each`` for trials of one joint, ``split`` for several trials of one file; into ``notes``
+    what is left out, into ``places`` where columns stood that not all trials have. Raises MeasurementError."""
     first = read(files[0])[0]
+    if len(first.tables) == 1 and (single := one_by_one(files, joints, hints)) is not None:
+        proposal_head[single.key] = dict(single.shapes)
+        _tell_left(single.others, notes)
+        notes += single.notes
+        places |= single.first
+        return Recorded("", (single.table,))
     if len(files) > 1 and len(first.tables) == 1:
+        if (some := _some_empty(files, first, hints)) is not None:
+            places |= some[1]
+            return Recorded(first.name, (some[0],))
         together = put_together(files, joints)
         if isinstance(together, tuple):
             proposal_head["side_by_side"] = dict(together[0].patterns)
-            left = sorted({f.name for f in together[0].others})
-            if left:
-                why = "since their names say nothing that is asked for, or the rest of their trial is missing"
-                notes.append(f"left out, {why}: {listed(left[:MOST_SHOWN])}")
+            _tell_left(together[0].others, notes)
             return Recorded("", (together[1],))
         spread = _spread(files, first)
         if spread is not None:
@@ -62,6 +73,28 @@ def gathered(
     if len(first.tables) == 1:
         return _first_of_split(first, proposal_head)
     return first
+
+
+def _tell_left(others: Sequence[Path], notes: list[str]) -> None:
+    if left := sorted({f.name for f in others}):
+        why = "since their names say nothing that is asked for, or the rest of their trial is missing"
+        notes.append(f"left out, {why}: {listed(left[:MOST_SHOWN])}")
+
+
+def _some_empty(files: Sequence[Path], first: Recorded, hints: Hints) -> tuple[Table, dict[str, float]] | None:
+    """Trials of the same columns, of which some are empty in the first and not in all: joints that were not recorded there."""
+    table = first.tables[0]
+    if all(recorded_in(table, a) for a in table.addresses()):
+        return None
+    tables = [table]
+    for file in files[1:]:
+        found = read(file)
+        if len(found) != 1 or len(found[0].tables) != 1 or found[0].tables[0].columns.keys() != table.columns.keys():
+            return None
+        tables.append(found[0].tables[0])
+    time = time_of(table, hints)
+    together, places = behind_one_another(tables, None if time is None else time.column)
+    return (together, places) if any(not recorded_in(table, a) for a in places) else None
 
 
 def _check_clocks(tables: Sequence[Table], times: Sequence[TimeChoice | None]) -> None:
@@ -163,13 +196,15 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
 
     head: dict[str, Any] = {}
     notes: list[str] = []
-    recorded = gathered(files, head, hints, robot.motor_names, notes)
+    places: dict[str, float] = {}
+    recorded = gathered(files, head, hints, robot.motor_names, notes, places)
     if len(recorded.tables) > 1 and "tables" not in head:  # what is named as a file is to be named at each channel
         shown = [t for t in recorded.tables if len(t) > 20]
         recorded = replace(recorded, tables=tuple(shown) or recorded.tables)
     proposal = propose(recorded, robot, hints)
     proposal.head = head | proposal.head
     proposal.notes[:0] = notes
+    tell_of_all_trials(proposal, files, places, robot)
     add_stated(proposal, files, recorded, robot)
     used = {c.column for c in proposal.choices}
     left = [name for name in proposal.unused if name not in used]

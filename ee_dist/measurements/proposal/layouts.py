@@ -55,6 +55,13 @@ def put_together(files: Sequence[Path], joints: Sequence[str]) -> tuple[Layout, 
     return None
 
 
+def files_of_joints(files: Sequence[Path], joints: Sequence[str]) -> tuple[Layout, dict[str, Table]] | None:
+    """Files that hold one joint each, all joints of a trial; None for others."""
+    found = _layout(files, _joints([f.stem for f in files], joints))
+    tables = None if found is None else _tables(found)
+    return None if found is None or tables is None or not _of_one_joint(tables, joints) else (found, tables)
+
+
 def _quantities(stems: Sequence[str]) -> list[tuple[int, int] | None]:
     """Where in each name the quantity stands, behind a word that all of them begin with: dataQ, dataQref, dataTimeStamp."""
     begins = _BEGINS.match(stems[0]) if stems else None

@@ -48,6 +48,8 @@ class Choice:
     entry: dict[str, Any] | None
     sure: str
     why: str
+    still: bool = False
+    """Whether its column never changes in the trial that was looked at."""
 
     @property
     def column(self) -> str:

@@ -215,13 +215,13 @@ class View:
             if not name:
                 continue
             more = units.entries[k] if units.entries else {"unit": "???"}
-            still = "" if signals.moves(block.values[:, k]) else "; does not move in this file"
+            still = not signals.moves(block.values[:, k])
             empty = empty_cells(block.table, block.columns[k])
             how = "the last value holds" if group == "commands" else "filled by straight lines"
             filled = f"; {empty} of {len(block.table)} cells are empty, {how}" if empty else ""
             anew = f"; begins anew after {block.rounds[k]:g}" if block.rounds and block.rounds[k] else ""
             self.out.choices.append(
-                Choice(group, name, self.entry(block, k, more) | which, level, text + still + anew + filled)
+                Choice(group, name, self.entry(block, k, more) | which, level, text + anew + filled, still)
             )
 
     def sensor_names(self, kind: str) -> list[str]:
