@@ -29,6 +29,9 @@ from ee_dist.effects import feed_forward  # noqa: F401
 # isort: split
 from ee_dist.effects import stamps  # noqa: F401
 
+# isort: split
+from ee_dist.effects import integral  # noqa: F401
+
 __all__ = [
     "CATALOGUE",
     "Effect",

@@ -433,3 +433,21 @@ def test_what_is_early_by_as_much_as_it_is_late_is_neither() -> None:
     late = np.stack([Delay(np.full((1, 2), 0.010), 0.005).over(again[:, None])[:, 0]])[0]
     np.testing.assert_allclose(late[2:-2], values[2:-2])
     assert advanced(values, 0.0, 0.005) is values
+
+
+def test_integral_gain_lets_a_load_creep_away(bench: Bench) -> None:
+    """Under a steady load a joint hangs back by load/kp; with ki that shrinks as exp(-t ki/kp), damping left out."""
+    robot = slider(kp=400.0, kd=60.0, torque_limit=1000.0)
+    load = term("offset_torque", "joint", torque_nm=20.0)
+    hangs = bench.run(robot, load, steps=3000).channel("position")
+    assert hangs[-1] == pytest.approx(20.0 / 400.0, rel=1e-3)
+    led = bench.run(robot, load, term("integral_gain", "joint", added=200.0), steps=3000).channel("position")
+    assert led[2999] / led[1999] == pytest.approx(math.exp(-200.0 / 400.0), rel=0.1)
+    none = bench.run(replace(robot, drives=(replace(robot.drives[0], ki=200.0),)), load, steps=3000)
+    assert none.channel("position").tobytes() == led.tobytes(), "as it is described"
+
+
+def test_integral_gain_is_held_within_a_quarter_of_the_torque_limit(bench: Bench) -> None:
+    robot = slider(kp=400.0, kd=60.0, torque_limit=40.0)
+    load, led = term("offset_torque", "joint", torque_nm=20.0), term("integral_gain", "joint", added=2000.0)
+    assert settled(bench, robot, load, led) == pytest.approx((20.0 - 40.0 / 4) / 400.0, rel=1e-3)

@@ -28,6 +28,7 @@ from ee_dist.discrepancy.ways.free_run.longer_steps import SLIGHT, every_row_is_
 from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
 from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, ToPositions, in_turn, pieces, spared, thinned
 from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.effects.integral import INTEGRAL
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
@@ -218,6 +219,10 @@ class FreeRun(Problem):
 
     def _simulated(self, trial: int, hypothesis: Hypothesis) -> Robot:
         return self._models([hypothesis], (trial,), self.steps)[trial][0]
+
+    def shows(self, effect: str, target: str) -> bool:
+        """A window knows nothing of what an integral has added up before it."""
+        return (effect != INTEGRAL or self.windows_s is None) and super().shows(effect, target)
 
     def noise_floor(self) -> tuple[float, str]:
         seldom = any(p.log.filled is not None for p in self.pieces)

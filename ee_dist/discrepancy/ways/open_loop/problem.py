@@ -52,6 +52,7 @@ from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, Weights, soft
 from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
 from ee_dist.effects.effect import Beside
 from ee_dist.effects.groups import members_of
+from ee_dist.effects.integral import INTEGRAL
 from ee_dist.effects.stamps import STAMPED_LATE
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
@@ -235,8 +236,11 @@ class OpenLoop(Problem):
         return tuple(float(1.0 / np.mean(widened[of == k])) for k in range(len(self.measured)))
 
     def shows(self, effect: str, target: str) -> bool:
-        """Where most sensors repeat readings, that one does so too says nothing; a simulation knows when it commands."""
+        """Where most sensors repeat readings, that one does so too says nothing; a simulation knows when it commands; and a
+        stretch says nothing of what an integral has added up before it."""
         if effect == STAMPED_LATE and not all(t.real for t in self.measured):
+            return False
+        if effect == INTEGRAL and self._whole is not None:
             return False
         if effect not in REPEATING:
             return super().shows(effect, target)
