@@ -10,7 +10,7 @@ from linear_problem import Linear
 from way_samples import measure, problem_by, samples
 
 from ee_dist.discrepancy.accounts.account import held_out_notes
-from ee_dist.discrepancy.evidence.holdout import MOTIONS, bootstrap, joint_by_joint, travelling, windows
+from ee_dist.discrepancy.evidence.holdout import MOTIONS, _turn, bootstrap, joint_by_joint, travelling, windows
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.effects.catalogue import Hypothesis
 
@@ -98,3 +98,15 @@ def test_motions_in_which_joints_move_together_or_twice_are_held_out(shares: tup
     both = arm_moved(*shares)
     assert not joint_by_joint(both)
     assert [c.name for c in travelling(both)] == [MOTIONS]
+
+
+def test_two_groups_of_motions_do_not_fall_together_with_how_recordings_alternate() -> None:
+    """Of series in which slow and quick, or three amplitudes, take turns each group has all kinds, and half of the motions."""
+    for of in (5, 6, 8, 12, 18, 30):
+        turns = np.array([_turn(k, of) for k in range(of)])
+        assert abs(turns.sum() - of / 2) <= 1
+        for period in (2, 3):
+            for kind in range(period):
+                mine = turns[kind::period]
+                assert len(mine) < 3 or set(mine) == {0, 1}, (of, period, kind)
+    assert [_turn(k, 4) for k in range(4)] == [0, 1, 2, 3], "few are held out one by one"

@@ -20,6 +20,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, Leading
 from ee_dist.discrepancy.search.valley import LARGE
+from ee_dist.discrepancy.thinning import place
 from ee_dist.effects.fixture import STAND
 from ee_dist.evaluation.gathered import side_by_side
 from ee_dist.robots.ranges import travel
@@ -31,7 +32,7 @@ WINDOWS, MOTIONS, SETTINGS = (
     "settings that were not fitted",
 )
 ONE_BY_ONE = 4
-"""Up to so many motions or settings each is held out by itself; more take turns in two groups."""
+"""Up to so many motions or settings each is held out by itself; more are held out in two groups."""
 SAME_MOTION = 0.02
 """Two trials are one motion where their commands differ by less than this share of how much they vary, over nearly all of it;"""
 SAME_COURSE = 0.15
@@ -129,10 +130,15 @@ def travelling(problem: Problem) -> list[Cut]:
             continue
         if name == MOTIONS and joint_by_joint(problem, kinds):
             continue
-        turns = len(different) if len(different) <= ONE_BY_ONE else 2
-        number = np.array([different.index(x) % turns for x in of_trial])
+        number = np.array([_turn(different.index(x), len(different)) for x in of_trial])
         cuts.append(Cut(name, number[trial], trial, np.zeros_like(trial)))
     return cuts
+
+
+def _turn(number: int, of: int) -> int:
+    """The turn in which the motion (setting) of that number is held out. Of two groups each has one of every pair, in an order
+    that no period of a series falls together with: of pieces that are slow and quick in turn each group has both."""
+    return number if of <= ONE_BY_ONE else (number + int(2.0 * place(number // 2))) % 2
 
 
 def held_out_by(problem: Problem) -> list[Cut]:
