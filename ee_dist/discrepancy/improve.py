@@ -9,38 +9,31 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, looked_for_at_once, stands_out
 from ee_dist.discrepancy.evidence.holdout import (
-    PRIOR,
     Cut,
     HeldOut,
     cross_fit,
     held_out_by,
-    prior_of,
     travelling,
     windows,
 )
-from ee_dist.discrepancy.evidence.intervals import ParameterReport, parameters
 from ee_dist.discrepancy.evidence.judge import Judged, judge
-from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise, settled
+from ee_dist.discrepancy.evidence.left import leftovers, settled
 from ee_dist.discrepancy.evidence.rule import LUCK, NEAR, no_more_than_noise
-from ee_dist.discrepancy.evidence.signs import either_sign
-from ee_dist.discrepancy.evidence.together import flat_widths
-from ee_dist.discrepancy.evidence.worth import worth_of
 from ee_dist.discrepancy.examine import FAR, STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.exchanges import exchanged, refitted, twins_of
-from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was, begin
+from ee_dist.discrepancy.explain import as_it_was, begin
+from ee_dist.discrepancy.finished import finished
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung, Twin
 from ee_dist.discrepancy.last_steps import last_steps
-from ee_dist.discrepancy.left_as_guessed import beside_guesses
 from ee_dist.discrepancy.problem import Problem, error, per_segment
 from ee_dist.discrepancy.pruning import without_useless
-from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of, with_room_left
+from ee_dist.discrepancy.search.candidates import Candidate, Proposal, not_said, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.pool import as_long
@@ -78,7 +71,6 @@ ASKED = "the effects asked for were added"
 REFITTED = "only the model's own values were to be fitted"
 ONE_MORE = "one more effect"
 """What the search is at, for who waits."""
-EXPLAINED, BETTER = "explained", "better_not_explained"
 
 
 def improve(
@@ -197,7 +189,7 @@ def improve(
         current, twins = last_steps(
             search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew, tried_with
         )
-    return _finish(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
+    return finished(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
 
 
 def _with_room(search: Search, fit: Fit) -> Fit:
@@ -291,65 +283,3 @@ def _rung(search: Search, judged: Judged, ties: Sequence[str] = ()) -> Rung:
         judged.interval,
         list(ties),
     )
-
-
-def _finish(
-    search: Search,
-    current: Current,
-    ladder: list[Rung],
-    base: Array,
-    stopped: str,
-    last: Examined | None,
-    twins: list[Twin],
-    tried: int,
-) -> Improvement:
-    problem = search.problem
-    floor, source = problem.noise_floor()
-    terms: Hypothesis = search.fixed
-    told: list[ParameterReport] = []
-    worth, left = None, leftovers(problem, base)
-    residual = base
-    if current.parts:
-        then = (*search.fixed, *current.hypothesis)
-        roomy = with_room_left(problem.robot, then, current.parts)
-        current = Current(roomy, values_of(roomy, current.hypothesis))
-        model = Model(current.parts)
-        # Where only noise is left values are what the measurements say.
-        prior = prior_of(search, [(model, current.u)]) - PRIOR
-        fit = fit_one(search, model, [current.u], None, (*WIDTHS[2:], 0.006), prior)
-        terms = as_far_as_there_is(problem.robot, (*search.fixed, *fit.hypothesis))
-        fit = replace(fit, u=values_of(model.parts, terms[len(search.fixed) :]))
-        residual = fit.residual
-        left = leftovers(problem, residual)
-        beside = beside_guesses(search, fit)
-        reports = parameters(problem, fit, left, tried, either_sign(search, fit), flat_widths(search, fit), beside)
-        told = [replace(p, term=p.term + len(search.fixed)) for p in reports]
-        worth = worth_of(problem, fit, base)
-    before, after = ladder[0].error_heldout, ladder[-1].error_heldout
-    above = before**2 - floor**2
-    share = (before**2 - max(after, floor) ** 2) / above if above > 0 else 0.0
-    verdict = _verdict(len(ladder) > 1 or bool(current.parts), left, after, floor)
-    return Improvement(
-        verdict,
-        share,
-        ladder,
-        terms,
-        told,
-        base,
-        residual,
-        floor,
-        source,
-        left,
-        stopped,
-        last,
-        worth=worth,
-        unsure=may_be_noise(problem, residual),
-        twins=twins,
-        judged_on=ladder[-1].held_out,
-    )
-
-
-def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor: float) -> str:
-    if settled(left, error_after, floor):
-        return EXPLAINED if changed else NOTHING_MISSING
-    return BETTER if changed else UNEXPLAINED

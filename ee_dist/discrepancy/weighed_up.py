@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.discrepancy.evidence.left import leftovers, settled
-from ee_dist.discrepancy.improve import BETTER, EXPLAINED
+from ee_dist.discrepancy.finished import BETTER, EXPLAINED
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem, error

@@ -11,7 +11,8 @@ import pytest
 from way_samples import Sample, measure, problem_by
 
 from ee_dist.discrepancy.explain import explain
-from ee_dist.discrepancy.improve import EXPLAINED, _seen_by_itself, improve
+from ee_dist.discrepancy.finished import EXPLAINED
+from ee_dist.discrepancy.improve import _seen_by_itself, improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate

@@ -13,7 +13,8 @@ from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
 from ee_dist.discrepancy.evidence.rule import TOO_LITTLE, TOO_LITTLE_ALONE
 from ee_dist.discrepancy.examine import STANDARD_EFFORT
 from ee_dist.discrepancy.explain import NOTHING_MISSING, UNEXPLAINED, as_it_was
-from ee_dist.discrepancy.improve import BETTER, EXPLAINED, NOTHING_LEFT, improve
+from ee_dist.discrepancy.finished import BETTER, EXPLAINED
+from ee_dist.discrepancy.improve import NOTHING_LEFT, improve
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import Hypothesis, Term, term

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ee_dist.discrepancy import weighed_up as module
-from ee_dist.discrepancy.improve import BETTER, EXPLAINED
+from ee_dist.discrepancy.finished import BETTER, EXPLAINED
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.weighed_up import ALL_ROWS, TRIALS_APART, share, weighed_up
 

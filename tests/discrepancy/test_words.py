@@ -17,7 +17,7 @@ from ee_dist.discrepancy.assumed import LABEL
 from ee_dist.discrepancy.evidence.intervals import BOUND, HARDLY, NEUTRAL, ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
-from ee_dist.discrepancy.improve import BETTER, EXPLAINED
+from ee_dist.discrepancy.finished import BETTER, EXPLAINED
 from ee_dist.discrepancy.ladder import Twin
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.improve import BETTER, improve
+from ee_dist.discrepancy.finished import BETTER
+from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate, candidates
 from ee_dist.discrepancy.search.fit import fit_one

@@ -40,8 +40,8 @@ from ee_dist.discrepancy.accounts.ranges import (
 from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, ENDED, HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.discrepancy.explain import NOTHING_MISSING
+from ee_dist.discrepancy.finished import EXPLAINED
 from ee_dist.discrepancy.importance import Share, added, shares
-from ee_dist.discrepancy.improve import EXPLAINED
 from ee_dist.discrepancy.ladder import Improvement, Rung, Twin
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
