@@ -15,7 +15,8 @@ from ee_dist.engines.per_robot import per_robot
 from ee_dist.trials.log import SensorLog
 
 MODELS = 256
-"""Compiled structures kept for reuse (about 0.15 MB each), beyond which the longest unused are dropped."""
+"""Compiled structures kept for reuse (some 0.7 MB each, and 15 MB of a robot on a floor, most of which is never touched), beyond
+which the longest unused are dropped."""
 
 
 WORTH_A_THREAD = 32

@@ -47,6 +47,9 @@ UNUSED = (
 """Stages with nothing to do in these models. Auto-reset would hide a robot that left the finite numbers."""
 NOTHING_TO_TOUCH = _OFF.mjDSBL_CONTACT | _OFF.mjDSBL_CONSTRAINT | _OFF.mjDSBL_WARMSTART
 """Further ones of a robot without a floor: the same bits, for a sixth less."""
+ROOM, ROOM_A_SQUARE = 2**19, 64
+"""Bytes of working memory of such a robot, and more for each square of its joints; its steps take some hundred for each. Left to
+itself MuJoCo takes 14 MB for each of hundreds of models, as room for contacts that it cannot have."""
 ITERATIONS, LINE_SEARCH = 100, 50
 """Upper bounds, MuJoCo's own. Newton needs 3 or 4 iterations here and 13 at worst; a bound of 20 broke robots apart whose
 friction was stiff, and saved nothing."""
@@ -140,6 +143,7 @@ def _spec(robot: Robot) -> Any:
         spec.worldbody.add_geom(name="floor", type=plane, size=[0, 0, 1], contype=0, conaffinity=0)
     else:
         option.disableflags = option.disableflags | int(NOTHING_TO_TOUCH)
+        spec.memory = ROOM + ROOM_A_SQUARE * len(robot.joints) ** 2
         if not (stiff or robot.free_base):
             # Nothing to damp and no tumbling: the same bits, and one solve less.
             option.integrator = mujoco.mjtIntegrator.mjINT_EULER
