@@ -43,6 +43,7 @@ def trial_message(number: int, record: TrialRecord, units: Mapping[str, str]) ->
         motor_units=[units.get(name, "") for name in log.motor_names],
         recorded=[name for name in (*_TABLES, _SERIES) if getattr(log, name) is not None],
         travel_m=log.travel_m,
+        not_recorded=record.not_recorded,
     )
 
 
@@ -163,7 +164,8 @@ class TrialBuilder:
             travel_m=m.travel_m,
             **tables,
         )
-        return TrialRecord(m.index, m.name, m.source, _driver(m.driver), log, _terms(m.believed))
+        believed = _terms(m.believed)
+        return TrialRecord(m.index, m.name, m.source, _driver(m.driver), log, believed, tuple(m.not_recorded))
 
 
 def hypothesis_record(message: Any) -> HypothesisRecord:

@@ -26,7 +26,8 @@ class TrialRecord:
 
     A PREDICTION was made before the trial, by the model that the controller was chosen on; HINDSIGHT is the trial on the
     model of the diagnosis that followed it. ``name`` is for people ("intact", "after the change", "trial 1").
-    ``believed`` is the hypothesis behind a prediction or hindsight.
+    ``believed`` is the hypothesis behind a prediction or hindsight. ``not_recorded``: sensors that nobody recorded in it; the log
+    holds where they are taken to have stood.
     """
 
     index: int
@@ -35,6 +36,7 @@ class TrialRecord:
     driver: Network | Commands
     log: SensorLog
     believed: Hypothesis = ()
+    not_recorded: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,8 @@ def logs(draw: st.DrawFn) -> SensorLog:
 
 NETWORKS = st.lists(FLOATS, max_size=5).map(lambda w: Network(tuple(w)))
 COMMANDS = arrays(np.float64, st.tuples(st.integers(0, 3), st.integers(0, 3)), elements=FLOATS).map(Commands)
-TRIALS = st.builds(TrialRecord, WHOLE, TEXTS, st.sampled_from(SOURCES), NETWORKS | COMMANDS, logs(), TERMS)
+NAMES = st.lists(TEXTS, max_size=3).map(tuple)
+TRIALS = st.builds(TrialRecord, WHOLE, TEXTS, st.sampled_from(SOURCES), NETWORKS | COMMANDS, logs(), TERMS, NAMES)
 HYPOTHESES = st.builds(HypothesisRecord, WHOLE, WHOLE, WHOLE, TERMS, FLOATS, st.booleans())
 GENERATIONS = st.builds(GenerationRecord, st.sampled_from(PHASES), WHOLE, WHOLE, FLOATS, FLOATS, WHOLE, WHOLE, WHOLE)
 
