@@ -68,7 +68,7 @@ def last_word(problems: Sequence[Problem], models: Sequence[Hypothesis], fitted:
     before, after = map(error, residuals)
     left = tuple(leftovers(last, residuals[1]))
     changed = models[0] != models[1]
-    others = (*last.other_errors(*models if changed else models[:1]), *_elsewhere(last.channels, fitted))
+    others = (*last.other_errors(*models if changed else models[:1]), *_elsewhere(last.compared, fitted))
     farther = last.farther_off(models[0], models[1], after < before) if changed else ""
     return LastWord(last, before, after, last.noise_floor()[0], tuple(by_trial), left, changed, others, farther)
 

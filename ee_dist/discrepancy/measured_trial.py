@@ -68,6 +68,12 @@ class MeasuredTrial:
     """Whether commands go on by straight lines from row to row."""
     begun: Begun | None = None
     """Of a stretch from within a record, how it begins."""
+    not_recorded: frozenset[str] = frozenset()
+    """Sensors that nobody recorded in it: its log holds where they are taken to have stood, and nothing of that is compared."""
+
+    def recorded(self, robot: Robot) -> Array:
+        """(S,) which of a robot's channels were recorded."""
+        return np.array([s.name not in self.not_recorded for s in robot.sensors], dtype=bool)
 
     @property
     def real(self) -> bool:

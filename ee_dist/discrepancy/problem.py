@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.recorded import not_compared
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.effect import FAMILIES, Beside
 from ee_dist.robots.model import Robot
@@ -218,7 +219,8 @@ class Problem(ABC):
     @property
     def notes(self) -> list[str]:
         """What of these measurements is not compared, or not as it was recorded, and why: every verb says so."""
-        return [IN_STEPS] if any(t.hardware and t.commands_held is False for t in self.measured) else []
+        in_steps = any(t.hardware and t.commands_held is False for t in self.measured)
+        return [IN_STEPS] * in_steps + not_compared(self.measured, self.robot)
 
     @property
     def doubts(self) -> str:
@@ -296,6 +298,12 @@ class Problem(ABC):
     def sure(self) -> Array:
         """(n,) what of the floor is noise beyond doubt; less, where the floor is only known to be no higher."""
         return self.floor
+
+    @cached_property
+    def compared(self) -> tuple[str, ...]:
+        """The channels that a residual has values of: what nobody recorded in any of these trials is none of them."""
+        there = np.bincount(self.channel_of, minlength=len(self.channels)) > 0
+        return tuple(name for name, own in zip(self.channels, there, strict=True) if own)
 
     @cached_property
     def trial_of(self) -> Index:

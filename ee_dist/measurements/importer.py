@@ -121,8 +121,9 @@ class _Import:
             external=external,
             filled=self.on.filled(),
         )
-        record = TrialRecord(self.index, self.report.trial, HARDWARE, Commands(commands.copy()), log, self._settings())
-        return record, self.report
+        sent = Commands(commands.copy())
+        absent = self.stood.sensors
+        return TrialRecord(self.index, self.report.trial, HARDWARE, sent, log, self._settings(), absent), self.report
 
     def _name(self) -> str:
         if self.mapping.trial is None:

@@ -14,18 +14,16 @@ from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.table import Recorded, Table
 from ee_dist.robots.model import Robot
 
-COMPARED = (
-    "compared like what was read, so that errors over all rows are smaller than those of the joints that were recorded, and what "
-    "the model sags there counts"
-)
-"""What a channel that nobody recorded is in a comparison: this is not hidden from whoever reads its errors."""
+COMPARED = "nothing of it is compared there"
+"""What a channel that nobody recorded in a trial is in a comparison, as whoever reads its errors is told."""
 
 
 @dataclass(frozen=True)
 class Stood:
-    """The joints whose positions were not recorded in a trial, and a line on them for its report."""
+    """The joints whose positions were not recorded in a trial, all sensors that were not, and a line on them for its report."""
 
     joints: frozenset[str] = frozenset()
+    sensors: tuple[str, ...] = ()
     line: str = ""
 
 
@@ -59,8 +57,17 @@ def with_those_that_stood(trials: Sequence[Recorded], mapping: Mapping, robot: R
     found = []
     for k, trial in enumerate(trials):
         own = [(group, name, c) for group, name, c in held if (k, c.table, c.column) in absent]
+        if own and _read(mapping) <= {name for group, name, _ in own if group == "sensors"}:
+            raise MeasurementError(
+                f"{where}: sensors: none of their columns is in trial {quoted(trial.name)}, or all are empty: leave its file out"
+            )
         found.append((_filled(trial, [c for _, _, c in own]), _stood(own, robot)))
     return found
+
+
+def _read(mapping: Mapping) -> set[str]:
+    """The sensors that are read from columns."""
+    return {name for name, c in mapping.sensors.items() if isinstance(c, Column)}
 
 
 def _filled(trial: Recorded, columns: Sequence[Column]) -> Recorded:
@@ -90,7 +97,7 @@ def _stood(channels: Sequence[tuple[str, str, Column]], robot: Robot) -> Stood:
     others = [f"{group} {name}".strip() for group, name, _ in channels if _joint(group, name, robot) not in places]
     told = [f"{joint} at {place}" for joint, place in places.items()]
     line = f"not recorded in this trial, and taken to stand still: {listed([*told, *others])}; {COMPARED}"
-    return Stood(frozenset(places), line)
+    return Stood(frozenset(places), tuple(name for group, name, _ in channels if group == "sensors"), line)
 
 
 def _joint(group: str, name: str, robot: Robot) -> str:

@@ -269,6 +269,8 @@ def digest_of(records: list[TrialRecord]) -> str:
     total = hashlib.sha256()
     for r in records:
         total.update(repr((r.index, r.name, r.believed, r.log.sensor_names, r.log.motor_names)).encode())
+        if r.not_recorded:
+            total.update(repr(r.not_recorded).encode())
         log = r.log
         for values in (
             log.times_s, log.sensors, log.commands, log.joints, log.torques, log.supply_v, log.external, log.filled,

@@ -142,7 +142,7 @@ def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis, fi
     by the same measure, and their commands taken as those of what was ``fitted``."""
     models = (apart.model, terms)
     problems = [way.as_read(replace(apart, model=m), config, fitted).as_searched for m in models]
-    return last_word(problems, models, fitted.channels)
+    return last_word(problems, models, fitted.compared)
 
 
 def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:

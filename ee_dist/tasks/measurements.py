@@ -104,7 +104,18 @@ def load(config: Config) -> Measurements:
             log, hardware = checked(t.log, robot, f"{file}, {t.name}"), _hardware(run)
             between = run.metadata.get(BETWEEN, "")
             held_so = HELD_IF.get(between) if hardware else False
-            trials.append(MeasuredTrial(t.name, log, t.driver, setup, held_so, hardware, between == LINES))
+            trials.append(
+                MeasuredTrial(
+                    t.name,
+                    log,
+                    t.driver,
+                    setup,
+                    held_so,
+                    hardware,
+                    between == LINES,
+                    not_recorded=frozenset(t.not_recorded),
+                )
+            )
             names.append(TrialName(len(trials), file.stem, t.name))
             of_file.append(file)
     if not trials:

@@ -58,7 +58,16 @@ def test_a_mapping_says_where_a_joint_stood(tmp_path: Path) -> None:
         first.commands[:, 2], np.radians(5)
     )
     (told,) = [d for d in report.done if d.startswith("not recorded in this trial")]
-    assert f"{LEG[1]} at 5 deg" in told and LEG[0] not in told and "compared like what was read" in told
+    assert f"{LEG[1]} at 5 deg" in told and LEG[0] not in told and "nothing of it is compared there" in told
+
+
+def test_a_trial_of_which_nothing_was_recorded_is_refused(tmp_path: Path) -> None:
+    by_hand(tmp_path, mapped())
+    pd.DataFrame({"t_s": motion(0)["t_s"], "note": 1.0}).to_csv(tmp_path / "empty.csv", index=False)
+    files = [tmp_path / "a.csv", tmp_path / "b.csv", tmp_path / "c.csv", tmp_path / "empty.csv"]
+    said = r"map\.yaml: sensors: none of their columns is in trial 'empty', or all are empty: leave its file out"
+    with pytest.raises(MeasurementError, match=said):
+        import_files(files, read_mapping(tmp_path / "map.yaml"), load_robot(tmp_path / "chain.yaml")[0])
 
 
 def test_without_it_or_with_a_wrong_name_the_column_is_missing(tmp_path: Path) -> None:

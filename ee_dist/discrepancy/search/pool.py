@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates
 from ee_dist.effects.groups import JOIN
@@ -86,8 +87,13 @@ def _shown(problem: Problem, sensor: str) -> float:
     if robot.sensors[at].kind != "position":
         return 0.0
     low, high = robot.joint(robot.sensors[at].target).ends
-    read = np.concatenate([t.log.sensors[t.log.readings, at] for t in problem.measured])
+    read = np.concatenate([t.log.sensors[t.log.readings, at] for t in _with(problem, sensor)] or [np.zeros(1)])
     return float(np.ptp(np.quantile(read, [SELDOM, 1 - SELDOM]))) / (BEYOND_STOPS * (high - low))
+
+
+def _with(problem: Problem, *sensors: str) -> list[MeasuredTrial]:
+    """The trials in which these were recorded."""
+    return [t for t in problem.measured if t.not_recorded.isdisjoint(sensors)]
 
 
 def as_long(problem: Problem, c: Candidate) -> Candidate:
@@ -123,7 +129,7 @@ def _fastest(problem: Problem) -> dict[str, float]:
     for k, s in enumerate(problem.robot.sensors):
         if s.kind != "position":
             continue
-        for log in (t.log for t in problem.measured):
+        for log in (t.log for t in _with(problem, s.name)):
             read = log.readings
             if len(read) < 3:
                 continue
@@ -149,7 +155,8 @@ def _seen_at(problem: Problem, c: Candidate, named: bool) -> Candidate | None:
     asked for by name."""
     robot = problem.robot
     k, told, at = robot.motor_names.index(c.target), [], []
-    for log in (t.log for t in problem.measured):
+    positions = [s.name for s in robot.sensors if s.kind == "position" and s.target == c.target]
+    for log in (t.log for t in _with(problem, *positions)):
         if log.joints is None or len(log) < 2:
             continue
         late = round(robot.joint(c.target).lag_s / float(log.times_s[1] - log.times_s[0]))
@@ -168,7 +175,7 @@ def _hinted(problem: Problem, c: Candidate) -> Candidate:
     if c.effect.seen_in is None or c.target not in problem.robot.sensor_names:
         return c
     at = problem.robot.sensor_names.index(c.target)
-    read = [log.sensors[log.readings, at] for log in (t.log for t in problem.measured)]
+    read = [log.sensors[log.readings, at] for log in (t.log for t in _with(problem, c.target))]
     values = c.effect.shown_in(np.concatenate(read)) if read else {}
     if not values or not c.has(values):
         return c

@@ -54,7 +54,7 @@ def tell_of_all_trials(proposal: Proposal, files: Sequence[Path], places: Mappin
         proposal.notes.append(
             "not every trial has every joint: where one was not recorded it is taken to stand still where its own recording "
             f"begins, as far from its command as it usually is ({at}), an assumption: 'held' behind its columns says otherwise; "
-            f"it is {COMPARED}"
+            f"{COMPARED}"
         )
     left = [_column(c) for c in asked if _column(c) in places and c.group not in HELD]
     if left:

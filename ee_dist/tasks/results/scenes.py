@@ -111,8 +111,8 @@ def _finding(problem: Problem, where: Comparison, account: Account, model: Hypot
     mine = said(problem, MODEL, model)
     cases: list[drawn.Case] = []
     for name, trial, log in zip(names, problem.measured, mine.logs, strict=True):
-        measured = trial.log
-        if set(log.sensor_names) - set(measured.sensor_names):
+        measured = trial.log.without(trial.not_recorded) if trial.not_recorded else trial.log
+        if set(log.sensor_names) - set(trial.log.sensor_names):
             k = len(cases)
             own = {
                 problem.channels[s.channel]: replace(s, predicted=s.measured)

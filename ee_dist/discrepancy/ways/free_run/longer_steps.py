@@ -34,13 +34,14 @@ def moved_by(
     models: Callable[[int], Sequence[Robot]],
     columns: tuple[int, ...],
     evaluator: Evaluator,
-) -> Array:
-    """(rows, C) by how much positions differ that are foretold in steps of ``count`` rows and of one; ``models``: what is
-    simulated so many rows at a time, by trial."""
+) -> list[Array]:
+    """(rows, C) of each window: by how much positions differ that are foretold in steps of ``count`` rows and of one; ``models``:
+    what is simulated so many rows at a time, by trial."""
 
-    def foretold(some: Sequence[Piece], steps: int) -> Array:
+    def foretold(some: Sequence[Piece], steps: int) -> list[Array]:
         of_trial = models(steps)
         jobs = [Job(p.rollout(of_trial[p.trial], len(p.log), False), ToPositions(columns, p.rows)) for p in some]
-        return np.concatenate([np.asarray(found) for found in evaluator.evaluate(jobs)])
+        return [np.asarray(found) for found in evaluator.evaluate(jobs)]
 
-    return np.abs(foretold(windows, 1) - foretold([p.coarser(count) for p in windows], count))
+    fine, coarse = foretold(windows, 1), foretold([p.coarser(count) for p in windows], count)
+    return [np.abs(a - b) for a, b in zip(fine, coarse, strict=True)]

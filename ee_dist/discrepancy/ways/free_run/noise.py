@@ -23,15 +23,17 @@ def noiseless(robot: Robot) -> Robot:
     return replace(robot, sensors=tuple(replace(s, noise=0.0) for s in robot.sensors))
 
 
-def noise_by_unit(pieces: Sequence[Piece], robot: Robot, columns: Sequence[int]) -> dict[str, float]:
-    """``_noise`` of all channels of a unit, by unit."""
-    units = dict.fromkeys(robot.sensors[k].unit for k in columns)
+def noise_by_unit(pieces: Sequence[Piece], robot: Robot, columns: Sequence[Sequence[int]]) -> dict[str, float]:
+    """``_noise`` of all channels of a unit, by unit; ``columns``: the channels that were recorded in each trial."""
+    every = sorted({k for some in columns for k in some})
+    units = dict.fromkeys(robot.sensors[k].unit for k in every)
     found = {}
     for unit in units:
-        own = [k for k in columns if robot.sensors[k].unit == unit]
+        own = [k for k in every if robot.sensors[k].unit == unit]
         # Of one unit it is a scale and no more. Beside another it decides which of them counts.
         least = FINEST * np.mean([channel_range(robot, robot.sensors[k]) for k in own]) if len(units) > 1 else 0.0
-        found[unit] = max(float(np.mean([_noise(p, own) for p in pieces])), float(least), 1e-9)
+        each = [(p, [k for k in own if k in columns[p.trial]]) for p in pieces]
+        found[unit] = max(float(np.mean([_noise(p, some) for p, some in each if some])), float(least), 1e-9)
     return found
 
 

@@ -84,17 +84,24 @@ class FreeRun(Problem):
         columns = [k for k, s in enumerate(robot.sensors) if s.kind == "position"]
         if not columns:
             raise MeasurementError(f"{robot.name}: no sensor of kind 'position', which a free run is compared by")
+        self.own = tuple(np.flatnonzero(t.recorded(robot)[columns]) for t in self.measured)
+        """Of each trial, which of these were recorded: nothing is compared of others."""
+        if nothing := [t.name for t, own in zip(self.measured, self.own, strict=True) if not len(own)]:
+            raise MeasurementError(
+                f"trial {nothing[0]!r}: no position was recorded in it, which a free run is compared by; leave it out (trials=)"
+            )
         self.columns = tuple(columns)
         # What is predicted is the motion: noise of its sensors would count against every model.
         self.bare = noiseless(robot)
         self.pieces = [p for k, t in enumerate(trials) for p in pieces(k, t, robot, windows_s, every, steps)]
-        by_unit = noise_by_unit(self.pieces, robot, columns)
+        by_unit = noise_by_unit(self.pieces, robot, [[columns[c] for c in own] for own in self.own])
         if one_in > 1:
             self.pieces = thinned(self.pieces, one_in)
         if steps > 1:
             self.pieces = [p.coarser(steps) for p in self.pieces]
-        self.noise = np.array([by_unit[robot.sensors[k].unit] for k in columns])
-        """(C,) mean absolute error that noise alone would leave, in the unit of each channel."""
+        self.noise = np.array([by_unit.get(robot.sensors[k].unit, np.nan) for k in columns])
+        """(C,) mean absolute error that noise alone would leave, in the unit of each channel; NaN of units of which nobody
+        recorded any."""
         self._lay_out(BLOCKS if windows_s is None else 1)
         grown = self._by_start() if windows_s is not None else np.ones(1)
         if grown.mean() >= GROWN:
@@ -113,15 +120,15 @@ class FreeRun(Problem):
 
     def _lay_out(self, blocks: int) -> None:
         """Segments and places of all residual values. A trial's values carry equal weight in sum, whatever its length."""
-        width = len(self.columns)
-        rows = [len(p.rows) for p in self.pieces]
-        starts = np.concatenate([[0], np.cumsum(rows)]) * width
+        rows, channels = [len(p.rows) for p in self.pieces], [self.own[p.trial] for p in self.pieces]
+        starts = np.cumsum([0, *(count * len(own) for count, own in zip(rows, channels, strict=True))])
         self.slices = [slice(int(a), int(b)) for a, b in pairwise(starts)]
         names: list[str] = []
         of_trial: list[int] = []
         seg: list[Array] = []
         time: list[Array] = []
-        for p, count in zip(self.pieces, rows, strict=True):
+        for p, count, own in zip(self.pieces, rows, channels, strict=True):
+            width = len(own)
             block, at = p.window, p.start_s + p.times_s
             cut = int(block.max()) + 1
             if cut == 1:
@@ -131,7 +138,7 @@ class FreeRun(Problem):
             time.append(np.repeat(at, width))
             names += [f"{self.measured[p.trial].name}@{at[np.argmax(block == b)]:.1f}s" for b in range(cut)]
             of_trial += [p.trial] * cut
-        segment_of, size = np.concatenate(seg), sum(rows) * width
+        segment_of, size = np.concatenate(seg), int(starts[-1])
         trial_of = np.array(of_trial)[segment_of]
         values = np.bincount(trial_of)
         self.weight = (values[values > 0].mean() / np.maximum(values, 1))[trial_of]
@@ -140,7 +147,7 @@ class FreeRun(Problem):
             segments=tuple(names),
             trial_of_segment=np.array(of_trial),
             segment_of=segment_of,
-            channel_of=np.tile(np.arange(width), sum(rows)),
+            channel_of=np.concatenate([np.tile(own, count) for own, count in zip(channels, rows, strict=True)]),
             time_s=np.concatenate(time),
             reading=np.ones(size, dtype=bool),
             floor=self.weight.copy(),
@@ -172,10 +179,11 @@ class FreeRun(Problem):
         found = self.evaluator.evaluate(jobs)
         out = np.zeros((len(hypotheses), len(self.segment_of)))
         for place, i in enumerate(chosen):
-            measured = self.pieces[i].measured(self.columns)
+            measured, own = self.pieces[i].measured(self.columns), self.own[self.pieces[i].trial]
             gap = measured[None] - np.stack(found[place * len(hypotheses) : (place + 1) * len(hypotheses)])
+            gap = gap[..., own]
             with np.errstate(invalid="ignore"):
-                value = np.sign(gap) * np.sqrt(np.abs(gap) * (self.weight[self.slices[i].start] / self.noise))
+                value = np.sign(gap) * np.sqrt(np.abs(gap) * (self.weight[self.slices[i].start] / self.noise[own]))
             out[:, self.slices[i]] = np.where(np.isfinite(value), value, np.inf).reshape(len(hypotheses), -1)
         return out
 
@@ -183,24 +191,27 @@ class FreeRun(Problem):
         """(n,) by how much more than noise a perfect model would leave, for it starts from what was measured: where a motion is
         not stable, a pole that stands upright, what is wrong with that grows until the window ends. By the robot as it is
         described, a standard deviation beside each measured position and speed."""
-        jobs, count, positions = [], [], self._positions_off()
-        of_trial = [(self._simulated(k, ()), speeds_off(t, self.robot)) for k, t in enumerate(self.measured)]
+        jobs, count = [], []
+        of_trial = [
+            (self._simulated(k, ()), self._positions_off(k), speeds_off(t, self.robot))
+            for k, t in enumerate(self.measured)
+        ]
         for p in self.pieces:
-            model, speeds = of_trial[p.trial]
+            model, positions, speeds = of_trial[p.trial]
             beside = [p, *p.beside(positions, speeds)]
             jobs += [Job(b.rollout(model, len(p.log), False), ToPositions(self.columns, p.rows)) for b in beside]
             count.append(len(beside))
         found, grown = iter(self.evaluator.evaluate(jobs)), []
-        for many in count:
+        for p, many in zip(self.pieces, count, strict=True):
             own, *others = (np.asarray(next(found), dtype=float) for _ in range(many))
             with np.errstate(invalid="ignore", over="ignore"):
                 spread = np.sqrt(sum(((o - own) ** 2 for o in others), np.zeros_like(own))) * MEAN_ABSOLUTE / self.noise
-            grown.append(np.hypot(1.0, np.where(np.isfinite(spread), spread, 0.0)).ravel())
+            grown.append(np.hypot(1.0, np.where(np.isfinite(spread), spread, 0.0))[:, self.own[p.trial]].ravel())
         return np.concatenate(grown)
 
-    def _positions_off(self) -> Array:
-        """(M,) standard deviations of the joint positions that a simulation starts from."""
-        joints = {s.target: n for s, n in zip((self.robot.sensors[k] for k in self.columns), self.noise, strict=True)}
+    def _positions_off(self, trial: int) -> Array:
+        """(M,) standard deviations of the joint positions that a simulation of a trial starts from."""
+        joints = {self.robot.sensors[self.columns[c]].target: self.noise[c] for c in self.own[trial]}
         return np.array([joints.get(m, 0.0) / MEAN_ABSOLUTE for m in self.robot.motor_names])
 
     def _models(self, hypotheses: Sequence[Hypothesis], trials: Collection[int], steps: int) -> dict[int, list[Robot]]:
@@ -261,12 +272,13 @@ class FreeRun(Problem):
         gap = self.raw(self.residuals([hypothesis])[0])
         out = []
         for i, p in enumerate(self.pieces):
-            off = gap[self.slices[i]].reshape(-1, len(self.columns))
+            channels = self.own[p.trial].tolist()
+            off = gap[self.slices[i]].reshape(-1, len(channels))
             measured, times = p.measured(self.columns), p.start_s + p.times_s
             for own in p.stretches:
-                for c, unit in enumerate(self.layout.units):
+                for at, c in enumerate(channels):
                     read = measured[own, c]
-                    out.append(Series(p.trial, c, unit, times[own], read, read - off[own, c]))
+                    out.append(Series(p.trial, c, self.layout.units[c], times[own], read, read - off[own, at]))
         return out
 
     @cached_property
@@ -299,7 +311,9 @@ class FreeRun(Problem):
         count, trials = self.every, list(enumerate(self.measured))
         windows = [p for k, t in trials for p in pieces(k, t, self.robot, self.windows_s, count, count)]
         off = moved_by(windows, count, self._as_described, self.columns, self.evaluator)
-        return count if float(np.mean(off / self.noise)) <= SLIGHT * float(self.floor.mean()) else 1
+        own = [self.own[p.trial] for p in windows]
+        times = np.concatenate([(o / self.noise)[:, c].ravel() for o, c in zip(off, own, strict=True)])
+        return count if float(np.mean(times)) <= SLIGHT * float(self.floor.mean()) else 1
 
     def _as_described(self, steps: int) -> list[Robot]:
         """The robot of each trial that is simulated so many rows at a time."""
@@ -389,7 +403,7 @@ class FreeRun(Problem):
         """The error of a robot that stays where each window begins."""
         gap = np.concatenate(
             [
-                ((read - read[own.start]) / self.noise)[own].ravel() * self.weight[at.start]
+                ((read - read[own.start]) / self.noise)[own, self.own[p.trial]].ravel() * self.weight[at.start]
                 for p, at in zip(self.pieces, self.slices, strict=True)
                 for read in [p.measured(self.columns)]
                 for own in p.stretches

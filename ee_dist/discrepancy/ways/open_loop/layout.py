@@ -30,11 +30,12 @@ def lay_out(
     trial_of_segment: list[int] = []
     slices: list[slice] = []
     block, window = weights.block, weights.window
-    s, per = len(robot.sensors), window // block
+    per = window // block
     at = 0
     looped = any(isinstance(p.run.driver, Network) for p in parts)
     for k, (part, filled) in enumerate(zip(parts, imported, strict=True)):
-        rows = len(part.run.log.readings)
+        own, rows = weights.own[k], len(part.run.log.readings)
+        s = len(own)
         blocks, windows = rows // block, rows // window
         first = len(names)
         count = max(1, windows)
@@ -42,7 +43,7 @@ def lay_out(
         trial_of_segment += [part.trial] * count
         of_block = first + np.minimum(np.arange(blocks) // per, count - 1)
         seg += [np.repeat(of_block, s), np.repeat(first + np.arange(windows), 2 * s)]
-        chan += [np.tile(np.arange(s), blocks), np.tile(np.arange(s), 2 * windows)]
+        chan += [np.tile(own, blocks), np.tile(own, 2 * windows)]
         middle = _middles(robot, part, filled, block)
         time += [np.repeat(middle, s), np.repeat(_middles(robot, part, filled, window), 2 * s)]
         reading += [np.ones(blocks * s, dtype=bool), np.zeros(2 * windows * s, dtype=bool)]
@@ -52,7 +53,7 @@ def lay_out(
         if isinstance(part.run.driver, Network):
             m = len(robot.drives)
             seg.append(np.repeat(of_block, m))
-            chan.append(np.tile(s + np.arange(m), blocks))
+            chan.append(np.tile(len(robot.sensors) + np.arange(m), blocks))
             time.append(np.repeat(middle, m))
             reading.append(np.zeros(m * blocks, dtype=bool))
             floor.append(np.zeros(m * blocks))

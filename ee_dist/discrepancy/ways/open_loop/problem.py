@@ -18,6 +18,7 @@ import numpy as np
 from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
 from ee_dist.discrepancy.problem import EVENT, Index, Problem, Series
+from ee_dist.discrepancy.recorded import means_of, row_by_row
 from ee_dist.discrepancy.ways.open_loop.falls import fallen
 from ee_dist.discrepancy.ways.open_loop.in_units import InUnits, farther_off, in_units, told_in_units
 from ee_dist.discrepancy.ways.open_loop.layout import lay_out
@@ -130,7 +131,7 @@ class OpenLoop(Problem):
             for t, values, d in zip(trials, read, self._data, strict=True)
         ]
         if scale is None and self._touches_nothing:
-            self.scale = no_more_than_places(self.scale, robot, self._off(robot))
+            self.scale = no_more_than_places(self.scale, robot, *self._off(robot))
         self.weights = self._weighed(before)
         imported = [self.measured[p.trial].log.filled is not None for p in self.parts]
         self.layout, self.slices = lay_out(robot, self.parts, imported, self.weights, self.soft)
@@ -213,11 +214,12 @@ class OpenLoop(Problem):
             found._whole = self.whole
         return found
 
-    def _off(self, model: Robot) -> Array:
-        """(S,) root mean squares of what a model misses, in the units of the channels."""
+    def _off(self, model: Robot) -> tuple[Array, Array]:
+        """(S,) root mean squares of what a model misses, in the units of the channels, and (S,) which were recorded at all."""
         found = self.predictor.digests([(k, self._held([model], k)[0]) for k in range(len(self.parts))])
         gaps = [d.means.astype(float) - p.means for d, p in zip(self._data, found, strict=True)]
-        return np.asarray(np.sqrt(np.mean(np.concatenate(gaps) ** 2, axis=0)))
+        read = row_by_row(gaps, [p.run.recorded(self.robot) for p in self.parts])
+        return np.sqrt(means_of(np.concatenate(gaps) ** 2, read)), np.asarray(read.any(axis=0))
 
     def _weighed(self, before: Hypothesis) -> Weights:
         models = [apply(self.robot, before)]
@@ -231,7 +233,8 @@ class OpenLoop(Problem):
     def trust(self) -> tuple[float, ...]:
         quiet = np.array([s.kind != "touch" for s in self.robot.sensors])
         alone = self.scale.scale**2 / self.block
-        widened = np.array([float(np.mean((d**2 / alone)[:, quiet])) for d in self.weights.deviation])
+        each = zip(self.weights.deviation, self.weights.own, strict=True)
+        widened = np.array([float(np.mean((d**2 / alone)[:, own[quiet[own]]])) for d, own in each])
         of = np.array([p.trial for p in self.parts])
         return tuple(float(1.0 / np.mean(widened[of == k])) for k in range(len(self.measured)))
 
@@ -321,9 +324,9 @@ class OpenLoop(Problem):
         return held
 
     def _compare(self, part: int, predicted: Digest) -> Array:
-        measured = self._data[part]
+        measured, own = self._data[part], self.weights.own[part]
         if not predicted.finite:
-            return np.full(measured.means.size + 2 * measured.rough.size, np.inf)
+            return np.full((len(measured.means) + 2 * len(measured.rough)) * len(own), np.inf)
         shape = (measured.means.astype(float) - predicted.means) / self.weights.deviation[part]
         grain = (
             np.log((measured.rough + self.weights.tiny) / self.weights.rough(predicted))
@@ -331,7 +334,7 @@ class OpenLoop(Problem):
         )
         compared = np.array([x.kind not in self.weights.repeating for x in self.robot.sensors])
         texture = np.stack([grain, frozen(measured, predicted, self.window) * compared * self._moving[part]], axis=1)
-        return np.concatenate([soften(shape, self.soft).ravel(), soften(texture, self.soft).ravel()])
+        return np.concatenate([soften(v[..., own], self.soft).ravel() for v in (shape, texture)])
 
     def _command_residuals(self, trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
         sent = predicted_commands(trial, models)

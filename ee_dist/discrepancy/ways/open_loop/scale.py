@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.recorded import means_of
 from ee_dist.discrepancy.slow_noise import MEDIAN_OF_SQUARES, slow_noise, without_motion
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.robots.described import OF_JOINT
@@ -44,11 +45,12 @@ def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
     touch = np.array([s.kind == "touch" for s in robot.sensors])
     noise, source = declared, "declared by the sensors"
     if not declared.any():
-        between = _between_repeats(trials)
+        own = np.stack([t.recorded(robot) for t in trials])
+        between = _between_repeats(trials, own)
         if between is not None:
             noise, source = between, "measured: differences between repeated trials"
         else:
-            noise = np.sqrt(np.mean([_variance(t.log) for t in trials], axis=0))
+            noise = np.sqrt(means_of(np.stack([_variance(t.log) for t in trials]), own))
             seldom = any(t.log.filled is not None for t in trials)
             source = f"estimated: {'divided' if seldom else 'second'} differences of the logs"
     scale = np.maximum(noise, RESOLUTION * spans)
@@ -56,17 +58,19 @@ def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
     return Scale(noise, scale, scale, source)
 
 
-def no_more_than_places(scale: Scale, robot: Robot, off: Array) -> Scale:
+def no_more_than_places(scale: Scale, robot: Robot, off: Array, recorded: Array | None = None) -> Scale:
     """The scale by which speeds and torques count no more than the positions that are measured beside them. ``off``: (S,) root
-    mean squares by which the robot as described misses each channel, in its own unit.
+    mean squares by which the robot as described misses each channel, in its own unit; ``recorded``: (S,) which were recorded in
+    some trial, if not all.
 
     By shares of their ranges speeds count many times as much: what is late or too soft is quick, and a speed is off by
     it as many times more as it is quick. Then positions, for which people look at a model, decide nothing. Within what no model
     is better than positions ask for nothing more."""
     kinds = np.array([s.kind for s in robot.sensors])
-    places = np.isin(kinds, PLACES)
+    there = np.ones(len(kinds), dtype=bool) if recorded is None else recorded
+    places = np.isin(kinds, PLACES) & there
     seen = {s.target for s, place in zip(robot.sensors, places, strict=True) if place}
-    beside = np.isin(kinds, OF_JOINT) & ~places & np.array([s.target in seen for s in robot.sensors])
+    beside = np.isin(kinds, OF_JOINT) & ~places & there & np.array([s.target in seen for s in robot.sensors])
     if not beside.any() or not np.isfinite(off).all():
         return scale
     squares = (off / scale.least) ** 2
@@ -84,13 +88,18 @@ def _variance(log: SensorLog) -> Array:
     return slow_noise(log.times_s[log.readings], log.sensors[log.readings]) ** 2
 
 
-def _between_repeats(trials: Sequence[MeasuredTrial]) -> Array | None:
-    groups: dict[str, list[Array]] = {}
-    for t in trials:
-        groups.setdefault(t.name, []).append(t.log.sensors)
-    spread = []
-    for logs in groups.values():
-        if len(logs) > 1:
+def _between_repeats(trials: Sequence[MeasuredTrial], recorded: Array) -> Array | None:
+    """None where a channel that was ``recorded`` (trials, S) has no repeats."""
+    groups: dict[str, list[int]] = {}
+    for k, t in enumerate(trials):
+        groups.setdefault(t.name, []).append(k)
+    spread, known = [], []
+    for members in groups.values():
+        if len(members) > 1:
+            logs = [trials[k].log.sensors for k in members]
             rows = min(map(len, logs))
             spread.append(np.var(np.stack([g[:rows] for g in logs]), axis=0, ddof=1).mean(axis=0))
-    return np.sqrt(np.mean(spread, axis=0)) if spread else None
+            known.append(recorded[members].all(axis=0))
+    if not spread or (recorded.any(axis=0) & ~np.any(known, axis=0)).any():
+        return None
+    return np.sqrt(means_of(np.stack(spread), np.stack(known)))

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ee_dist.discrepancy.problem import Mask
+from ee_dist.discrepancy.recorded import means_of
 from ee_dist.discrepancy.ways.open_loop.prediction import Digest, block_sums
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -58,18 +59,20 @@ def frozen(measured: Digest, predicted: Digest, window: int) -> Array:
     return np.asarray((measured.repeated - predicted.repeated) / spread)
 
 
-def repeating(robot: Robot, pairs: Iterable[tuple[Digest, Digest, Mask]], window: int) -> frozenset[str]:
-    """Kinds of sensors most of which repeat readings as the model's do not, from (measured, predicted, where that tells) of each
-    trial."""
-    squares = [
-        np.mean(np.maximum(frozen(m, p, window) * tells, 0.0) ** 2, axis=0)
-        for m, p, tells in pairs
+def repeating(robot: Robot, trials: Iterable[tuple[Digest, Digest, Mask, Mask]], window: int) -> frozenset[str]:
+    """Kinds of sensors most of which repeat readings as the model's do not, from (measured, predicted, where that tells, which
+    channels were recorded) of each trial."""
+    found = [
+        (np.mean(np.maximum(frozen(m, p, window) * tells, 0.0) ** 2, axis=0), recorded)
+        for m, p, tells, recorded in trials
         if p.finite and len(p.repeated)
     ]
-    if not squares:
+    if not found:
         return frozenset()
-    odd = np.mean(squares, axis=0) > ODD**2
-    kinds = np.array([s.kind for s in robot.sensors])
+    squares, own = (np.stack(each) for each in zip(*found, strict=True))
+    there = own.any(axis=0)
+    odd = (means_of(squares, own) > ODD**2)[there]
+    kinds = np.array([s.kind for s in robot.sensors])[there]
     return frozenset(
         kind
         for kind in dict.fromkeys(kinds.tolist())

@@ -39,9 +39,10 @@ class Views:
         return np.asarray(self.soft * np.sinh(residual / self.soft))
 
     def blocks(self, part: int, residual: Array) -> Array:
-        """(R // block, S): the part of a residual (n,) that compares means, of one part with R readings."""
-        rows, s = self._rows(part) // self.block, len(self.robot.sensors)
-        return residual[self.slices[part]][: rows * s].reshape(rows, s)
+        """(R // block, S): the part of a residual (n,) that compares means, of one part with R readings; 0 of channels that were
+        not recorded."""
+        rows, s = self._rows(part) // self.block, len(self.weights.own[part])
+        return self._spread(part, residual[self.slices[part]][: rows * s].reshape(rows, s))
 
     def raw_blocks(self, part: int, residual: Array) -> Array:
         """The same before softening, in the units of the channels."""
@@ -49,16 +50,22 @@ class Views:
 
     def raw_grain(self, part: int, residual: Array) -> Array:
         """(R // window, S): differences of the log of roughness, before softening."""
-        rows, s = self._rows(part), len(self.robot.sensors)
+        rows, s = self._rows(part), len(self.weights.own[part])
         first, windows = rows // self.block * s, rows // self.window
         texture = residual[self.slices[part]][first : first + 2 * s * windows].reshape(windows, 2, s)[:, 0]
-        return np.asarray(self.smooth(texture) * self.weights.grain_deviation[part])
+        return np.asarray(self.smooth(self._spread(part, texture)) * self.weights.grain_deviation[part])
+
+    def _spread(self, part: int, values: Array) -> Array:
+        """(..., S) of the values (..., C) of the channels that were recorded in a part."""
+        out = np.zeros((len(values), len(self.robot.sensors)))
+        out[:, self.weights.own[part]] = values
+        return out
 
     def raw(self, residual: Array) -> Array:
         """(n,) in the units of the channels; NaN where the texture of a channel is compared."""
         out = np.full(len(residual), np.nan)
         for k, part in enumerate(self.slices):
-            values = self.raw_blocks(k, residual).ravel()
+            values = self.raw_blocks(k, residual)[:, self.weights.own[k]].ravel()
             out[part.start : part.start + len(values)] = values
             if isinstance(self.parts[k].run.driver, Network):
                 scale = command_scale(self.robot)
@@ -72,6 +79,8 @@ class Views:
         for k, part in enumerate(self.parts):
             if not np.isfinite(mine := residual[self.slices[k]]).all() or not mine.any():
                 continue
+            if channel not in self.weights.own[k]:
+                continue
             measured = self.data[k].means[:, channel].astype(float)
             log, of_blocks = part.run.log, len(measured) * self.block
             began = log.times_s[0] - (part.run.begun.after_s if part.run.begun else 0.0)
@@ -83,9 +92,10 @@ class Views:
     def series(self, predicted: Sequence[Array]) -> list[Series]:
         """Channel by channel, with what was ``predicted`` of each part, (T, S)."""
         out = []
-        for part, values in zip(self.parts, predicted, strict=True):
+        for part, values, own in zip(self.parts, predicted, self.weights.own, strict=True):
             log, read = part.run.log, part.run.log.readings
-            for c, sensor in enumerate(self.robot.sensors):
+            for c in own.tolist():
+                sensor = self.robot.sensors[c]
                 out.append(Series(part.trial, c, sensor.unit, log.times_s[read], log.sensors[read, c], values[read, c]))
         return out
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.discrepancy.recorded import medians_of, row_by_row
 from ee_dist.discrepancy.ways.open_loop.prediction import Digest, Predictor
 from ee_dist.discrepancy.ways.open_loop.scale import Scale
 from ee_dist.discrepancy.ways.open_loop.texture import repeating
@@ -55,6 +56,8 @@ class Weights:
     known: tuple[Array, ...]
     undeclared: Array
     repeating: frozenset[str]
+    own: tuple[Array, ...]
+    """Places of the channels that were recorded in each part: nothing is compared of others."""
 
     @property
     def tiny(self) -> Array:
@@ -77,6 +80,7 @@ class Weights:
         share = (noise / self.block + self.begun[part]) / off + left
         rough = _ROUGH_FLOOR * texture / grain_off
         grain = _ROUGH_FLOOR * noisy * pure / grain_off + rough
+        share, left, grain, rough = (values[:, self.own[part]] for values in (share, left, grain, rough))
         floor = [share.ravel() * _SOFT_FLOOR[soft], np.stack([grain, np.zeros_like(grain)], axis=1).ravel()]
         return floor, [left.ravel() * _SOFT_FLOOR[soft], np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
 
@@ -95,8 +99,9 @@ def weigh(
     pairs = [(k, m) for k, models in enumerate(held) for m in models]
     found = predictor.digests(pairs)
     first = found[::count]
-    repeats = repeating(robot, zip(data, first, moving, strict=True), window)
-    undeclared, tiny = _rougher(robot, scale, data, first), _tiny(scale)
+    recorded = [t.recorded(robot) for t in predictor.trials]
+    repeats = repeating(robot, zip(data, first, moving, recorded, strict=True), window)
+    undeclared, tiny = _rougher(robot, scale, data, first, recorded), _tiny(scale)
     begun = tuple(predictor.by_start(k, m) for k, m in pairs[::count])
     deviation, grain_deviation = [], []
     for k in range(len(held)):
@@ -111,7 +116,7 @@ def weigh(
         deviation.append(np.sqrt(noise + _held_up(spread)))
         grain_deviation.append(np.sqrt(_by_luck(window) + known[k][1] + _held_up(grain)))
     settled = tuple(deviation), tuple(grain_deviation), begun, tuple(known), undeclared, repeats
-    return Weights(scale, block, window, *settled)
+    return Weights(scale, block, window, *settled, tuple(map(np.flatnonzero, recorded)))
 
 
 def _tiny(scale: Scale) -> Array:
@@ -135,15 +140,17 @@ def _held_up(spread: Array) -> Array:
     return np.asarray(np.maximum(spread, (padded[:-2] + spread + padded[2:]) / 3.0))
 
 
-def _rougher(robot: Robot, scale: Scale, data: Sequence[Digest], predicted: Sequence[Digest]) -> Array:
+def _rougher(
+    robot: Robot, scale: Scale, data: Sequence[Digest], predicted: Sequence[Digest], recorded: Sequence[Array]
+) -> Array:
     """(S,) variance of noise where none is declared: by how much channels are rougher than the model's, and no more than
     others of their kind, so that a sensor that is noisier than they are stands out."""
     kinds = np.array([s.kind for s in robot.sensors])
     if any(s.noise for s in robot.sensors) or not all(p.finite for p in predicted):
         return np.zeros(len(kinds))
-    more = np.concatenate([d.rough.astype(float) - p.rough for d, p in zip(data, predicted, strict=True)])
-    own = np.clip(np.median(more, axis=0), 0.0, scale.noise**2) if len(more) else np.zeros(len(kinds))
-    usual = {
-        kind: np.median(own[kinds == kind]) if (kinds == kind).sum() > 2 else own[kinds == kind].min() for kind in kinds
-    }
+    each = [d.rough.astype(float) - p.rough for d, p in zip(data, predicted, strict=True)]
+    more, read, there = np.concatenate(each), row_by_row(each, recorded), np.any(recorded, axis=0)
+    own = np.clip(medians_of(more, read), 0.0, scale.noise**2) if len(more) else np.zeros(len(kinds))
+    alike = {kind: own[there & (kinds == kind)] for kind in kinds}
+    usual = {kind: np.median(some) if len(some) > 2 else some.min(initial=np.inf) for kind, some in alike.items()}
     return np.minimum(own, [usual[kind] for kind in kinds])
