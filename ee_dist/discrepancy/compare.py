@@ -94,6 +94,13 @@ def heat(problem: Problem, residual: Array) -> Array:
     return _rms(problem, residual, problem.segment_of, problem.trial_of_segment)
 
 
+def has_values(problem: Problem) -> Array:
+    """(segments, channels) whether anything was compared there."""
+    cell = problem.segment_of * len(problem.channels) + problem.channel_of
+    count = np.bincount(cell, minlength=len(problem.segments) * len(problem.channels))
+    return np.asarray(count.reshape(len(problem.segments), -1) > 0)
+
+
 def by_trial(problem: Problem, residual: Array) -> Array:
     """(trials, channels) root mean square of a residual (n,), each by the weight of its trial; zero where there is no value."""
     return _rms(problem, residual, problem.trial_of, np.arange(len(problem.trials)))

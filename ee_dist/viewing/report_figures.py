@@ -86,11 +86,12 @@ def heat_map(
     titles: Sequence[str] = ("model", "improved model"),
     label: str = "error (standard deviations)",
 ) -> go.Figure:
-    """(segments, channels) errors, one table or two below each other; what ``floor`` noise leaves is near the background."""
+    """(segments, channels) errors, one table or two below each other; what ``floor`` noise leaves is near the background, and NaN
+    has no colour."""
     every = range(tables[0].shape[1])
     # Without noise a right model may leave nothing at all: then all rows are shown, and none stands out.
-    shown = [k for k in every if any(t[:, k].any() for t in tables)] or [*every]
-    top = max(4.0 * floor, float(np.quantile(tables[0][:, shown], 0.98)))
+    shown = [k for k in every if any(np.nan_to_num(t[:, k]).any() for t in tables)] or [*every]
+    top = max(4.0 * floor, float(np.nanquantile(tables[0][:, shown], 0.98)))
     named = list(titles) if len(tables) > 1 else None
     # Room for a title between two tables, however few rows they have.
     tall = 17 * max(len(shown), 3)
@@ -103,6 +104,7 @@ def heat_map(
                 x=list(segments),
                 y=[channels[k].replace("_", " ") for k in shown],
                 coloraxis="coloraxis",
+                hoverongaps=False,
                 hovertemplate="%{y}<br>%{x}<br>%{z:.3g}<extra></extra>",
             ),
             row=row,

@@ -17,6 +17,7 @@ from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig, RobotCon
 from ee_dist.tasks.import_ import Options, run
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.results import scenes
+from ee_dist.tasks.results.sections import heat_section
 from ee_dist.tasks.ways import WAYS
 
 JOINTS = ("hip", "knee")
@@ -80,3 +81,11 @@ def test_a_scene_draws_what_was_recorded(config: Config, monkeypatch: pytest.Mon
     found = compare(problem, problem.residuals([()])[0])
     scenes.compare_scene(problem, found, compare_account(problem, found, []), (), tmp_path / "a.rrd")
     assert [c.measured.sensor_names for c in drawn[0].cases] == [("position_hip",), ("position_knee",)]
+
+
+def test_a_heat_map_has_no_colour_where_nothing_was_recorded(config: Config) -> None:
+    problem = WAYS["open_loop"].make(load(config), config)
+    figure = heat_section(problem, problem.residuals([()])[0]).figure
+    assert figure is not None
+    blank = np.isnan(np.array(figure.data[0].z, dtype=float))
+    np.testing.assert_array_equal(blank, np.stack([problem.trial_of_segment != k for k in range(2)]))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.discrepancy.accounts.of_explain import shown_gain, told_gain
-from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, heat, span_of, trial_name
+from ee_dist.discrepancy.compare import Comparison, by_trial, circumstances, has_values, heat, span_of, trial_name
 from ee_dist.discrepancy.compare import rows_of as rows_at
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.last_word import HELD_APART, LastWord
@@ -131,7 +131,9 @@ def heat_section(problem: Problem, residual: Array, after: Array | None = None) 
         "Each cell is the error of one channel in one window of time. What is near the background is noise, red is what the "
         "model gets wrong."
     )
-    tables = [drawn(problem, heat(problem, r)) for r in (residual, after) if r is not None]
+    there = has_values(problem)
+    # Where nobody recorded anything the model is neither right nor wrong: no colour.
+    tables = [np.where(there, drawn(problem, heat(problem, r)), np.nan) for r in (residual, after) if r is not None]
     figure = figures.heat_map(
         tables, unique, problem.channels, drawn(problem, 1.0), (MODEL, IMPROVED), axis_of(problem)
     )
