@@ -7,10 +7,12 @@ from itertools import zip_longest
 from pathlib import Path
 
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.readers import kind_of
+from ee_dist.measurements.readers import kind_of, read
 from ee_dist.measurements.readers.json_rows import read_json
 from ee_dist.measurements.readers.options import Options
 
+PROSE = ".txt"
+"""The suffix of tables, and of notes."""
 DEEPEST = 4
 """Folders below the one that was named in which files are looked for."""
 
@@ -29,11 +31,24 @@ def recordings_in(folder: Path, kind: str | None = None) -> tuple[list[Path], li
     if loose:
         more = f" and {len(loose) - 1} more" if len(loose) > 1 else ""
         notes.append(f"{loose[0].name}{more} left out: no rows in it")
+    if len({f.suffix.lower() for f in found} - {PROSE, ".json"}):
+        prose = {f: why for f in found if f.suffix.lower() == PROSE and (why := _no_table(f))}
+        notes += [f"{f.name} left out: {why}" for f, why in prose.items()]
+        loose += prose
     return [f for f in found if f not in loose], notes
 
 
 def _those(folder: Path, kind: str | None) -> list[Path]:
     return sorted(f for f in folder.iterdir() if kind_of(f) is not None and kind in (None, kind_of(f)))
+
+
+def _no_table(file: Path) -> str:
+    """Why a text beside recordings of another kind is none itself, but what people write about them; empty: it is one."""
+    try:
+        read(file)
+    except MeasurementError as error:
+        return str(error).removeprefix(f"{file}: ")
+    return ""
 
 
 def _has_rows(file: Path) -> bool:

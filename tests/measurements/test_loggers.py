@@ -145,6 +145,19 @@ def test_a_folder_for_each_run(tmp_path: Path) -> None:
     assert not np.array_equal(found[0][0].log.sensors, found[1][0].log.sensors)
 
 
+def test_what_people_wrote_beside_their_tables_is_left_out_and_told(tmp_path: Path) -> None:
+    telemetry(0).to_csv(tmp_path / "sine.csv", index=False)
+    telemetry(1).to_csv(tmp_path / "step.txt", index=False)
+    (tmp_path / "notes.txt").write_text(
+        "The elbow was greased.\n\nGains: 350, 20\nThen, on Monday, again, but colder\n"
+    )
+    files, notes = recordings_in(tmp_path)
+    assert [f.name for f in files] == ["sine.csv", "step.txt"]
+    assert len(notes) == 1 and notes[0].startswith("notes.txt left out: ")
+    (tmp_path / "sine.csv").unlink()
+    assert len(recordings_in(tmp_path)[0]) == 2, "where all end so, one that cannot be read is told when it is read"
+
+
 def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
     names = runs(tmp_path)
     files = sorted(tmp_path.rglob("telemetry.csv"))
