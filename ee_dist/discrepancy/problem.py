@@ -300,6 +300,12 @@ class Problem(ABC):
         return self.floor
 
     @cached_property
+    def curves(self) -> tuple[tuple[int, str], ...]:
+        """The trials, and the channels of each, that a residual has values of."""
+        there = np.unique(self.trial_of * len(self.channels) + self.channel_of)
+        return tuple((int(k) // len(self.channels), self.channels[int(k) % len(self.channels)]) for k in there)
+
+    @cached_property
     def compared(self) -> tuple[str, ...]:
         """The channels that a residual has values of: what nobody recorded in any of these trials is none of them."""
         there = np.bincount(self.channel_of, minlength=len(self.channels)) > 0

@@ -187,6 +187,7 @@ def compared(error: float, left: list[Leftover]) -> Account:
         notes=[],
         doubts="",
         channels=("a_b", "command_b"),
+        curves=((0, "a_b"), (0, "command_b")),
         trials=("sway",),
     )
     return compare_account(problem, found, left)  # type: ignore[arg-type]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from ee_dist.basics.names import counted
 from ee_dist.discrepancy.accounts.account import (
     CONTENT,
@@ -55,8 +53,7 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     # A channel that agrees to the last digit is a command that no sensor comes into: there is nothing to compare.
     compared = [c for c in found.channels if c.normalised > 0] or found.channels
     names = {c.name for c in compared}
-    there = np.unique(problem.trial_of * len(problem.channels) + problem.channel_of) % len(problem.channels)
-    places = counted(sum(problem.channels[c] in names for c in there), "curve")
+    places = counted(sum(channel in names for _, channel in problem.curves), "curve")
     of = f"{places} ({counted(len(compared), 'channel')} in {counted(len(problem.trials), 'trial')})"
     sure = (
         f"How sure: {curves_of(left)} of {of} differ{'s' if curves_of(left) == 1 else ''} by more than noise"
