@@ -62,12 +62,10 @@ def finished(
         told = [replace(p, term=p.term + len(search.fixed)) for p in reports]
         worth = worth_of(problem, fit, base)
     before, after = ladder[0].error_heldout, ladder[-1].error_heldout
-    above = before**2 - floor**2
-    share = (before**2 - max(after, floor) ** 2) / above if above > 0 else 0.0
     verdict = _verdict(len(ladder) > 1 or bool(current.parts), left, after, floor)
     return Improvement(
         verdict,
-        share,
+        taken_off(before, after, floor),
         ladder,
         terms,
         told,
@@ -83,6 +81,12 @@ def finished(
         twins=twins,
         judged_on=ladder[-1].held_out,
     )
+
+
+def taken_off(before: float, after: float, floor: float) -> float:
+    """The share of the squared error above the noise that went."""
+    above = before**2 - floor**2
+    return (before**2 - max(after, floor) ** 2) / above if above > 0 else 0.0
 
 
 def _verdict(changed: bool, left: Sequence[Leftover], error_after: float, floor: float) -> str:

@@ -308,8 +308,8 @@ class Problem(ABC):
     @cached_property
     def compared(self) -> tuple[str, ...]:
         """The channels that a residual has values of: what nobody recorded in any of these trials is none of them."""
-        there = np.bincount(self.channel_of, minlength=len(self.channels)) > 0
-        return tuple(name for name, own in zip(self.channels, there, strict=True) if own)
+        there = {channel for _, channel in self.curves}
+        return tuple(name for name in self.channels if name in there)
 
     @cached_property
     def trial_of(self) -> Index:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.discrepancy.evidence.left import leftovers, settled
-from ee_dist.discrepancy.finished import BETTER, EXPLAINED
+from ee_dist.discrepancy.finished import BETTER, EXPLAINED, taken_off
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem, error
@@ -49,5 +49,4 @@ def _on_all_rows(found: Improvement, whole: Problem) -> Improvement:
 
 def share(before: float, after: float, floor: float) -> float:
     """Of the squared error above the noise that went; NaN where hardly any was."""
-    above = before**2 - floor**2
-    return (before**2 - max(after, floor) ** 2) / above if before > TELLING * floor else float("nan")
+    return taken_off(before, after, floor) if before > TELLING * floor else float("nan")
