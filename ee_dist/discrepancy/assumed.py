@@ -51,6 +51,10 @@ single effect leads away from: soft gains sag. So they are looked for with most 
 LATE, LATER = "command_delay", (0.3, 0.7)
 """What passes between a command and a controller that nobody knows is not known either; a soft one looks late too, and leads
 away from a stiff one that is. So they are looked for with a delay, from these shares of the lag that joints were seen to have,"""
+AHEAD, SOONER = "speed_feed_forward", 0.5
+"""A controller that knows how fast its goal goes follows sooner than its damping would let it; a guess that does not know it
+comes to gains many times too stiff. Where joints were seen to follow within this share of the lag that was guessed at, it is
+looked for so, too, and found so, also where it takes off less, where a guess ended at its bound otherwise and does not so,"""
 LESS = 0.9
 """and found so where that leaves less than this share of what is above the noise otherwise."""
 LEAST, MOST = -0.7, 1.0
@@ -104,6 +108,12 @@ def assumed_drives(
             best, u, energy = other
     late = tuple(as_slow(search.problem, c) for c in _at(robot, LATE, joints) if LATE in names and c.name not in taken)
     alone = _farther(search, best, u, energy)
+    ahead = _at(robot, AHEAD, joints) if AHEAD in names and _sooner(robot, joints) else []
+    if ahead and ahead[0].name not in taken:
+        other = _farther(search, *_fitted(search, joints, (*best, *ahead)))
+        less = 1.0 if _ended(*alone[:2]) and not _ended(*other[:2]) else LESS
+        if other[2] - noise < less * (alone[2] - noise):
+            best, alone = (*best, *ahead), other
     if late and _lag(robot, joints):
         other = _farther(search, *_fitted(search, joints, (*best, *late)))
         alone = other if other[2] - noise < LESS * (alone[2] - noise) else alone
@@ -120,9 +130,7 @@ def _farther(
     somebody would who wrote that into the description. Kept where it takes much off what is left."""
     noise = float(search.problem.floor[search.everything].sum())
     for _ in range(AGAIN):
-        if energy <= NEAR**2 * noise or not any(
-            _ends(c, u[at]) for c, at in zip(parts, Model(parts).places, strict=True)
-        ):
+        if energy <= NEAR**2 * noise or not _ended(parts, u):
             break
         terms = Model(parts).hypothesis(u)
         robot = apply(search.problem.robot, terms)
@@ -132,6 +140,11 @@ def _farther(
             break
         parts, u, energy = wider, fit.u, fit.energy
     return parts, u, energy
+
+
+def _ended(parts: Sequence[Candidate], u: Array) -> bool:
+    """Whether one of the parts did so."""
+    return any(_ends(c, u[at]) for c, at in zip(parts, Model(tuple(parts)).places, strict=True))
 
 
 def _ends(c: Candidate, u: Array) -> bool:
@@ -182,7 +195,7 @@ def puts_right(robot: Robot, c: Candidate) -> bool:
     """Whether it is one of these effects, at joints whose gains were assumed; or one value for all of whatever was assumed."""
     at = {*(c.members(robot) or (c.target,))}
     assumed = {*robot.assumed_joints("kp")}
-    if c.effect.name == LATE:
+    if c.effect.name in (LATE, AHEAD):
         return at == assumed
     return c.effect.guesses_at(robot, c.target) or (c.effect.name in TOGETHER and at <= assumed)
 
@@ -229,6 +242,12 @@ def _lag(robot: Robot, joints: Sequence[str]) -> float:
     return float(np.median([robot.joint(j).lag_s for j in joints]))
 
 
+def _sooner(robot: Robot, joints: Sequence[str]) -> bool:
+    """Whether most of the joints were seen to follow much sooner than the damping that was guessed at lets them."""
+    guessed = float(np.median([d.kd / d.kp if d.kp > 0 else 0.0 for d in (drive_of(robot, j) for j in joints)]))
+    return _lag(robot, joints) < SOONER * guessed
+
+
 def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
     """A grid: damping falls with the gain, so that a joint follows as fast, or is what makes it as late as it was seen to be,
     and friction holds as large an error. Rotors are as assumed, or fall with the gain too: who took a motor for ten times as
@@ -253,6 +272,7 @@ def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
             "coulomb_friction": apart * gain * stiffness,
             LATE: delay,
             CARRIED: MUCH,
+            AHEAD: 1.0,
         }
         mains = [(c, c.effect.main) for c in model.parts]
         u = [c.shares({p.name: values.get(c.effect.name, p.neutral)}) for c, p in mains]

@@ -187,6 +187,29 @@ def test_weight_that_controllers_carry_is_found_with_them() -> None:
     assert "weight_carried" not in {c.effect.name for c in other.parts}
 
 
+@pytest.mark.parametrize("knows", [True, False])
+def test_a_controller_that_knows_how_fast_its_goal_goes_is_no_stiffer_one(knows: bool) -> None:
+    """Guessed at as one that does not, it would be ever so much stiffer; one that does not know it is told so neither."""
+    sample = samples()["arm"]
+    friction = tuple(term("coulomb_friction", j, torque_nm=0.05) for j in sample.robot.motor_names)
+    hidden = (*((term("speed_feed_forward", "all_joints", share=1.0),) if knows else ()), *friction)
+    trials = measure(sample, hidden)
+    guess = tuple(replace(d, kp=d.kp / 2, kd=3 * d.kd) for d in sample.robot.drives)
+    described = replace(sample.robot, drives=guess, assumed=tuple((d.joint, f) for d in guess for f in ("kp", "kd")))
+    problem = problem_by("open_loop", trials, with_lags(described, trials))
+    pool = candidates(problem.robot, without=["weight_carried"])
+    proposal, u = assumed_drives(Search(problem), pool) or pytest.fail("nothing was proposed")
+    terms = Model(proposal.parts).hypothesis(u)
+    found = {t.effect: dict(t.values) for t in terms}
+    assert ("speed_feed_forward" in found) == knows
+    assert found["position_gain"]["factor"] == pytest.approx(2.0, rel=0.15)
+    if knows:
+        assert found["speed_feed_forward"]["share"] == pytest.approx(1.0, abs=0.1)
+        assert all(puts_right(problem.robot, c) for c in proposal.parts)
+    as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
+    assert better < 0.2 * as_it_is
+
+
 def test_no_motor_is_called_weak_beside_a_guess() -> None:
     """A torque is too small only beside one that somebody knew: with guessed gains it is these that are wrong."""
     robot = samples()["arm"].robot

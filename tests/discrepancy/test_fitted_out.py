@@ -44,10 +44,12 @@ def test_precise_data_are_fitted_down_to_their_noise() -> None:
     assert fit.energy < 1.1 * problem.floor.sum()
 
 
-def held_out(problem: Linear, residual: Array, whole: bool, parts: tuple[Candidate, ...] = ()) -> HeldOut:
+def held_out(
+    problem: Linear, residual: Array, whole: bool, parts: tuple[Candidate, ...] = (), at: float = 0.1
+) -> HeldOut:
     cut = travelling(problem)[0] if whole else windows(problem)
     everywhere = np.ones(len(residual), dtype=bool)
-    fit = Fit(Model(parts), np.full(len(parts), 0.1), 1.0, residual, np.ones((len(residual), len(parts))), everywhere)
+    fit = Fit(Model(parts), np.full(len(parts), at), 1.0, residual, np.ones((len(residual), len(parts))), everywhere)
     return HeldOut(cut, residual, 1.0, (fit,))
 
 
@@ -87,18 +89,31 @@ def test_of_a_single_motion_what_comes_in_anothers_place_is_worth_as_much_as_any
     assert surely_better(problem, one, other, 100), "of what was weighed before it is enough"
 
 
-@pytest.mark.parametrize(("fuller", "first"), [(6.0, 2), (9.5, 1)])
-def test_the_same_law_with_a_further_term_goes_first_where_it_takes_a_fifth(fuller: float, first: int) -> None:
+@pytest.mark.parametrize(
+    ("fuller", "ends", "first"),
+    [
+        (6.0, (False, False), 2),
+        (9.0, (False, False), 1),
+        (9.0, (True, False), 2),
+        (9.0, (True, True), 1),
+        (9.5, (True, False), 1),
+    ],
+)
+def test_the_same_law_with_a_further_term_goes_first_where_it_takes_a_fifth(
+    fuller: float, ends: tuple[bool, bool], first: int
+) -> None:
+    """Or less than that, where the law alone ended as far as it may go, and with the term it does not."""
     problem = Linear((), motions=4)
     unit = np.sign(problem.data)
-    other = candidate(ROBOT, "motor_weak", "hip_rear_left")
+    dry, other = (candidate(ROBOT, "coulomb_friction", j) for j in ("knee_front_left", "hip_rear_left"))
     base, simple = 20.0 * unit, 10.0 * unit
     # One motion is worse with it, so that the two are tied.
     worse = np.where(problem.trial_of == 0, 12.0, fuller) * unit
-    models = [Proposal((WEAK,)), Proposal((WEAK, other))]
+    models = [Proposal((dry,)), Proposal((dry, other))]
+    ((_, most),) = dry.bounds
     found = [
-        judge(problem, base, held_out(problem, r, True, p.parts), p, Model(p.parts), 10)
-        for p, r in zip(models, (simple, worse), strict=True)
+        judge(problem, base, held_out(problem, r, True, p.parts, most if end else 0.1), p, Model(p.parts), 10)
+        for p, r, end in zip(models, (simple, worse), ends, strict=True)
     ]
     order = ranked(found)
     assert len(order[0].proposal.parts) == first

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ee_dist.discrepancy.evidence.holdout import WINDOWS, HeldOut, bootstrap
-from ee_dist.discrepancy.evidence.intervals import half_widths
+from ee_dist.discrepancy.evidence.intervals import BOUND, at_bound, half_widths
 from ee_dist.discrepancy.evidence.rule import (
     NEAR,
     NOTHING,
@@ -281,10 +281,23 @@ def _left(j: Judged) -> float:
 
 def _fuller(j: Judged, first: Judged) -> bool:
     """Whether it is the same and more, and takes off a part of what that leaves. With a handful of motions nothing is sure: the
-    further term may be none, and yet foretells better on the whole."""
-    if not j.earned or not contains(j, first):
+    further term may be none, and yet foretells better on the whole. However little it takes off where the other ended at the end
+    of its range, and it does not: that range is too small, or the effect is another."""
+    if not j.earned or not contains(j, first) or float(first.held.sum()) <= NEAR**2 * first.sure:
         return False
-    return float(first.held.sum()) > NEAR**2 * first.sure and _left(j) <= FULLER * _left(first)
+    share = 1.0 if _at_its_end(first) and not _at_its_end(j) else FULLER
+    return _left(j) <= share * _left(first)
+
+
+def _at_its_end(j: Judged) -> bool:
+    """Whether a value of the proposal ended where it may not go farther, in some turn."""
+    return any(
+        at_bound(c, k, float(u)) == BOUND
+        for fit in j.outcome.fits
+        for c, place in zip(fit.model.parts, fit.model.places, strict=True)
+        if c in j.proposal.parts
+        for k, u in enumerate(fit.u[place])
+    )
 
 
 def _as_few_do_more(one: Judged, guess: Judged) -> bool:
