@@ -187,7 +187,7 @@ class _Look:
         if alone is None or alone.held > FAR**2 * float(problem.floor.sum()):
             # Of a hundred values each may be worth no more than luck, where one number for all joints is worth much.
             few = shared(problem.robot, self._everywhere(base))
-            other = self._fit(base, few, None if alone is None else (fit, alone.held))
+            other = self._fit(base, few, than + self.luck(than), None if alone is None else (fit, alone.held))
             together = self._worth(other, {}, than) if other is not None else None
             if other is not None and together is not None and (alone is None or together.held < alone.held):
                 alone, fit, single = together, other, base
@@ -202,10 +202,16 @@ class _Look:
     def _everywhere(self, base: Current) -> list[Candidate]:
         return [c for c in self._others(Model(base.parts)) if c.effect.everywhere]
 
-    def _fit(self, base: Current, few: Sequence[Candidate], beside_it: tuple[Fit, float] | None = None) -> Fit | None:
+    def _fit(
+        self,
+        base: Current,
+        few: Sequence[Candidate],
+        wanted: float = np.inf,
+        beside_it: tuple[Fit, float] | None = None,
+    ) -> Fit | None:
         """The base with all ``few`` that leave marks of their own, from neutral; None where these are too few to be fitted at
-        once, or, by the trial that tells most alone, leave more of it than another fit did of what was held out
-        (``beside_it``: that fit, and its energy on all held-out data)."""
+        once, or leave more of what they are fitted to than is ``wanted``, or than another fit did of what was held out
+        (``beside_it``: that fit, and its energy on all held-out data), by the trial that tells most alone or by all of them."""
         robot = self.search.problem.robot
         few = distinct(self.calm, base, beside(robot, base.parts, base.hypothesis, few))
         if not few or len(base.parts) + len(few) < FEWEST:
@@ -216,17 +222,23 @@ class _Look:
             best, held = beside_it
             one = telling_values(self.search.problem, best.residual, best.mask)
             share = float((best.residual[one] ** 2).sum()) / best.energy
-            (first,) = follow_valley(self.calm, [(model, u)], one, PRIOR, widths=widths)
+            (first,) = follow_valley(self.calm, [(model, u)], one, PRIOR, widths=widths, wanted=share * held)
             if first.energy > share * held:
                 return None
-        (fit,) = follow_valley(self.brief, [(model, u)], self.brief.everything, PRIOR, widths=widths)
-        return self._on_all_of_it(over_ridges(self.brief, fit, PRIOR))
+            wanted = min(wanted, held)
+        # Of the beginnings alone nobody knows what they may leave.
+        enough = wanted if self.brief is self.calm else np.inf
+        (fit,) = follow_valley(self.brief, [(model, u)], self.brief.everything, PRIOR, widths=widths, wanted=enough)
+        if fit.energy > enough:
+            return None
+        return self._on_all_of_it(over_ridges(self.brief, fit, PRIOR), wanted)
 
-    def _on_all_of_it(self, fit: Fit) -> Fit:
-        """A fit to the beginnings, where these are looked at first: of long trials they tell in which valley to look."""
-        if self.brief is self.calm:
-            return fit
-        (fit,) = follow_valley(self.calm, [(fit.model, fit.u)], self.calm.everything, PRIOR, widths=(AGAIN,))
+    def _on_all_of_it(self, fit: Fit, wanted: float = np.inf) -> Fit:
+        """A fit to the beginnings, where these are looked at first: of long trials they tell in which valley to look. ``wanted``
+        as in valley.py."""
+        if self.brief is not self.calm:
+            own = self.calm.everything
+            (fit,) = follow_valley(self.calm, [(fit.model, fit.u)], own, PRIOR, widths=(AGAIN,), wanted=wanted)
         return fit
 
     def _one_sided(self, fit: Fit) -> bool:

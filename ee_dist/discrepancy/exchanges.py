@@ -9,7 +9,7 @@ from collections.abc import Set as AbstractSet
 import numpy as np
 
 from ee_dist.discrepancy.assumed import puts_right
-from ee_dist.discrepancy.evidence.holdout import Cut, HeldOut, cross_fit, held_out_by
+from ee_dist.discrepancy.evidence.holdout import AWAY, Cut, HeldOut, cross_fit, held_out_by
 from ee_dist.discrepancy.evidence.judge import surely_better
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.instead import Instead, instead_of
@@ -22,6 +22,7 @@ from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import as_long
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS
+from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.discrepancy.torque_scale import other_scale
 from ee_dist.trials.log import Array
 
@@ -155,9 +156,9 @@ def nearest(
     more = tuple(other_scale(search.problem, current, own, pool))
     found = instead_of(search, current, own, pool, asked, more)
     best = next((i for i in found if i.better), None)
-    if best is not None and _surely(search, current, best, len(pool)):
+    if best is not None and _surely(search, best, len(pool)):
         return best.then, [], _step(search, best)
-    found, nearer = _nearest_of(search, current, found, len(pool))
+    found, nearer = _nearest_of(search, found, len(pool))
     fixed = search.fixed
     twins = [
         Twin(i.gone.name, i.then.hypothesis[-1], (*fixed, *i.then.hypothesis))
@@ -171,34 +172,34 @@ def nearest(
     return nearer.then, [Twin(nearer.comes.name, gone, (*fixed, *was)), *twins], _step(search, nearer)
 
 
-def _nearest_of(
-    search: Search, current: Current, found: Sequence[Instead], tried: int
-) -> tuple[list[Instead], Instead | None]:
+def _nearest_of(search: Search, found: Sequence[Instead], tried: int) -> tuple[list[Instead], Instead | None]:
     """What does as well on data held out, too, as far as that was asked; and of it what is nearest to the description."""
     left = list(found)
-    for one in sorted((i for i in found if i.nearer), key=lambda i: float(i.then.u @ i.then.u)):
-        if not _worse(search, current, one.then, tried):
+    for one in sorted((i for i in found if i.nearer), key=lambda i: float(i.fitted.u @ i.fitted.u)):
+        if not _worse(search, one, tried):
             return left, one
         left.remove(one)
     return left, None
 
 
-def _worse(search: Search, current: Current, then: Current, tried: int) -> bool:
+def _worse(search: Search, found: Instead, tried: int) -> bool:
     """Whether another model is worse, on data that its fits had not seen, by more than leaving a term out may cost."""
-    one, other = _held_out(search, current, then)
+    one, other = _held_out(search, found)
     return other.energy - one.energy > allowed_loss(search.problem, one.energy, one.cut, tried)
 
 
-def _surely(search: Search, current: Current, found: Instead, tried: int) -> bool:
+def _surely(search: Search, found: Instead, tried: int) -> bool:
     """Whether another model is better on data that its fits had not seen."""
-    one, other = _held_out(search, current, found.then)
+    one, other = _held_out(search, found)
     return surely_better(search.problem, one, other, tried, Proposal((found.comes,)))
 
 
-def _held_out(search: Search, current: Current, then: Current) -> list[HeldOut]:
-    """Two models judged on what is held out in the strictest way."""
-    models = [(Model(m.parts), m.u) for m in (current, then)]
-    return cross_fit(search, models, strictest(search.problem), WIDTHS[1:])
+def _held_out(search: Search, found: Instead) -> list[HeldOut]:
+    """The model and the other one judged on what is held out in the strictest way, their values fitted as far as takes them away
+    from those that have seen it."""
+    models = [(f.model, f.u) for f in (found.was, found.fitted)]
+    widths = WIDTHS[2:] if len(found.was.u) >= LARGE else WIDTHS[1:]
+    return cross_fit(search, models, strictest(search.problem), widths, short=AWAY)
 
 
 def _step(search: Search, found: Instead) -> Rung:

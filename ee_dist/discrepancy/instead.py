@@ -20,7 +20,7 @@ from ee_dist.discrepancy.evidence.holdout import PRIOR
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.search.candidates import Candidate, not_said, on_top_of, possible
-from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.screen import SHOWS
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import gauss_newton, slopes_at
@@ -52,18 +52,23 @@ FOLLOWS, FOLLOWS_LEAST = 0.3, 0.02
 
 @dataclass(frozen=True, eq=False)
 class Instead:
-    """``gone``: an effect of the model; ``comes``: what does as well in its place, if all other values follow: the last part of
-    the model ``then``. ``nearer``: to the description than the model was; ``better``: what was fitted is told apart in favour of
-    it."""
+    """``gone``: an effect of a model that was fitted (``was``); ``comes``: what does as well in its place, if all other values
+    follow: the last part of the model ``then``, as it was ``fitted``. ``nearer``: to the description than the model was;
+    ``better``: what was fitted is told apart in favour of it."""
 
     gone: Candidate
-    then: Current
+    was: Fit
+    fitted: Fit
     nearer: bool
     better: bool
 
     @property
+    def then(self) -> Current:
+        return Current(self.fitted.model.parts, self.fitted.u)
+
+    @property
     def comes(self) -> Candidate:
-        return self.then.parts[-1]
+        return self.fitted.model.parts[-1]
 
 
 def instead_of(
@@ -88,8 +93,10 @@ def instead_of(
     starts = [*more, *_promising(looked, np.where(looked.everything, base, 0.0), current, own, pool, asked)]
     if not starts:
         return []
-    now, *fits = follow_valley(search, [(model, current.u), *starts], mine, PRIOR, widths=(WIDTH,))
-    allowed = TIE_ENERGY * max(float(floor[mine].mean()), now.energy / int(mine.sum()))
+    here = float(base[mine] @ base[mine])
+    wanted = here + _allowed(here, floor[mine]) + PRIOR * float(current.u @ current.u)
+    now, *fits = follow_valley(search, [(model, current.u), *starts], mine, PRIOR, widths=(WIDTH,), wanted=wanted)
+    allowed = _allowed(now.energy, floor[mine])
     out: dict[str, Instead] = {}
     guessed = {current.parts[k].name for k in of_one_guess(model)}
     for fit in sorted(fits, key=lambda f: f.energy):
@@ -97,8 +104,13 @@ def instead_of(
         nearer = gone.name not in guessed and bool(fit.u @ fit.u + NEARER < now.u @ now.u)
         if fit.energy - now.energy < allowed and gone.name not in out:
             better = now.energy - fit.energy > allowed
-            out[gone.name] = Instead(gone, Current(fit.model.parts, fit.u), nearer, better)
+            out[gone.name] = Instead(gone, now, fit, nearer, better)
     return list(out.values())
+
+
+def _allowed(energy: float, floor: Array) -> float:
+    """By how much more energy than this another model does as well, of residual values with a ``floor`` (n,)."""
+    return TIE_ENERGY * max(float(floor.mean()), energy / len(floor))
 
 
 @dataclass(frozen=True, eq=False)

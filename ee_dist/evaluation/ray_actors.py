@@ -53,7 +53,7 @@ class _Worker:
 WORTH_A_CALL = 48
 """Jobs below which a step costs nearly as much for the batch as for its robots: no call carries fewer unless there are
 too few for all workers."""
-AT_ONCE = 256
+AT_ONCE = 512
 """Jobs of one worker up to which it gets them in one call: each further batch costs as much, step by step, as some ten robots."""
 LOOK_S = 1.0
 """How long to wait for results before looking whether Ray is still there."""

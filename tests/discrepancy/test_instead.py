@@ -77,7 +77,7 @@ def test_what_is_nearer_and_foretells_worse_is_neither_taken_nor_told_as_a_twin(
     """As well on what was fitted, and not on what was held out."""
     search, current = fitted(Alike((term("motor_weak", JOINT, loss=0.6),)), THREE)
 
-    def held_out(search: Search, models: Sequence[tuple[Model, Array]], *_: object) -> list[HeldOut]:
+    def held_out(search: Search, models: Sequence[tuple[Model, Array]], *_: object, **more: object) -> list[HeldOut]:
         found = cross_fit(search, models, windows(search.problem))
         return [
             replace(h, residual=h.residual * (1.3 if WEAK in m.parts else 1.0))

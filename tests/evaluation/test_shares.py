@@ -34,8 +34,8 @@ def test_a_small_lot_is_one_call_a_worker():
 
 
 def test_a_large_lot_ends_in_small_helpings():
-    sizes = handed_out(1000, [0.5, 0.5])
-    assert sizes[0] == 250
+    sizes = handed_out(2000, [0.5, 0.5])
+    assert sizes[0] == 500
     assert sizes == sorted(sizes, reverse=True)
     assert all(s >= WORTH_A_CALL for s in sizes[:-1])
 

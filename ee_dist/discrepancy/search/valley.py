@@ -41,6 +41,9 @@ GAIN = 0.005
 """Share of the energy that an iteration must take off, or else slopes are taken narrower; at the narrowest it ends."""
 BEHIND = 0.5
 """Share of its energy that a better descent has left when one that stands still is given up."""
+SLOW, BEGUN = 0.25, 2
+"""Share of what is missing to where a descent is of use that a round must take off, from which round on, or else it is given up:
+rounds that take off a fifth less each than the one before never come there."""
 FOLLOWED, PAYS = 3, 0.02
 """Steps in turn by corrected slopes, at most, and the share of the energy that a step must take off for another to follow it."""
 
@@ -64,6 +67,8 @@ class _Run:
     """Energy and values before the last step,"""
     rounds: int = 0
     """how often slopes were taken,"""
+    round_from: float = np.inf
+    """with what energy the last time,"""
     followed: int = 0
     """and which step by the slopes corrected since then comes next (0: they are taken anew)."""
     again: bool = False
@@ -92,13 +97,15 @@ def follow_valley(
     rivals: bool = False,
     same: int = 0,
     values_only: bool = False,
+    wanted: float = np.inf,
 ) -> list[Fit]:
     """The best values of each (model, start) on the residual values of ``mask`` (n,), in the order given, all in step: the best
     of a descent from each of ``widths``, of which the last steps follow ever narrower slopes, unless the start is ``settled``
     in a valley already. ``rivals``: only the best of all starts is wanted, and what comes near it. ``same``: so many values come
     first in all starts, and are alike there: slopes by these are taken once to begin with, beside nothing else. ``values_only``:
-    slopes are not, and steps by corrected ones may be the last. ``prior`` as in slopes.py; ``slopes`` of the results are those of
-    the smooth residual, weighed."""
+    slopes are not, and steps by corrected ones may be the last. ``wanted``: energy above which a descent is of no use: one that
+    would not come there is given up. ``prior`` as in slopes.py; ``slopes`` of the results are those of the smooth residual,
+    weighed."""
     whole, search = search, search.within(mask)
     points = [np.clip(np.asarray(u, float), m.lower, m.upper) for m, u in starts]
     rows = search.residuals([m.hypothesis(u) for (m, _), u in zip(starts, points, strict=True)])
@@ -115,13 +122,15 @@ def follow_valley(
         _slopes([run for run in anew if np.isfinite(run.energy)], search, mask, known)
         known = None
         for run in anew:
-            run.rounds += 1
+            run.rounds, run.round_from = run.rounds + 1, run.energy
         going = [run for run in moving if np.isfinite(run.energy)]
         _steps(going, search, mask, prior, far)
         for run in going:
             _next(run, far, settled, values_only or run.rounds < iterations)
             if run.followed:
                 _correct(run, search, mask)
+            else:
+                run.done = run.done or _never_comes(run, wanted)
         together = len(runs) if rivals else len(widths)
         for k in range(0, len(runs), together):
             _give_up(runs[k : k + together])
@@ -243,6 +252,12 @@ def _goes_finer(run: _Run) -> bool:
     reach = left / np.maximum(np.linalg.norm(run.weighed_slopes(len(run.smooth)), axis=0), 1e-12)
     run.reach = np.maximum(reach, FINEST * NARROWEST)
     return bool((reach < NARROWEST).any())
+
+
+def _never_comes(run: _Run, wanted: float) -> bool:
+    """Whether a descent will not come down to where it is of use, by what its last round took off."""
+    missing, taken = run.energy - wanted, run.round_from - run.energy
+    return run.rounds >= BEGUN and missing > 0 and taken < SLOW * missing
 
 
 def _give_up(runs: Sequence[_Run]) -> None:
