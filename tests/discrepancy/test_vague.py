@@ -30,7 +30,8 @@ def judged(explained: float, vague: bool) -> object:
     cut = SimpleNamespace(by_unit=lambda e: e)
     one = SimpleNamespace(
         name=f"{explained}", explained=explained, vague=vague, why_not="", held=np.full(20, 1000.0 * (1 - explained)),
-        outcome=SimpleNamespace(fits=(), cut=cut), dispersion=1.0, proposal=SimpleNamespace(size=4 if vague else 1, guess=False, parts=()),
+        outcome=SimpleNamespace(fits=(), cut=cut), dispersion=1.0,
+        proposal=SimpleNamespace(size=4 if vague else 1, guess=False, parts=()),
         tied_with=[], rank=0, sure=0.0,
     )  # fmt: skip
     return Following(one)
