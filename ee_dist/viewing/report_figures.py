@@ -228,20 +228,28 @@ def ladder(
     return figure
 
 
-def values(title: str, at: Sequence[tuple[str, float, float]], neutral: float) -> go.Figure:
-    """One quantity at each of its places, (place, value, half of its interval), beside the value at which it does nothing."""
+def values(title: str, at: Sequence[tuple[str, float, float, float]], neutral: float) -> go.Figure:
+    """One quantity at each of its places, (place, value, low and high end of its interval), beside the value at which it does
+    nothing. A bound may cut an interval on one side."""
     figure = go.Figure()
-    known = [half if np.isfinite(half) else 0.0 for _, _, half in at]
+    reach = np.array([(high - value, value - low) for _, value, low, high in at])
+    above, below = np.where(np.isfinite(reach), np.maximum(reach, 0.0), 0.0).T
+    # What is said of a place after its name has a line of its own: plotly cuts what is wider than half of a figure.
+    names = [place.replace(", ", "<br>") for place, *_ in at]
     figure.add_scatter(
-        x=[value for _, value, _ in at],
-        y=[place for place, _, _ in at],
+        x=[value for _, value, _, _ in at],
+        y=names,
         mode="markers",
         marker={"size": 9, "color": IMPROVED},
-        error_x={"type": "data", "array": known, "color": IMPROVED, "thickness": 2, "width": 5},
-        hovertemplate="%{y}: %{x:.4g} ± %{error_x.array:.2g}<extra></extra>",
-    )
+        error_x={
+            "type": "data", "symmetric": False, "array": above, "arrayminus": below,
+            "color": IMPROVED, "thickness": 2, "width": 5,
+        },
+        text=[f"{low:.4g} to {high:.4g}" for _, _, low, high in at],
+        hovertemplate="%{y}: %{x:.4g}, %{text}<extra></extra>",
+    )  # fmt: skip
     figure.add_vline(x=neutral, line={"color": "#8899aa", "width": 1})
-    styled(figure, 78 + 24 * len(at))
+    styled(figure, 78 + sum(10 + 14 * (1 + name.count("<br>")) for name in names))
     figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ", type="category")
     figure.update_layout(
         title={"text": title, "font": {"size": 12}, "x": 0.02, "y": 0.97},

@@ -115,7 +115,7 @@ def test_a_real_trial_that_begins_in_motion_is_compared_once_it_has_settled() ->
     problem = OpenLoop([moving, standing], ARM, evaluator_for(ARM))
     first = [float(problem.layout.time_s[(problem.trial_of == k) & problem.layout.reading].min()) for k in (0, 1)]
     assert first[0] >= module.SETTLED_S - problem.block * ARM.time_step_s and first[1] < 0.1
-    (note,) = [n for n in problem.notes if "begin in motion" in n]
+    (note,) = [n for n in problem.notes if "begins in motion" in n]
     assert moving.name in note and "1 trial" in note
     thrown = moving.log.joints.copy()
     thrown[0] += 0.2

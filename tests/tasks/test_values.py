@@ -53,6 +53,25 @@ def test_values_stand_beside_those_of_their_kind():
     ]  # fmt: skip
 
 
+def test_an_interval_that_a_bound_cuts_is_drawn_from_end_to_end():
+    """Not as far below the value as above it; what is said of a joint beside its name has a line of its own."""
+    robot = quadruped()
+    terms = tuple(
+        term("coulomb_friction", t, torque_nm=v) for t, v in (("all_joints", 1.48), ("knee_front_left", 10.2))
+    )
+    reports = [
+        ParameterReport(0, "torque_nm", 1.48, 0.0, 4.0, ""), ParameterReport(1, "torque_nm", 10.2, 9.2, math.inf, "")
+    ]  # fmt: skip
+    (kind,) = kinds_of(terms, reports, robot)
+    (figure,) = values_section([kind]).figures
+    bars = figure.data[0].error_x
+    assert not bars.symmetric
+    assert list(bars.array) == pytest.approx([2.52, 0.0]) and list(bars.arrayminus) == pytest.approx([1.48, 1.0])
+    assert figure.data[0].text[0] == "0 to 4"
+    assert figure.data[0].y[1].startswith("knee front left<br>"), figure.data[0].y
+    assert all("," not in name.split("<br>")[0] for name in figure.data[0].y)
+
+
 def test_units_are_those_of_a_slide():
     found = kinds_of(
         (term("coulomb_friction", "carriage", torque_nm=20.0),), [ParameterReport(0, "torque_nm", 20, 19, 21, "")],

@@ -62,14 +62,10 @@ def proof_section(
     after: Array | None = None,
     channel: str = "",
 ) -> Section | None:
-    """The stretch of time in which a channel (or the one asked for) shows most: of what was found, or of what is wrong."""
+    """The stretch of time in which a channel (or the one asked for) shows most: of what was found, or of what is wrong, as the
+    table of channels tells it."""
     width = len(problem.channels)
-    gained = residual**2 - (problem.floor if after is None else after**2)
-    cell = problem.segment_of * width + problem.channel_of
-    count = len(problem.segments) * width
-    drawn_ = np.where(problem.layout.reading, gained, 0.0)
-    # What makes a channel rougher, and nothing else, gains in what is compared besides readings.
-    excess = np.bincount(cell, weights=drawn_ if drawn_.sum() > 0.5 * gained.sum() else gained, minlength=count)
+    excess = heat(problem, residual).ravel() if after is None else _gained(problem, residual, after)
     asked = np.tile([not channel or name == channel for name in problem.channels], len(problem.segments))
     excess = np.where(asked, excess, -np.inf)
     by_name = {(o.channel, o.trial): o for o in overlays}
@@ -92,6 +88,16 @@ def proof_section(
     return Section(heading, caption, figures.proof(shown, [n for n, _ in models], (begin, end)))
 
 
+def _gained(problem: Problem, residual: Array, after: Array) -> Array:
+    """(segments x channels,) energy that the improved model takes off."""
+    gained = residual**2 - after**2
+    cell = problem.segment_of * len(problem.channels) + problem.channel_of
+    read = np.where(problem.layout.reading, gained, 0.0)
+    # What makes a channel rougher, and nothing else, gains in what is compared besides readings.
+    weights = read if read.sum() > 0.5 * gained.sum() else gained
+    return np.bincount(cell, weights=weights, minlength=len(problem.segments) * len(problem.channels))
+
+
 def browser_section(overlays: Sequence[Overlay], models: Models) -> Section:
     found = browser(overlays, [n for n, _ in models])
     caption = "Pick a channel and a trial; the arrows go on to the next in the order of their error."
@@ -111,7 +117,7 @@ def values_section(kinds: Sequence[Kind]) -> Section | None:
     ]
     table = Table(["effect", "quantity", "where", "value", "95 % interval", "unit", "note"], rows, (3, 4))
     drawn_ = [
-        figures.values(k.name, [(place, p.value, (p.high - p.low) / 2) for place, p in k.at], k.neutral)
+        figures.values(k.name, [(place, p.value, p.low, p.high) for place, p in k.at], k.neutral)
         for k in kinds
         if len(k.at) > 1
     ]

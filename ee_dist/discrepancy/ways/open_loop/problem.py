@@ -259,7 +259,7 @@ class OpenLoop(Problem):
         ]
         led = forgets(self.robot, self.measured)
         if moving := [t.name for t in self.measured if led and unsettled(t, self.robot)]:
-            begun = f"{counted(len(moving), 'trial')} that begin in motion ({listed(moving)})"
+            begun = f"{counted(len(moving), 'trial')} that begin{'s' if len(moving) == 1 else ''} in motion ({listed(moving)})"
             why = "nobody knows what the controllers were told before"
             lines.append(f"The first {SETTLED_S:g} s of {begun} is simulated and not compared: {why}.")
         if self.scale.loosened > NOTED:
