@@ -85,7 +85,9 @@ def test_a_scene_draws_what_was_recorded(config: Config, monkeypatch: pytest.Mon
 
 def test_a_heat_map_has_no_colour_where_nothing_was_recorded(config: Config) -> None:
     problem = WAYS["open_loop"].make(load(config), config)
-    figure = heat_section(problem, problem.residuals([()])[0]).figure
+    section = heat_section(problem, problem.residuals([()])[0])
+    figure = section.figure
+    assert section.caption.endswith("What is blank nobody recorded.")
     assert figure is not None
     blank = np.isnan(np.array(figure.data[0].z, dtype=float))
     np.testing.assert_array_equal(blank, np.stack([problem.trial_of_segment != k for k in range(2)]))

@@ -138,6 +138,8 @@ def heat_section(problem: Problem, residual: Array, after: Array | None = None) 
         "model gets wrong."
     )
     there = has_values(problem)
+    if not there.all():
+        caption += " What is blank nobody recorded."
     # Where nobody recorded anything the model is neither right nor wrong: no colour.
     tables = [np.where(there, drawn(problem, heat(problem, r)), np.nan) for r in (residual, after) if r is not None]
     figure = figures.heat_map(
