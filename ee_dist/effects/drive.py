@@ -284,7 +284,9 @@ def deadband(robot: Robot, target: str, values: Mapping[str, float]) -> Robot:
 LIGHTER, LIGHTER_AT_LEAST, LIGHTER_GUESS = 0.9, 0.25, 0.98
 """Shares of the described rotor's inertia that may not be there: files often carry what keeps a simulation steady. More than
 the smaller share only where the joint stays slow enough for its controller; most of all of one that was guessed at, and, where
-the controller was guessed too, whatever that would do: models of measured robots hold any (``discrepancy.steps``)."""
+the controller was guessed too, whatever that would do: models of measured robots hold any (``discrepancy.steps``). A torque has
+no controller that a light joint could be too quick for, and a motor without a gear next to no rotor: of a guess there nothing
+need be."""
 
 
 GEARED = 10.0
@@ -299,7 +301,7 @@ def _rotors(robot: Robot, target: str) -> dict[str, Range]:
     drive, felt, dt = scales.drive_of(robot, target), scales.inertia(robot, target), robot.time_step_s
     rotor = drive.rotor_inertia
     guessed = (target, "rotor_inertia") in robot.assumed
-    most = (LIGHTER_GUESS if guessed else LIGHTER) * rotor
+    most = ((1.0 if drive.command == "torque" else LIGHTER_GUESS) if guessed else LIGHTER) * rotor
     if not (guessed and (target, "kp") in robot.assumed):
         most = min(most, scales.spare_inertia(robot, target))
     less = max(LIGHTER_AT_LEAST * rotor, most)

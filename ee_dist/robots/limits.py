@@ -10,12 +10,12 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.robots.body import Body
 from ee_dist.robots.described import GRAVITY_M_S2
-from ee_dist.robots.model import Joint
+from ee_dist.robots.model import Joint, Part
 
 TORQUE_PER_INERTIA = 50.0
 """rad/s^2 (m/s^2) that an assumed torque limit gives a joint beside what it holds,"""
 LEVER_M = 0.25
-"""which is the weight of the whole robot on this lever; of a slide, half the weight."""
+"""which is the weight of all that moves on this lever; of a slide, half the weight."""
 PLACEHOLDER = 50.0
 """Times what a robot needs from which a limit is none. Servos that CAD programs enter too strong have ten times as much."""
 
@@ -79,22 +79,27 @@ def told(found: Mapping[str, Placeholder], body: Body, swinging: Collection[str]
 
 
 def _weight(body: Body) -> float:
-    return sum(p.mass_kg for p in body.parts) * GRAVITY_M_S2
+    """N of all that moves: a base that is bolted down rests on its bolts, and one without mass was given some."""
+    return sum(p.mass_kg for p in body.parts if body.free_base or _chain(body, p)) * GRAVITY_M_S2
+
+
+def _chain(body: Body, part: Part) -> list[Joint]:
+    """The joints from a part towards the base, up to the last that moves; none of a part that stands where the base stands."""
+    above = {j.child: j for j in body.joints}
+    joint, chain = above.get(part.name), []
+    while joint is not None:
+        chain.append(joint)
+        joint = above.get(joint.parent)
+    while chain and chain[-1].kind == "fixed":
+        chain.pop()
+    return chain
 
 
 def _stretched(body: Body) -> float:
     """N.m about the first joints with all that they carry in one line: no torque that only holds is more."""
-    above = {j.child: j for j in body.joints}
     torque = 0.0
     for part in body.parts:
-        reach, joint = float(np.linalg.norm(part.com_m)), above.get(part.name)
-        chain = []
-        while joint is not None:
-            chain.append(joint)
-            joint = above.get(joint.parent)
-        while chain and chain[-1].kind == "fixed":
-            chain.pop()
-        if chain:
-            reach += sum(float(np.linalg.norm(j.position_m)) for j in chain[:-1])
+        if chain := _chain(body, part):
+            reach = float(np.linalg.norm(part.com_m)) + sum(float(np.linalg.norm(j.position_m)) for j in chain[:-1])
             torque += part.mass_kg * reach * GRAVITY_M_S2
     return torque

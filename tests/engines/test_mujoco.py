@@ -15,7 +15,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.bodies import Group
 from ee_dist.engines.mujoco.contact import IMPEDANCE, contact
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
-from ee_dist.engines.mujoco.model import NOTHING_TO_TOUCH, UNUSED, Model, structure_key
+from ee_dist.engines.mujoco.model import NOTHING_TO_TOUCH, UNUSED, Model, of_length_one, structure_key
 from ee_dist.robots.mass_matrix import mass_matrix
 from ee_dist.robots.model import Joint, Part, Robot, Shape
 from ee_dist.robots.quadruped import quadruped
@@ -56,6 +56,72 @@ def test_a_filled_model_remembers_nothing_of_the_robot_before() -> None:
         a, b = getattr(used.compiled, name), getattr(fresh.compiled, name)
         assert a.tobytes() == b.tobytes(), name
     assert used.compiled.opt.gravity.tobytes() == fresh.compiled.opt.gravity.tobytes()
+
+
+def bent(robot: Robot, rng: np.random.Generator) -> Robot:
+    """The robot with every joint elsewhere, turned, and about another axis, and the base turned where it is bolted."""
+    joints = tuple(
+        replace(
+            j,
+            position_m=tuple(np.array(j.position_m) + rng.normal(size=3) / 50),
+            rotation=tuple(quaternion(rng)),
+            axis=tuple(np.round(unit(rng.normal(size=3)), 6)),
+        )
+        for j in robot.joints
+    )
+    start = robot.start_rotation if robot.free_base else tuple(quaternion(rng))
+    return replace(robot, joints=joints, start_rotation=start)
+
+
+def unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def quaternion(rng: np.random.Generator) -> np.ndarray:
+    return np.round(unit(np.array([*(0.2 * rng.normal(size=3)), 1.0])), 7)
+
+
+@pytest.mark.parametrize("free_base", [True, False])
+def test_where_joints_are_and_how_they_turn_is_a_row_of_numbers(free_base: bool) -> None:
+    """What the compiler would make of each robot by itself, to the last bit, though it is asked once."""
+    rng = np.random.default_rng(0)
+    robot = replace(quadruped().with_world(has_floor=free_base), free_base=free_base)
+    robots = [bent(robot, rng) for _ in range(6)]
+    assert len({structure_key(r) for r in robots}) == 1
+    shared = Model(robots[0])
+    for other in robots:
+        own = Model(other)
+        for model in (shared, own):
+            model.fill(model.numbers(other))
+        for name in ("body_pos", "body_quat", "jnt_axis", "body_invweight0", "dof_M0", "body_simple", "geom_pos"):
+            assert getattr(shared.compiled, name).tobytes() == getattr(own.compiled, name).tobytes(), name
+    together = MuJoCoEngine(1).rollout([Rollout(r, network(k), 60) for k, r in enumerate(robots)])
+    for k, (r, log) in enumerate(zip(robots, together, strict=True)):
+        (alone,) = MuJoCoEngine(1).rollout([Rollout(r, network(k), 60)])
+        assert log.sensors.tobytes() == alone.sensors.tobytes()
+
+
+def test_lengths_are_made_one_as_by_the_compiler() -> None:
+    rng = np.random.default_rng(1)
+    for k in range(300):
+        turn, axis = rng.normal(size=4), rng.normal(size=3)
+        if k % 3:
+            turn, axis = (np.round(unit(v), 16 if k % 3 == 1 else 8) for v in (turn, axis))
+        spec = mujoco.MjSpec()
+        body = spec.worldbody.add_body(quat=turn)
+        body.explicitinertial, body.mass, body.inertia = True, 1.0, [1.0, 1.0, 1.0]
+        body.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+        m = spec.compile()
+        assert of_length_one(turn).tobytes() == m.body_quat[1].tobytes()
+        assert of_length_one(axis).tobytes() == m.jnt_axis[0].tobytes()
+
+
+def test_shapes_count_only_where_there_is_a_floor() -> None:
+    bare = replace(quadruped(), parts=tuple(replace(p, shapes=()) for p in quadruped().parts))
+    hung, bare_hung = (r.with_world(has_floor=False) for r in (quadruped(), bare))
+    assert structure_key(quadruped()) != structure_key(bare)
+    assert structure_key(hung) == structure_key(bare_hung)
+    assert Model(hung).compiled.ngeom == 0
 
 
 def test_only_structure_is_compiled_anew() -> None:

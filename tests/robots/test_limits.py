@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from ee_dist.robots.inertia import felt_inertia
+from ee_dist.robots.limits import LEVER_M, TORQUE_PER_INERTIA
+from ee_dist.robots.model import Robot
 from ee_dist.robots.starter import Starter, starter
 from ee_dist.robots.urdf import read_urdf
 
@@ -15,10 +19,10 @@ JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child li
 <axis xyz="0 1 0"/><limit lower="-2" upper="2" {effort} velocity="3"/></joint>"""
 
 
-def begun(folder: Path, first: str, second: str, mass: float = 0.3, kind: str = "revolute", more: str = "") -> Starter:
+def begun(folder: Path, first: str, second: str, mass: float = 0.3, kind: str = "revolute", more: str = "", base: float = 0.0) -> Starter:
     """The description to begin with of two links on a base, whose joints have these limits."""
     parts = [
-        '<link name="base"/>',
+        LINK.format(name="base", com=0.0, mass=base) if base else '<link name="base"/>',
         JOINT.format(name="a", kind=kind, parent="base", child="upper", effort=first),
         LINK.format(name="upper", com=0.1, mass=mass),
         JOINT.format(name="b", kind="revolute", parent="upper", child="lower", effort=second),
@@ -65,6 +69,19 @@ def test_a_heavy_robot_needs_what_a_light_one_does_not(tmp_path: Path, kind: str
     ]
     heavy = begun(tmp_path, 'effort="5000"', 'effort="300"', 30.0, kind)
     assert not [line for line in heavy.assumed if "no real" in line]
+
+
+def test_what_is_bolted_down_needs_no_motor(tmp_path: Path) -> None:
+    """Neither a heavy base, nor the mass that a base without one is given, makes the arm's motors any stronger."""
+    light = begun(tmp_path, "", "")
+    heavy = begun(tmp_path, "", "", base=40.0)
+    assert [d.torque_limit for d in heavy.robot.drives] == [d.torque_limit for d in light.robot.drives]
+    needed = 0.6 * 9.81 * LEVER_M + TORQUE_PER_INERTIA * felt_inertia(bare(light.robot))[0]
+    assert light.robot.drives[0].torque_limit == pytest.approx(needed, rel=0.05)
+
+
+def bare(robot: Robot) -> Robot:
+    return replace(robot, drives=tuple(replace(d, rotor_inertia=0.0) for d in robot.drives))
 
 
 def chain(folder: Path, efforts: list[float], mass: float = 0.5) -> Starter:

@@ -1,9 +1,9 @@
 """A MuJoCo model of a robot: compiled once per structure, with numbers that are filled in per robot.
 
 The structure of a robot is what MuJoCo's compiler turns into addresses and flags: parts, joints, shapes, touch sensors.
-Everything else that an effect may change (masses, centres of mass, inertias, rotor inertias, gravity, friction, give of
-the floor) is a row of numbers, so that a batch of different robots needs one compiled model and an array. A structure is
-compiled with placeholders for all of these: no robot can be felt by those that share its structure.
+Everything else that an effect may change (masses, centres of mass, inertias, rotor inertias, where joints are and about what
+they turn, gravity, friction, give of the floor) is a row of numbers, so that a batch of different robots needs one compiled
+model and an array. No robot can be felt by those that share its structure: each of these rows is filled in for each.
 
 Joints have no limits, springs or damping here: those are in the drive path. Only the floor is touched, through one
 explicit contact pair per shape, which spares the search for colliding shapes.
@@ -11,6 +11,7 @@ explicit contact pair per shape, which spares the search for colliding shapes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -53,9 +54,21 @@ itself MuJoCo takes 14 MB for each of hundreds of models, as room for contacts t
 ITERATIONS, LINE_SEARCH = 100, 50
 """Upper bounds, MuJoCo's own. Newton needs 3 or 4 iterations here and 13 at worst; a bound of 20 broke robots apart whose
 friction was stiff, and saved nothing."""
+ROUNDED = 1e-14
+"""By how much a length may be off one."""
 TOUCH_REACH_M = 100.0
 """Radius of the zone in which a contact of a part counts as touch: all of it."""
-OWN = ("opt.gravity", "body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_armature")
+OWN = (
+    "opt.gravity",
+    "body_mass",
+    "body_inertia",
+    "body_ipos",
+    "body_iquat",
+    "dof_armature",
+    "body_pos",
+    "body_quat",
+    "jnt_axis",
+)
 """Fields of a model that are each robot's own, besides those of the contact with the floor."""
 
 
@@ -63,16 +76,27 @@ def structure_key(robot: Robot) -> tuple[Any, ...]:
     """What a compiled model cannot change. Equal keys, equal models up to the patched numbers."""
     lost = set(robot.lost)
     # Whether a part's inertia is centred and aligned decides short cuts in MuJoCo's kinematics.
-    parts = tuple((p.name, p.shapes, any(p.com_m), any(p.inertia_kg_m2[3:])) for p in robot.parts if p.name not in lost)
+    floor = robot.world.has_floor
+    parts = tuple(
+        (p.name, p.shapes if floor else (), any(p.com_m), any(p.inertia_kg_m2[3:]))
+        for p in robot.parts
+        if p.name not in lost
+    )
+    # So does a joint that turns about one of the axes of its frame.
     joints = tuple(
-        (j.name, j.kind, j.parent, j.child, j.position_m, j.rotation, j.axis)
-        for j in robot.joints
-        if j.child not in lost
+        (j.name, j.kind, j.parent, j.child, sum(map(bool, j.axis)) == 1) for j in robot.joints if j.child not in lost
     )
     touch = tuple(s.target for s in robot.sensors if s.kind == "touch")
-    fixed_at = None if robot.free_base else (robot.start_position_m, robot.start_rotation)
-    floor = robot.world.has_floor
-    return parts, joints, touch, robot.motor_names, fixed_at, robot.time_step_s, floor, bool(stiff_joints(robot).any())
+    return (
+        parts,
+        joints,
+        touch,
+        robot.motor_names,
+        robot.free_base,
+        robot.time_step_s,
+        floor,
+        bool(stiff_joints(robot).any()),
+    )
 
 
 class Model:
@@ -101,24 +125,33 @@ class Model:
         self.dof = [int(m.jnt_dofadr[j]) for j in joints]
         free = sorted(moving - set(robot.motor_names))
         self.undriven = [(name, int(m.joint(name).qposadr[0])) for name in free]
+        self.axes = {j.name: int(m.joint(j.name).id) for j in robot.present_joints if j.kind != "fixed"}
         targets = [s.target for s in robot.sensors if s.kind == "touch"]
         self.touches = [k for k, name in enumerate(targets) if name in parts]
         self.pair_body = m.geom_bodyid[m.pair_geom2] if m.npair else np.zeros(0, dtype=int)
         place = {int(body): k for k, body in enumerate(self.bodies)}
         self.pair_part = [place[int(body)] for body in self.pair_body]
-        self._fields = [m.opt.gravity, m.body_mass, m.body_inertia, m.body_ipos, m.body_iquat, m.dof_armature]
+        self._fields = [m.opt.gravity, *(getattr(m, name) for name in OWN[1:])]
         self._blank = [np.array(field) for field in self._fields]
 
     def numbers(self, robot: Robot) -> list[Array]:
         """The robot's own values of the fields in ``OWN``."""
-        gravity, mass, inertia, com, turn, rotor = (blank.copy() for blank in self._blank)
+        gravity, mass, inertia, com, turn, rotor, at, frame, axis = (blank.copy() for blank in self._blank)
         gravity[:] = gravity_vector(robot)
         for body, part in zip(self.bodies, robot.present_parts, strict=True):
             mass[body], com[body] = part.mass_kg, part.com_m
             inertia[body], turn[body] = principal(part)
         for k, dof in zip(self.motors, self.dof, strict=True):
             rotor[dof] = robot.drives[k].rotor_inertia
-        return [gravity + 0.0, mass, inertia, com + 0.0, turn, rotor]
+        body_of = dict(zip((p.name for p in robot.present_parts), self.bodies, strict=True))
+        if not robot.free_base:
+            at[self.root], frame[self.root] = robot.start_position_m, of_length_one(_turn(robot.start_rotation))
+        for joint in robot.present_joints:
+            body = body_of[joint.child]
+            at[body], frame[body] = joint.position_m, of_length_one(_turn(joint.rotation))
+            if joint.kind != "fixed":
+                axis[self.axes[joint.name]] = of_length_one(np.array(_plain(joint.axis)))
+        return [gravity + 0.0, mass, inertia, com + 0.0, turn, rotor, at + 0.0, frame, axis]
 
     def fill(self, numbers: Sequence[Array]) -> None:
         """Make these the numbers of the compiled model, and renew what follows from them."""
@@ -199,7 +232,7 @@ def _parents_first(robot: Robot) -> Sequence[Part]:
 
 
 def _add_shapes(spec: Any, body: Any, part: Part, robot: Robot) -> None:
-    for k, shape in enumerate(part.shapes):
+    for k, shape in enumerate(part.shapes if robot.world.has_floor else ()):
         size = [0.0, 0.0, 0.0]
         size[: len(shape.size)] = shape.size
         if shape.kind in ("capsule", "cylinder"):
@@ -214,8 +247,7 @@ def _add_shapes(spec: Any, body: Any, part: Part, robot: Robot) -> None:
             contype=0,
             conaffinity=0,
         )
-        if robot.world.has_floor:
-            spec.add_pair(geomname1="floor", geomname2=name, condim=3, margin=MARGIN_M)
+        spec.add_pair(geomname1="floor", geomname2=name, condim=3, margin=MARGIN_M)
 
 
 def _plain(values: Sequence[float]) -> list[float]:
@@ -225,6 +257,12 @@ def _plain(values: Sequence[float]) -> list[float]:
 
 def _turn(rotation: Quat) -> Array:
     return scalar_first(np.array(_plain(rotation)))
+
+
+def of_length_one(vector: Array) -> Array:
+    """To the last bit as MuJoCo's compiler makes it so: what is of length one already is left alone."""
+    length = math.sqrt(sum(v * v for v in vector.tolist()))
+    return vector if abs(length - 1.0) <= ROUNDED else vector / length
 
 
 def scalar_first(rotation: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,11 +44,15 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
         return _lerobot(block, joints, hints)
     kinds = {j.kind for j in joints}
     if kinds == {"hinge", "slide"}:
-        parts = [position_units(_part(block, [k]), [j], hints) for k, j in enumerate(joints)]
+        parts = _as_the_others(
+            [position_units(_part(block, [k]), [j], _for_kind(hints, j)) for k, j in enumerate(joints)], block, joints
+        )
         worst = next((p for s in (UNKNOWN, LIKELY) for p in parts if p.sure == s), parts[0])
         said = "; ".join(dict.fromkeys(f"{j.name}: {p.why}" for j, p in zip(joints, parts, strict=True)))
         why = worst.why if worst.sure == UNKNOWN else said
-        return UnitChoice(tuple(p.entries[0] if p.entries else {} for p in parts), worst.sure, why)
+        # One that nobody knows leaves all open: what is not known of one joint is asked for.
+        entries = tuple(e for p in parts for e in p.entries)
+        return UnitChoice(entries if len(entries) == len(parts) else (), worst.sure, why)
     allowed = LENGTHS if kinds == {"slide"} else (*ANGLES, "mrad")
     reach = np.array([reach_of(j) if math.isfinite(j.ends[1]) else math.inf for j in joints])
     if hints.unit == SHARE:
@@ -103,6 +107,31 @@ def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitC
     )
 
 
+def _for_kind(hints: Hints, joint: Joint) -> Hints:
+    """A unit that was said is that of the joints that it fits, where some turn and some slide."""
+    other = LENGTHS if joint.kind == "hinge" else (*ANGLES, "mrad")
+    return replace(hints, unit=None) if hints.unit in other else hints
+
+
+def _as_the_others(parts: Sequence[UnitChoice], block: Block, joints: Sequence[Joint]) -> list[UnitChoice]:
+    """Of joints that turn and joints that slide, those that stand still, and so show no unit, are in rad and m where all that
+    others show is."""
+    shown = {e["unit"] for p in parts for e in p.entries}
+    if not shown or not shown <= {"rad", "m"} or not all(set(e) == {"unit"} for p in parts for e in p.entries):
+        return list(parts)
+    span = np.ptp(block.values, axis=0)
+    found = []
+    for k, (part, joint) in enumerate(zip(parts, joints, strict=True)):
+        unit = "rad" if joint.kind == "hinge" else "m"
+        room = reach_of(joint) if math.isfinite(joint.ends[1]) else math.inf
+        seen = float(np.abs(block.values[:, k]).max())
+        if not part.entries and span[k] <= STILL * min(room, TURNS_ON) and seen <= BEYOND * room:
+            why = f"stands still: in {unit}, as the others are in {' and '.join(sorted(shown))}"
+            part = UnitChoice(({"unit": unit},), LIKELY, why)
+        found.append(part)
+    return found
+
+
 def counts(block: Block) -> str:
     """What whole numbers may be: the counts of an encoder."""
     # As the file holds them: those of the block may stand between rows.
@@ -114,8 +143,6 @@ def counts(block: Block) -> str:
 
 
 def _part(block: Block, keep: list[int]) -> Block:
-    from dataclasses import replace
-
     return replace(block, columns=tuple(block.columns[k] for k in keep), values=block.values[:, keep],
                    units=tuple(block.units[k] for k in keep) if block.units else ())  # fmt: skip
 
