@@ -21,6 +21,7 @@ from ee_dist.discrepancy.evidence.judge import FEW_SHOW, Judged, judge, ranked
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers
 from ee_dist.discrepancy.evidence.rule import least_energy, no_more_than_noise
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.run_through import that_hold_run_through
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, possible
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.pool import held_still
@@ -149,6 +150,7 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
         pairs = _pairs(screened, now)
         if pairs:
             judged = ranked([*judged, *_judged(search, current, pairs, base, len(pool), leading)])
+    judged = that_hold_run_through(problem, search.fixed, current.hypothesis, judged)
     best = judged[0] if judged and judged[0].earned else None
     left = leftovers(problem, base if best is None else best.residual)
     return Examined(judged, screened, base, left, len(pool))

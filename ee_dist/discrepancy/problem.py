@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,13 @@ class Series:
     times_s: Array
     measured: Array
     predicted: Array
+
+
+class Through(NamedTuple):
+    """How far off a model is that runs through: in ``natural_unit``, and as people read it."""
+
+    size: float
+    told: str
 
 
 def joined(series: Sequence[Series]) -> list[Series]:
@@ -202,6 +210,11 @@ class Problem(ABC):
         """Why a model, run through, does not move where the robot did and its description does; empty: it does. In windows it
         goes on with the speed that it is given."""
         return ""
+
+    def run_through(self, models: Sequence[Hypothesis]) -> list[Through] | None:
+        """How far off each of some models is over whole records, where a search goes by windows of them and controllers lead the
+        robot; None elsewhere."""
+        return None
 
     def other_errors(self, *models: Hypothesis) -> list[str]:
         """Errors of a model, or of one and another made from it, as this way counts them elsewhere, in lines for people."""

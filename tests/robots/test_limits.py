@@ -19,7 +19,9 @@ JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child li
 <axis xyz="0 1 0"/><limit lower="-2" upper="2" {effort} velocity="3"/></joint>"""
 
 
-def begun(folder: Path, first: str, second: str, mass: float = 0.3, kind: str = "revolute", more: str = "", base: float = 0.0) -> Starter:
+def begun(
+    folder: Path, first: str, second: str, mass: float = 0.3, kind: str = "revolute", more: str = "", base: float = 0.0
+) -> Starter:
     """The description to begin with of two links on a base, whose joints have these limits."""
     parts = [
         LINK.format(name="base", com=0.0, mass=base) if base else '<link name="base"/>',

@@ -22,7 +22,7 @@ import numpy as np
 
 from ee_dist.basics.altered import altered
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, error, joints_of
+from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, Through, error, joints_of
 from ee_dist.discrepancy.starting import speeds_off
 from ee_dist.discrepancy.ways.free_run.longer_steps import SLIGHT, every_row_is_known, moved_by
 from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
@@ -352,6 +352,12 @@ class FreeRun(Problem):
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         return self.other_errors(hypothesis)
+
+    def run_through(self, models: Sequence[Hypothesis]) -> list[Through] | None:
+        if self.windows_s is None or not led(self.robot):
+            return None
+        whole = self._whole
+        return [Through(whole.natural(e), whole.told(e)) for e in map(error, whole.residuals(models))]
 
     def other_errors(self, *models: Hypothesis) -> list[str]:
         out = []
