@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.basics.quoted import quoted
+from ee_dist.measurements.bunched import pace_of
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping import Column, Even
 from ee_dist.measurements.sampling import Timing, check_times, once_a_moment
@@ -40,6 +41,12 @@ class Clocked:
     timing: Timing
     name: str = "row"
     """What says when its rows were: a column, or "row" where nothing does."""
+    stamped: Array | None = None
+    """Seconds (T,) that it says they were, where rows are taken at an even pace all the same."""
+
+    @property
+    def stamps_s(self) -> Array:
+        return self.times_s if self.stamped is None else self.stamped
 
 
 def times_of(table: Table, time: Column | Even | None, where: str) -> tuple[Array, str]:
@@ -59,10 +66,16 @@ def times_of(table: Table, time: Column | Even | None, where: str) -> tuple[Arra
     return raw * factor(time.unit, "s", f"{where}: time") * time.scale, time.column
 
 
-def clocked(table: Table, time: Column | Even | None, where: str) -> Clocked:
-    """The main table's clock; of a few rows that bear the time of the row before the last counts. Raises MeasurementError for
-    times that stand still more often, run backwards, or jump beyond reason."""
+def clocked(table: Table, time: Column | Even | None, where: str, readings: Array | None = None) -> Clocked:
+    """The main table's clock; of a few rows that bear the time of the row before the last counts. Where ``readings`` (T, J) of
+    positions show that stamps come in bunches, and rows do not, rows are an even pace apart. Raises MeasurementError for times
+    that stand still more often, run backwards, or jump beyond reason."""
     times_s, name = times_of(table, time, where)
+    trusted = isinstance(time, Column) and time.sure
+    if readings is not None and not trusted and (pace := pace_of(times_s, readings)) is not None:
+        even = np.arange(len(times_s)) * pace
+        even += float(np.mean(times_s - even))
+        return Clocked(table, even, check_times(even, table, name), name, times_s)
     if (last := once_a_moment(times_s)) is not None:
         table, times_s = table.part(last), times_s[last]
     timing = check_times(times_s, table, name)

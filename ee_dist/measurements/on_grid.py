@@ -42,6 +42,7 @@ class OnGrid:
         step = robot.time_step_s if mapping.rate_hz is None else 1.0 / mapping.rate_hz
         found = TrialClocks(recorded, mapping, robot, report.done)
         self.unit = found.unit
+        report.suspicious += [found.lost] * bool(found.lost)
         check_grid(found.main, step, mapping.rate_hz is not None, self.unit)
         found.cut()
         self.main, self.clocks = found.main, found.clocks

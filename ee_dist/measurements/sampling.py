@@ -57,6 +57,9 @@ def check_times(times_s: Array, table: Table, column: str) -> Timing:
         first = float(np.median(np.abs(steps)))
         several = "; several trials in one file? add 'split: restarts'" if steps[row - 1] < -10 * first else ""
         more = f", and in {len(wrong) - 1} rows more" if len(wrong) > 1 and not several else ""
+        if (steps >= 0).all() and len(wrong) > AGAIN * len(steps) and times_s[-1] > times_s[0]:
+            rate = float(f"{len(steps) / (times_s[-1] - times_s[0]):.4g}")
+            more += f"; if they were read at an even pace, write 'time: {{rate_hz: {rate:g}}}' into the mapping"
         raise MeasurementError(
             f"{table}: row {table.line(row)}, column {quoted(column)}: time {how} "
             f"({times_s[row - 1]:.9g} s, then {times_s[row]:.9g} s){more}{several}"

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.basics.names import counted
-from ee_dist.measurements.alignment import Match, match, one_clock
+from ee_dist.measurements.alignment import SHARED, Match, match, one_clock
 from ee_dist.measurements.clocks import clocked, loosely_clocked
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.frozen import frozen
+from ee_dist.measurements.jumps import FEWEST, hops
 from ee_dist.measurements.mapping import Column, Even, Mapping
 from ee_dist.measurements.robot_channels import command_kind
 from ee_dist.measurements.table import Recorded, Table
@@ -29,23 +30,66 @@ that is judged."""
 
 class TrialClocks:
     """``main`` is the clocked table of the first sensor, ``clocks`` all by name, on its clock; ``unit`` is what the mapping
-    says its time is in. What was done goes to ``done``. Raises MeasurementError where the clocks cannot be brought together.
+    says its time is in, ``lost`` where rows are missing among those that come in bunches. What was done goes to ``done``. Raises
+    MeasurementError where the clocks cannot be brought together.
     """
 
     def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, done: list[str]) -> None:
         self.recorded, self.mapping, self.robot, self.done = recorded, mapping, robot, done
-        self.where = str(mapping.source)
+        self.where, self.lost = str(mapping.source), ""
         used = mapping.columns()
         self.first = next((c.table for g, _, c in used if g == "sensors"), "")
         time = self._time(self.first)
         self.unit = time.unit if isinstance(time, Column) else "s"
-        self.main = clocked(self._table(self.first), time, self.where)
+        self.main = clocked(self._table(self.first), time, self.where, self._positions())
         self._tell_moments()
         self.clocks = {self.first: self.main}
         for name in dict.fromkeys(c.table for _, _, c in used):
             if name != self.first:
                 self.clocks[name] = loosely_clocked(self._table(name), self._time(name), self.where)
         self._align()
+        self._tell_bunched()
+
+    def _positions(self) -> Array | None:
+        """(T, J) what the main table says of joints' positions, as it stands there."""
+        kinds = {s.name: s.kind for s in self.robot.sensors}
+        read = [
+            c.column
+            for n, c in self.mapping.sensors.items()
+            if isinstance(c, Column) and c.table == self.first and kinds.get(n) == "position"
+        ]
+        table = self._table(self.first)
+        return np.stack([table.numbers(c, gaps=True) for c in read], axis=1) if read else None
+
+    def _tell_bunched(self) -> None:
+        """Tells of rows that are taken at an even pace; other tables that bear the same stamps follow."""
+        if self.main.stamped is None:
+            return
+        stamps, pace = self.main.stamped, self.main.timing.median_s
+        steps = 1e3 * np.diff(stamps)
+        for name, found in self.clocks.items():
+            if name != self.first and float(np.isin(found.times_s, stamps).mean()) > SHARED:
+                found.times_s = np.interp(found.times_s, stamps, self.main.times_s)
+        self._look_for_lost()
+        keep = "; 'sure: true' at the time keeps the stamps" if self.main.table.clock is None else ""
+        who, apart = self.first or self.main.table.path.name, f"{steps.min():.3g} to {steps.max():.3g} ms apart"
+        self.done.append(
+            f"{who}: stamps come in bunches ({apart}), and positions go on evenly from row to row: rows are taken "
+            f"{1e3 * pace:.4g} ms apart ({1 / pace:.4g} Hz){keep}"
+        )
+
+    def _look_for_lost(self) -> None:
+        """Rows at an even pace from one of which to the next several times as far was gone, by the joints as they were read."""
+        read = self._positions()
+        if read is None:
+            return
+        rows = np.unique(np.concatenate([hops(column, self.main.times_s) for column in read.T]))
+        if len(rows) >= FEWEST:
+            first = self.main.table.line(int(rows[0]) + 1)
+            self.lost = (
+                f"time: rows seem to be lost at {len(rows)} places, before row {first} first, where "
+                "a joint goes several times as far in one row as around it: rows count as evenly apart there"
+            )
 
     def _tell_moments(self) -> None:
         every, kept = len(self._table(self.first)), len(self.main.table)
@@ -80,7 +124,7 @@ class TrialClocks:
                 continue
             if found.table.clock is not None and self.main.table.clock is not None:
                 continue
-            if one_clock(self.main.times_s, found.times_s):
+            if one_clock(self.main.stamps_s, found.times_s):
                 self.done.append(
                     f"{name}: its clock and that of {self.first} count from one epoch, stamp the same rows, or begin and end "
                     "together: taken as the same"
@@ -213,5 +257,5 @@ class TrialClocks:
 
     def _keep(self, rows: slice) -> None:
         """Keeps some rows of the main table."""
-        self.main = replace(self.main, table=self.main.table.part(rows), times_s=self.main.times_s[rows])
+        self.main = replace(self.main, table=self.main.table.part(rows), times_s=self.main.times_s[rows], stamped=None)
         self.clocks[self.first] = self.main
