@@ -36,7 +36,8 @@ class Table:
     """Columns of one clock. A column is an array (T,) or (T, n) of numbers, or a list of T cells as they were read.
 
     ``lines`` are the numbers that the file's user sees for the rows; ``clock`` is the column that holds the seconds of a
-    clock that all tables of the recording share; ``parts`` names the numbers of list cells; ``units`` are those that the
+    clock that all tables of the recording share; ``parts`` names the numbers of list cells; ``spread`` are the columns that the
+    numbers of an array became, whose places are known as well; ``units`` are those that the
     file states; ``twice`` are names that head more than one column; ``notes`` say what was done on the way.
     """
 
@@ -47,6 +48,7 @@ class Table:
     lines: Sequence[int] | None = None
     clock: str | None = None
     parts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    spread: dict[str, tuple[str, ...]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     twice: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
@@ -149,6 +151,10 @@ class Table:
         found = _PLACE.match(column)
         if found and found["name"] in self.columns:
             return self._inside(found["name"], found["part"])
+        spread = self.spread.get(found["name"], ()) if found else ()
+        own = dict(zip(map(str, range(len(spread))), spread, strict=True)).get(found["part"]) if found else None
+        if own in self.columns:
+            return self.columns[own]
         raise MeasurementError(f"{self}: no column {quoted(column)}; {nearest(column, self.addresses())}")
 
     def _inside(self, name: str, part: str) -> Any:

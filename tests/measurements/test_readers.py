@@ -89,6 +89,43 @@ def test_episodes_groups_and_structs_are_trials(tmp_path: Path) -> None:
     assert np.array_equal(found[1].tables[0].numbers("q[0]"), m["q"][:, 0] + 1)
 
 
+@pytest.mark.parametrize("form", ["cell", "characters", "npz", "7.3"])
+def test_an_array_whose_columns_the_file_names_is_read_by_these(tmp_path: Path, form: str) -> None:
+    data, names = np.random.default_rng(0).random((50, 4)), ["time", "shoulder_position", "elbow_position", "current"]
+    path = tmp_path / {"npz": "a.npz", "7.3": "a.h5"}.get(form, "a.mat")
+    if form == "npz":
+        np.savez(path, data=data, labels=names)
+    elif form == "7.3":
+        with h5py.File(path, "w") as f:
+            f["data"] = data.T
+            cell = f.create_dataset("column_name", (4, 1), dtype=h5py.ref_dtype)
+            cell.attrs["MATLAB_class"] = np.bytes_("cell")
+            for k, n in enumerate(names):
+                text = f.create_dataset(f"#refs#/{k}", data=np.array([[ord(c)] for c in n], dtype=np.uint16))
+                text.attrs["MATLAB_class"] = np.bytes_("char")
+                cell[k, 0] = text.ref
+    else:
+        cell = np.array(names, dtype=object if form == "cell" else np.str_)
+        io.savemat(path, {"data": data, "column_name": cell, "units": np.array(["s", "deg", "deg", "A"], dtype=object)})
+    (table,) = read(path)[0].tables
+    assert list(table.addresses()) == names
+    for k, name in enumerate(names):
+        assert np.array_equal(table.numbers(name), data[:, k])
+        assert np.array_equal(table.numbers(f"data[{k}]"), data[:, k])  # as mappings have it that were written before
+    assert table.units == ({} if form in ("npz", "7.3") else dict(zip(names, ("s", "deg", "deg", "A"), strict=True)))
+
+
+def test_names_of_joints_are_those_of_the_places_in_all_arrays(tmp_path: Path) -> None:
+    q = np.random.default_rng(0).random((50, 2))
+    names = np.array(["shoulder", "elbow"], dtype=object)
+    io.savemat(tmp_path / "a.mat", {"t": np.arange(50.0), "q": q, "tau": 2 * q, "joint_names": names})
+    (table,) = read(tmp_path / "a.mat")[0].tables
+    assert np.array_equal(table.numbers("q[elbow]"), q[:, 1]) and np.array_equal(table.numbers("tau[1]"), 2 * q[:, 1])
+    io.savemat(tmp_path / "b.mat", {"t": np.arange(50.0), "q": q, "tau": 2 * q, "operators": names})
+    (table,) = read(tmp_path / "b.mat")[0].tables
+    assert list(table.addresses()) == ["t", "q[0]", "q[1]", "tau[0]", "tau[1]"]
+
+
 def test_arrays_of_two_lengths_are_two_tables(tmp_path: Path) -> None:
     np.savez(
         tmp_path / "a.npz",

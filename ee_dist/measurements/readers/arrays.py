@@ -6,6 +6,7 @@ import re
 import zipfile
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ TRIAL = re.compile(
 """What groups are called that hold a trial each."""
 
 
+_UNITS, _JOINTS = re.compile("unit", re.I), re.compile("joint|motor|servo", re.I)
+"""What texts are called that are units of columns, and names of joints."""
 _SIGNS = (b"\x93NUMPY", b"\x80")
 """How an array begins, and a pickle, which deserves a reason of its own."""
 
@@ -30,16 +33,20 @@ _SIGNS = (b"\x93NUMPY", b"\x80")
 def recorded(file: Path, name: str, arrays: Mapping[str, Any], notes: tuple[str, ...] = ()) -> Recorded:
     """A trial of arrays: those of one length are one table, numbers and texts its header.
 
-    Arrays are (T,), (T, n) or (n, T). Raises MeasurementError where none is a series.
+    Arrays are (T,), (T, n) or (n, T); n texts are the names of n columns, or of joints. Raises MeasurementError where none is a
+    series.
     """
     series: dict[str, Any] = {}
     header: dict[str, Any] = {}
+    texts: dict[str, list[str]] = {}
     said = list(notes)
     for key, value in arrays.items():
         array = np.asarray(value)
         if array.dtype.kind not in "fiub":
             if array.ndim == 0 and array.dtype.kind in "US":
                 header[key] = str(array)
+            elif array.dtype.kind == "U" and 1 < array.size == max(array.shape) <= WIDEST:
+                texts[key] = [str(c).strip() for c in array.ravel()]
             continue
         array = np.squeeze(array)
         if array.ndim == 0:
@@ -62,16 +69,42 @@ def recorded(file: Path, name: str, arrays: Mapping[str, Any], notes: tuple[str,
     if not groups:
         raise MeasurementError(f"{file}: no array of numbers in it that is a series; there are: {_shapes(arrays)}")
     tables = tuple(
-        Table(
-            file,
-            columns,
-            header,
-            name="" if len(groups) == 1 else next(iter(columns)),
-            notes=tuple(said) if not k else (),
+        _called(
+            Table(
+                file,
+                columns,
+                header,
+                name="" if len(groups) == 1 else next(iter(columns)),
+                notes=tuple(said) if not k else (),
+            ),
+            texts,
         )
         for k, columns in enumerate(groups.values())
     )
     return Recorded(name, tables)
+
+
+def _called(table: Table, texts: Mapping[str, list[str]]) -> Table:
+    """The table with the names that the file itself has for the columns of its arrays: of joints, in all that have as many, or
+    of quantities, for the one array that has as many. Units are told by their name."""
+    wide = {k: v.shape[1] for k, v in table.columns.items() if v.ndim == 2}
+    units = [t for k, t in texts.items() if _UNITS.search(k)]
+    for key, names in texts.items():
+        theirs = [k for k, width in wide.items() if width == len(names)]
+        if _UNITS.search(key) or not theirs or len(set(names)) < len(names) or not all(names):
+            continue
+        if _JOINTS.search(key):
+            return replace(table, parts={k: tuple(names) for k in theirs})
+        if len(theirs) > 1 or set(names) & (table.columns.keys() - {theirs[0]}):
+            continue
+        columns: dict[str, Any] = {}
+        for k, array in table.columns.items():
+            columns |= dict(zip(names, array.T, strict=True)) if k == theirs[0] else {k: array}
+        stated = next((dict(zip(names, u, strict=True)) for u in units if len(u) == len(names)), {})
+        return replace(
+            table, columns=columns, spread={theirs[0]: tuple(names)}, units={k: u for k, u in stated.items() if u}
+        )
+    return table
 
 
 def _rows(array: Any, lengths: Counter[int]) -> int:

@@ -11,7 +11,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.readers.arrays import TRIAL, recorded
 from ee_dist.measurements.readers.needs import needed
 from ee_dist.measurements.readers.options import Options, bounded
-from ee_dist.measurements.table import Recorded
+from ee_dist.measurements.table import WIDEST, Recorded
 
 
 def read_hdf5(file: Path, options: Options) -> tuple[Recorded, ...]:
@@ -67,6 +67,9 @@ def _arrays(h5py: Any, source: Any, file: Path) -> tuple[dict[str, Any], tuple[s
         if item.external or item.is_virtual:
             notes.append(f"{path}: left out, its numbers stand in other files")
             return
+        if (texts := _texts(h5py, source, item)) is not None:
+            found[path] = texts
+            return
         numeric = item.dtype.kind in "fiub"
         if not numeric and item.dtype.names is None:
             return
@@ -91,3 +94,13 @@ def _arrays(h5py: Any, source: Any, file: Path) -> tuple[dict[str, Any], tuple[s
 
     source.visititems(visit)
     return found, tuple(notes)
+
+
+def _texts(h5py: Any, source: Any, item: Any) -> Any:
+    """The texts of a cell of MATLAB's, which refers to arrays of characters in the same file; None for anything else."""
+    if item.attrs.get("MATLAB_class", b"") != b"cell" or not h5py.check_ref_dtype(item.dtype) or item.size > WIDEST:
+        return None
+    cells = [source[r] for r in item[()].ravel() if r]
+    if not cells or not all(c.attrs.get("MATLAB_class", b"") == b"char" and c.size <= WIDEST for c in cells):
+        return None
+    return np.array(["".join(map(chr, c[()].T.ravel())) for c in cells])

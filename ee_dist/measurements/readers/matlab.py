@@ -44,7 +44,7 @@ def read_mat(file: Path, options: Options) -> tuple[Recorded, ...]:
         raise MeasurementError(f"{file}: not a MATLAB file, or cut short: {what}")
     found = []
     for name, told in said["trials"]:
-        columns = {k: arrays[v[0]] if isinstance(v, list) else v for k, v in told.items()}
+        columns = {k: _value(v, arrays) for k, v in told.items()}
         if not any(np.asarray(v).dtype.kind in "fiub" for v in columns.values()):
             raise MeasurementError(
                 f"{file}: no arrays of numbers in it (timeseries, tables and objects are not read): "
@@ -52,6 +52,13 @@ def read_mat(file: Path, options: Options) -> tuple[Recorded, ...]:
             )
         found.append(recorded(file, name, columns))
     return tuple(found)
+
+
+def _value(told: Any, arrays: list[Any]) -> Any:
+    """What the other process said of an entry: an array by its number, texts, or what it is."""
+    if isinstance(told, dict):
+        return np.array(told["texts"], dtype=np.str_)
+    return arrays[told[0]] if isinstance(told, list) else told
 
 
 def _asked(file: Path) -> tuple[dict[str, Any], list[Any]]:

@@ -80,15 +80,25 @@ def _flatten(data: Mapping[str, Any], before: str, into: dict[str, Any], trials:
             isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
         ):
             into[name] = value
+        elif (texts := _texts(value)) is not None:
+            into[name] = texts
+
+
+def _texts(value: Any) -> tuple[str, ...] | None:
+    """The texts of a cell or of an array of characters; None where there are others."""
+    cells = np.ravel(np.asarray(value, dtype=object)).tolist() if isinstance(value, (list, np.ndarray)) else []
+    return tuple(cells) if cells and all(isinstance(c, str) for c in cells) else None
 
 
 def _told(flat: Mapping[str, Any], arrays: list[Any]) -> dict[str, Any]:
-    """Names to [number of an array], or to a text or number as it is."""
+    """Names to [number of an array], to {"texts": [...]}, or to a text or number as it is."""
     told: dict[str, Any] = {}
     for name, value in flat.items():
         if isinstance(value, np.ndarray):
             told[name] = [len(arrays)]
             arrays.append(value)
+        elif isinstance(value, tuple):
+            told[name] = {"texts": value}
         else:
             told[name] = value
     return told
