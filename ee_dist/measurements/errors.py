@@ -12,6 +12,10 @@ class MeasurementError(LogError):
     """A measurement that cannot be used; one line: what, where, and what would be right."""
 
 
+class EmptyColumnError(MeasurementError):
+    """A column without a single number."""
+
+
 class SeveralColumnsError(MeasurementError):
     """A name that several columns have, which says itself which there are: no row of the file is wrong."""
 

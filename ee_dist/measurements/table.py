@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ee_dist.basics.quoted import quoted
-from ee_dist.measurements.errors import MeasurementError, SeveralColumnsError, nearest
+from ee_dist.measurements.errors import EmptyColumnError, MeasurementError, SeveralColumnsError, nearest
 from ee_dist.trials.log import Array
 
 _PLACE = re.compile(r"^(?P<name>.+)\[(?P<part>[^\[\]]+)\]$")
@@ -110,6 +110,10 @@ class Table:
         cells = self._cells(column)
         out = self._floats(cells, column)
         bad = np.flatnonzero(~np.isfinite(out))
+        if len(bad) and not gaps and np.isnan(out).all():
+            raise EmptyColumnError(
+                f"{self}: column {quoted(column)} is empty from end to end; take it out of the mapping, or leave this file out"
+            )
         if len(bad) and not gaps:
             raw = cells[int(bad[0])]
             known = "empty" if raw is None or raw == "" else f"{raw}"

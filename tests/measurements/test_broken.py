@@ -48,6 +48,10 @@ def cut(rows: int) -> Callable[[pd.DataFrame], pd.DataFrame]:
         (lambda f: f.rename(columns={"position_m": "position_mm"}), "no column 'position_m'; did you mean position_mm"),
         (put("position_m", 41, "oops"), r"row (42|43), column 'position_m': 'oops' is not a number"),
         (put("position_m", 41, None), r"row (42|43), column 'position_m' is (empty|nan)"),
+        (
+            lambda f: f.assign(position_m=np.nan),
+            r"column 'position_m' is empty from end to end; take it out of the mapping",
+        ),
         (put("t", 41, 0.0), r"row (42|43), column 't': time runs backwards \(0.04 s, then 0 s\)"),
         (lambda f: f.assign(t=f["t"].round(1)), r"row (2|3), column 't': time stands still .*, and in \d+ rows more"),
         (cut(0), "no rows in it"),

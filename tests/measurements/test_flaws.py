@@ -44,6 +44,18 @@ def test_a_flaw_in_what_is_not_needed_is_a_note(tmp_path: Path) -> None:
     assert len([n for n in proposal.notes if "'elbow_vel_rad_s': '-' is not a number" in n]) == 1
 
 
+def test_columns_without_a_number_are_left_out_and_told(tmp_path: Path) -> None:
+    table = frame()
+    table["shoulder_effort"], table["elbow_effort"], table["stamp"] = np.nan, np.nan, np.nan
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, table))
+    assert not proposal.questions
+    assert proposal.notes == ["left out, for no cell holds a number: shoulder_effort, elbow_effort, stamp"]
+    logs.imported(tmp_path, tmp_path / "log.csv")
+    # Nor is an empty time a flaw of a log without one.
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, table.drop(columns="time")))
+    assert proposal.questions == ["no column rises like a time; say task.rate_hz=ROWS_A_SECOND"]
+
+
 @pytest.mark.parametrize("zone", ["Z", "+02:00", ""])
 def test_dates_are_times(tmp_path: Path, zone: str) -> None:
     table, m = frame(), motion()

@@ -211,6 +211,10 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
     if left:
         more = f" and {len(left) - MOST_SHOWN} more" if len(left) > MOST_SHOWN else ""
         proposal.notes.append(f"columns not used: {', '.join(left[:MOST_SHOWN])}{more}")
+    empty = [a for t in recorded.tables for a in t.addresses() if a not in used and not recorded_in(t, a)]
+    if empty:
+        more = f" and {len(empty) - MOST_SHOWN} more" if len(empty) > MOST_SHOWN else ""
+        proposal.notes.append(f"left out, for no cell holds a number: {', '.join(empty[:MOST_SHOWN])}{more}")
     tilts = [name for name in left if tilt_of(name)]
     if tilts and robot.free_base and not any(s.kind in TILTS for s in robot.sensors):
         wanted = ", ".join(f"{{name: {kind}, kind: {kind}}}" for kind in TILTS)

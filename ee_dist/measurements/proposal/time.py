@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ee_dist.measurements.clocks import FASTEST_S, QUICKEST_S, SLOWEST_S
-from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.errors import EmptyColumnError, MeasurementError
 from ee_dist.measurements.proposal.blocks import series_of
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Hints
 from ee_dist.measurements.proposal.words import TIME, Reading, read_name, unit_word
@@ -87,6 +87,8 @@ def time_flaw(table: Table) -> MeasurementError | None:
             rises = float((steps > 0).mean())
             if rises > MOSTLY or ((steps >= 0).all() and rises > SELDOM):
                 check_times(values, table, address)
+        except EmptyColumnError:
+            continue
         except MeasurementError as error:
             return error
     return None
