@@ -42,6 +42,34 @@ def test_a_passive_joint_needs_no_command(tmp_path: Path, driven: str, command: 
     assert (record.log.commands[:, 1 - k] == 0.0).all()
 
 
+@pytest.mark.parametrize(
+    "columns",
+    [
+        ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"),
+        ("Fx_N", "Fy_N", "Tz_Nm"),
+        ("sensor_force_x", "sensor_force_y", "sensor_torque_z"),
+        ("ft_sensor_torque",),
+        ("wrist_wrench",),
+    ],
+)
+def test_a_sensor_of_forces_is_no_command_of_the_one_joint_that_obeys_torques(
+    tmp_path: Path, columns: tuple[str, ...]
+) -> None:
+    m, path = samples.motion(), samples.robot_file(tmp_path)
+    driven, swings = samples.JOINTS
+    text = path.read_text().split("drives:")[0]
+    path.write_text(f"{text}drives:\n  {driven}: {{command: torque}}\n  {swings}: {{command: none}}\n")
+    robot, _ = load_robot(path)
+    frame = logs.frame_of(m["t"], m["q"], m["g"]).drop(columns=[f"{j}_goal_rad" for j in samples.JOINTS])
+    for k, name in enumerate(columns):
+        frame[name] = np.sin((2 + k) * m["t"])
+    proposal = proposal_for([logs.written(tmp_path, frame)], robot, Hints())
+    assert [c.column for c in proposal.choices if c.group == "commands"] == ["???"]
+    assert not any(name in q for q in proposal.questions for name in columns)
+    proposal = proposal_for([logs.written(tmp_path, frame.assign(torque=m["g"][:, 0]))], robot, Hints())
+    assert [c.column for c in proposal.choices if c.group == "commands"] == ["torque"]
+
+
 def test_where_nothing_is_driven_a_log_of_positions_is_all_that_there_is(tmp_path: Path) -> None:
     m, path = samples.motion(), samples.robot_file(tmp_path)
     text = path.read_text().split("drives:")[0]

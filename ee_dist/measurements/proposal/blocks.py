@@ -27,6 +27,7 @@ from ee_dist.measurements.proposal.words import (
     tokens,
     unit_word,
 )
+from ee_dist.measurements.proposal.wrench import of_a_wrench
 from ee_dist.measurements.table import Recorded, Table
 from ee_dist.robots.model import Sensor
 from ee_dist.trials.log import Array
@@ -132,7 +133,9 @@ def blocks_of(
         named |= limbs | sensed
         pairs = spelled_out({_stem(a) for a in series})
         families: dict[tuple[str, bool], list[tuple[str, Reading, str | None]]] = {}
-        for address in series:
+        nobodys = [a for a in series if a not in named and joint_in(a, words) is None]
+        wrench = of_a_wrench(table.name, {a: read_name(a) for a in nobodys})
+        for address in (a for a in series if a not in wrench):
             joint, stem = joint_in(address, words), _stem(address)
             said = stem if joint is None or joint_in(stem, words) else address
             reading = read_name(pairs.get(stem, said), words[joint] if joint else frozenset())
@@ -153,7 +156,7 @@ def blocks_of(
                 mute += [m[0] for m in members]
         found += _by_place(table, [a for a in series if a in mute], series, joints, order)
         if order is not None:
-            used = {c for b in found for c in b.columns}
+            used = {c for b in found for c in b.columns} | wrench
             found += _by_other_names(table, [a for a in series if a not in used], series, joints, order)
     return [b for b in found if b.reading.kind != OTHER]
 

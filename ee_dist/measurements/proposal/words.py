@@ -15,7 +15,8 @@ _QUANTITY = {
     TORQUE: "tau tor torq torqs torque torques effort efforts trq moment drehmoment force kraft jtau frc",
     CURRENT: "cur curr current currents amps ampere strom iq amperage",
     OTHER: "acc accel acceleration qdd ddq qddot ddotq volt voltage volts temp temperature pwm err error fric friction duty "
-    "status flag mode supply battery load enable enabled counter seq id ticks cycle wrench imu tcp cartesian eef",
+    "status flag mode supply battery load enable enabled counter seq id ticks cycle wrench imu tcp cartesian eef "
+    "ft fts ftsensor loadcell",
     TIME: "t time times timestamp timestamps stamp stamps zeit clock sec secs seconds elapsed uptime tstamp date datetime",
 }
 VOLTAGES = frozenset(["pwm", "duty", "volt", "volts", "voltage"])
