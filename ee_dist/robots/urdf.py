@@ -13,6 +13,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
@@ -31,7 +32,7 @@ from ee_dist.robots.model import (
     Shape,
     Vec3,
 )
-from ee_dist.robots.moments import Moments, refused
+from ee_dist.robots.moments import Moments, one_direction, refused
 from ee_dist.robots.pivots import PIVOT_HINT
 from ee_dist.robots.xacro import PROGRAM, XacroError, expanded, is_xacro
 from ee_dist.robots.xml import XmlError, element_of, read_xml
@@ -115,7 +116,8 @@ class _Reader:
         for name in order[1:]:
             if carried[name].kind == "fixed" and carried[name].parent in still:
                 still.add(name)
-        parts = {name: self.part(name, links[name], carried.get(name), name in still) for name in order}
+        axes = one_direction(order, carried)
+        parts = {name: self.part(name, links[name], carried.get(name), name in still, axes.get(name)) for name in order}
         if self.moments.unfit:
             raise self.fail(f"links {listed(self.moments.unfit)}", refused())
         kept_parts, kept_joints, start, given, idle = folded(parts, {n: carried[n] for n in order[1:]}, order[0])
@@ -146,7 +148,7 @@ class _Reader:
             unlimited=tuple(name for name in moving if self.unlimited(elements[name], f"joint {quoted(name)}")),
             transmissions=tuple(j.get("name", "") for t in self.root.iter("transmission") for j in t.iter("joint")),
             root_without_mass=root_given,
-            bolted_only=tuple(self.moments.idle),
+            bolted_only=(*self.moments.idle, *self.moments.planar),
             free_base=True if floats is not None else None,
             start_position_m=start[0],
             start_rotation=start[1],
@@ -330,8 +332,10 @@ class _Reader:
             raise self.fail(where, f"its limits leave no range: lower {lower:g}, upper {upper:g}")
         return lower, upper
 
-    def part(self, name: str, e: ET.Element, joint: Joint | None, still: bool) -> Part:
-        """A link as a part; ``still``: it never moves beside the root."""
+    def part(
+        self, name: str, e: ET.Element, joint: Joint | None, still: bool, axis: NDArray[np.float64] | None = None
+    ) -> Part:
+        """A link as a part; ``still``: it never moves beside the root; ``axis`` (3,): the one direction about which it turns."""
         where = f"link {quoted(name)}"
         shapes = tuple(s for c in e.findall("collision") if (s := self.shape(name, c)) is not None)
         inertial = e.find("inertial")
@@ -356,8 +360,8 @@ class _Reader:
         if not own.any() and joint is not None and joint.kind == "fixed":
             own = np.diag(np.full(3, mass * POINT_M**2))
             self.assumed.append(f"{where}: a mass without inertia: taken as a ball of 1 cm")
-        own = self.moments.usable(name, own, still)
         axes = rotation_matrix(turn)
+        own = self.moments.usable(name, own, still, None if axis is None else axes.T @ axis)
         return Part(name, mass, com, entries(axes @ own @ axes.T), shapes)
 
     def shape(self, link: str, collision: ET.Element) -> Shape | None:

@@ -478,6 +478,51 @@ def test_what_is_fixed_to_a_bolted_base_needs_no_inertia(tmp_path: Path) -> None
         robot_of_body(body, drives | {"free_base": True}, "r.yaml")
 
 
+LEFT_OUT = [(0.0, 0.008, 0.0), (1e-6, 0.008, 1e-6)]
+
+
+@pytest.mark.parametrize("diagonal", LEFT_OUT)
+def test_moments_that_a_planar_robot_leaves_out_count_for_nothing(
+    tmp_path: Path, diagonal: tuple[float, float, float]
+) -> None:
+    """Both links turn about y, whose moment is given: the motion is that of the same robot with all moments."""
+    drives, logs = {"drives": {"a": {"kp": 5}, "b": {"kp": 5}}, "free_base": False}, []
+    for own in (diagonal, (0.005, 0.008, 0.006)):
+        body = read(
+            tmp_path, link("base"), hinge("a", "base", "one"), link("one", com="0 0 0.1", diagonal=own),
+            hinge("b", "one", "two", inside='<dynamics damping="0.1"/>'), link("two", com="0 0 0.1", diagonal=own),
+        )  # fmt: skip
+        robot, _ = robot_of_body(body, drives, "r.yaml")
+        (log,) = MuJoCoEngine(threads=1).rollout([Rollout(robot, Commands(np.full((1, 2), 0.3)), 50)])
+        logs.append(log.sensors)
+        if own == diagonal:
+            (note,) = [a for a in body.assumed if "left out" in a]
+            assert "'one' (" in note and "'two' (" in note and "all joints turn about one direction" in note
+            with pytest.raises(RobotError, match=r"'one'.*no rigid body has this inertia.*free_base: false"):
+                robot_of_body(body, drives | {"free_base": True}, "r.yaml")
+    assert np.allclose(*logs, atol=1e-6)
+
+
+@pytest.mark.parametrize("diagonal", [(0.0, 0.008, 0.001), (0.0004, 0.8, 0.0004), (0.008, 0.0, 0.0), (0.0, 0.0, 0.0)])
+def test_others_that_no_rigid_body_has_are_refused_of_planar_robots_too(
+    tmp_path: Path, diagonal: tuple[float, float, float]
+) -> None:
+    with pytest.raises(UrdfError, match="no rigid body has this inertia"):
+        read(tmp_path, link("base"), hinge("a", "base", "one"), link("one", diagonal=diagonal))
+    about_z = hinge("a", "base", "one").replace("0 1 0", "0 0 1")
+    with pytest.raises(UrdfError, match="no rigid body has this inertia"):
+        read(tmp_path, link("base"), about_z, link("one", diagonal=(0.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("diagonal", LEFT_OUT)
+def test_moments_that_are_left_out_of_a_robot_that_turns_about_two_directions_are_refused(
+    tmp_path: Path, diagonal: tuple[float, float, float]
+) -> None:
+    yawing = hinge("a", "base", "one").replace("0 1 0", "0 0 1")
+    with pytest.raises(UrdfError, match=r"'two' .* no rigid body has this inertia"):
+        read(tmp_path, link("base"), yawing, link("one"), hinge("b", "one", "two"), link("two", diagonal=diagonal))
+
+
 def test_an_inertia_of_another_unit_is_refused_before_anything_is_guessed_from_it(tmp_path: Path) -> None:
     def mistyped(link: ET.Element) -> None:
         link.find("inertial/inertia").attrib.update(ixx="6.9e4", iyy="6.9e4")  # type: ignore[union-attr]
