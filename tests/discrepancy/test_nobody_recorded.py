@@ -204,6 +204,15 @@ def test_a_calibration_leaves_nothing_there() -> None:
     assert left["motion 2"][0, 1] > 0
 
 
+def test_a_calibration_is_the_mean_over_the_trials_of_a_name_in_which_a_channel_was_recorded() -> None:
+    one, other = plain("open_loop"), by("open_loop", tuple(replace(t, name="motion") for t in one_each()))
+    assert isinstance(one, OpenLoop) and isinstance(other, OpenLoop)
+    squares = [v**2 for v in unmodelled_by(one, one.residuals([()])[0]).values()]
+    (left,) = unmodelled_by(other, other.residuals([()])[0]).values()
+    # Where noise alone is left the squares of single trials were raised to 0.
+    assert left[0, 1] == pytest.approx(np.sqrt((squares[2][0, 1] + squares[3][0, 1]) / 2), rel=0.05)
+
+
 def test_trials_in_which_all_was_recorded_say_nothing_of_it() -> None:
     for way in ("open_loop", "free_run"):
         assert not any("nobody recorded" in line for line in by(way, recorded()).notes)
