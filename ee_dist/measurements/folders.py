@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
 
+import numpy as np
+
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.readers import kind_of, read
 from ee_dist.measurements.readers.json_rows import read_json
 from ee_dist.measurements.readers.options import Options
+from ee_dist.measurements.table import Table
 
 PROSE = ".txt"
 """The suffix of tables, and of notes."""
@@ -35,7 +38,48 @@ def recordings_in(folder: Path, kind: str | None = None) -> tuple[list[Path], li
         prose = {f: why for f in found if f.suffix.lower() == PROSE and (why := _no_table(f))}
         notes += [f"{f.name} left out: {why}" for f, why in prose.items()]
         loose += prose
+    again = _written_twice([f for f in found if f not in loose])
+    if again:
+        more = f" and {len(again) - 1} more" if len(again) > 1 else ""
+        file, first = next(iter(again.items()))
+        notes.append(f"{file.name}{more} left out: the same rows as in {first.name}, read once")
+        loose += again
     return [f for f in found if f not in loose], notes
+
+
+def _written_twice(files: Sequence[Path]) -> dict[Path, Path]:
+    """Files of which each is another's record in another form, under the same name but for its suffix, and that other; of each
+    pair of suffixes the first two files tell."""
+    told: dict[tuple[str, str], bool] = {}
+    firsts: dict[tuple[Path, str], Path] = {}
+    again = {}
+    for file in files:
+        first = firsts.setdefault((file.parent, file.stem), file)
+        if first == file:
+            continue
+        forms = (first.suffix, file.suffix)
+        if forms not in told:
+            told[forms] = _same(first, file)
+        if told[forms]:
+            again[file] = first
+    return again
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Whether two files hold the same numbers in the same columns."""
+    try:
+        tables = [[t for r in read(f) for t in r.tables] for f in (one, other)]
+        return len(tables[0]) == len(tables[1]) and all(
+            [*a.addresses()] == [*b.addresses()] and len(a) == len(b) and all(_alike(a, b, c) for c in a.addresses())
+            for a, b in zip(*tables, strict=True)
+        )
+    except MeasurementError:
+        return False
+
+
+def _alike(one: Table, other: Table, column: str) -> bool:
+    a, b = one.numbers(column, gaps=True), other.numbers(column, gaps=True)
+    return bool(np.allclose(a, b, rtol=1e-4, atol=1e-4 * float(np.nanmax(np.abs(a), initial=0.0)), equal_nan=True))
 
 
 def _those(folder: Path, kind: str | None) -> list[Path]:

@@ -28,7 +28,7 @@ from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import BETWEEN, ESTIMATED, Estimated, Mapping
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.pieces import in_pieces, pieces_asked
-from ee_dist.measurements.proposal.files import proposal_for
+from ee_dist.measurements.proposal.kinds import proposal_of_kinds
 from ee_dist.measurements.proposal.model import FIT, UNITS_TO_ASK, Hints, Proposal
 from ee_dist.measurements.proposal.write import as_yaml, rows
 from ee_dist.measurements.readers import FORMATS, kind_of
@@ -90,7 +90,7 @@ def run(config: Config, options: Options, out: Path) -> None:
                 f"{robot.name} has no drives: 'task=robot urdf={config.robot.urdf or 'FILE.urdf'}' writes a description "
                 "with some to begin with; then robot=urdf robot.drives=FILE.yaml"
             )
-        proposal = proposal_for(files, robot, replace(hints, written=written_orders(config)))
+        proposal, files = proposal_of_kinds(files, robot, replace(hints, written=written_orders(config)))
         mapping = written(proposal, config, files, out, console)
     robot, remarks = with_gains(robot, mapping)
     robot, finer = at_rate(robot, mapping)
