@@ -16,9 +16,9 @@ AROUND = 5
 OFF, MOVES, THROWN = 0.3, 5.0, 8.0
 """Judged at steps that are off by this share of the usual one, where a joint goes so many times its noise in the rows around, and
 nowhere makes so many times the largest of most of its steps, as where an angle wraps."""
-BY_ROW = 0.5
-"""Share of what stamps say beyond an even pace that positions must follow for the stamps to be right: 1 if they are, 0 if the
-rows are even. What they follow, and twice what is not known of it, is below."""
+BY_ROW = 0.35
+"""Share of what stamps say beyond an even pace that positions may follow at most, with twice what is not known of it: 0 if
+the rows are even, 1 if the stamps are right, as in logs of robots whose pace wanders."""
 
 
 def pace_of(times_s: Array, readings: Array) -> float | None:
