@@ -35,7 +35,10 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
 RESTART_S = 0.5
-"""Length of windows that start anew from the measured state."""
+"""Length of windows that start anew from the measured state,"""
+LATE, LAGS = 0.5, 4.0
+"""but of so many lags where a joint was seen to come later than by so much of it: by the end of such a window it has hardly come
+to what it was told, and any soft controller does as well."""
 GROWN = 10.0
 """Error over that of noise alone, of a perfect model, from which the starts of windows decide: motions that are not stable.
 Below it noise is all of the floor: it is a bound, and hid what was found without it in simulated robots."""
@@ -323,7 +326,7 @@ class FreeRun(Problem):
     @cached_property
     def _in_windows(self) -> FreeRun:
         """The same by windows, all of them."""
-        return self._by(RESTART_S)
+        return self._by(window_s(self.robot))
 
     @cached_property
     def _whole(self) -> FreeRun:
@@ -434,6 +437,12 @@ class FreeRun(Problem):
         """(trials,) mean absolute position error of each trial, in ``natural_unit``."""
         residual = self.residuals([hypothesis])[0]
         return np.array([self.natural(self.trial_error(residual, k)) for k in range(len(self.measured))])
+
+
+def window_s(robot: Robot) -> float:
+    """How long windows of a robot are, by what was seen of it."""
+    lag = max((robot.joint(d.joint).lag_s for d in robot.drives), default=0.0)
+    return RESTART_S if lag <= LATE * RESTART_S else round(LAGS * lag, 1)
 
 
 def led(robot: Robot) -> bool:
