@@ -28,6 +28,8 @@ GOES, HALF = 0.8, 0.5
 """Correlation with what the motion needs from which numbers without a name go with it, if it leaves less than this share of what
 the positions leave unexplained."""
 SHOWN = 4
+BEYOND = 5.0
+"""Times what drives give at most, the median of joints, from which numbers are not what they gave: servos report mA."""
 
 
 def _check_order(v: View, block: Block) -> None:
@@ -91,13 +93,21 @@ def add_torques(v: View) -> None:
         else:
             _tell_rivals(v, [s for s in found if s.score >= 2])
         return
-    if chosen.block.reading.kind == CURRENT and v.hints.gains is None and not any(sensed) and led(v):
+    current = chosen.block.reading.kind == CURRENT
+    beyond = "" if current or any(sensed) or v.hints.gains is not None else _beyond_the_drives(v, chosen.block)
+    if v.hints.gains is None and not any(sensed) and led(v) and (current or beyond):
         # A robot that is led by its commands is compared without torques.
+        what = f"motor currents ({chosen.block.name}) are" if current else f"{chosen.block.name} {beyond}: no N.m, and"
         v.out.notes.append(
-            f"motor currents ({chosen.block.name}) are left out; with task.gains=[N.m per A, one for each joint], or "
+            f"{what} left out; with task.gains=[N.m per {'A' if current else 'one'}, one for each joint], or "
             f"task.gains={FIT}, they are the torques of a balance of forces"
         )
         return
+    if beyond:
+        v.out.ask(
+            f"torques: {chosen.block.name} {beyond}: currents? say task.gains=[N.m per one, one for each joint] or "
+            f"task.gains={FIT}; or write 'unit: N.m' into the mapping, if the drive gives more than its description says"
+        )
     chosen.block.used = True
     units = torque_units(v, chosen.block)
     _check_order(v, chosen.block)
@@ -105,6 +115,23 @@ def add_torques(v: View) -> None:
     if any(sensed):
         v.add("sensors", sensed, chosen.block, units, chosen.why, level)
     v.add("torques", list(v.robot.motor_names), chosen.block, units, chosen.why, level)
+
+
+def _beyond_the_drives(v: View, block: Block) -> str:
+    """What numbers without a unit reach that drives cannot give, by what their file states; empty where they may be N.m (N)."""
+    stated = {d.joint: d.torque_limit for d in v.robot.drives if np.isfinite(d.torque_limit)}
+    guessed = v.robot.assumed_joints("torque_limit")
+    most = np.nanmax(np.abs(block.values), axis=0)
+    times = {
+        k: float(most[k]) / stated[j.name]
+        for k, j in enumerate(v.joints)
+        if most[k] > 0 and j.name in stated and j.name not in guessed
+    }
+    if any(block.units) or not times or float(np.median(list(times.values()))) <= BEYOND:
+        return ""
+    worst = max(times, key=lambda k: times[k])
+    name = v.joints[worst].name
+    return f"reach {most[worst]:.3g} at {name}, where its drive gives {stated[name]:.3g} at most"
 
 
 def _tell_rivals(v: View, found: list[Scored]) -> None:

@@ -210,12 +210,16 @@ def role_of(name: str) -> bool | None:
     return asked if asked != seen else None
 
 
+AMPERES = ("A", "mA")
+
+
 def _kind(kinds: list[str], texts: list[str], unit: str | None) -> tuple[str | None, bool]:
     if OTHER in kinds:
         return OTHER, False
     for kind in (SPEED, CURRENT, TORQUE, POSITION):
         if kind in kinds:
-            return kind, False
+            # An effort in mA is one that its servo measures by its current.
+            return CURRENT if kind == TORQUE and unit in AMPERES else kind, False
     if unit is not None:
         by_unit = {
             "rad/s": SPEED,
