@@ -153,12 +153,11 @@ def error_name(problem: Problem) -> str:
     return _capital(problem.natural_name) + unit
 
 
-def before_and_after(problem: Problem, before: float, after: float, floor: float) -> str:
-    """The model, the improved one and noise in one line."""
-    return (
-        f"{error_name(problem)}: model {problem.told(before)}, improved model {problem.told(after)}, noise floor "
-        f"{problem.told(floor)}."
-    )
+def before_and_after(problem: Problem, before: float, after: float, floor: float, on: str = "") -> str:
+    """The model, the improved one and noise in one line; ``on``: what data, where others follow."""
+    what = f"{error_name(problem)}{f' on {on}' if on else ''}"
+    told = problem.told
+    return f"{what}: model {told(before)}, improved model {told(after)}, noise floor {told(floor)}."
 
 
 def unexplained_rest(explained: float, settled: bool) -> str:
@@ -176,8 +175,10 @@ def tie_text(what: str, others: Sequence[str]) -> str:
     return f"These measurements cannot tell {what} from: {', '.join(map(placed, others))}."
 
 
-def left_text(left: Sequence[Leftover], after: bool) -> str:
+def left_text(left: Sequence[Leftover], after: bool, on: str = "") -> str:
+    """``on``: which trials, where they are others than those of the problem."""
     head = "Even with it, more than noise is left in" if after else "It sits in"
+    head = f"On {on} more than noise is left in" if on else head
     return f"{head} {counted(curves_of(left), 'curve')}; worst: {'; '.join(plain(str(g)) for g in left[:3])}."
 
 

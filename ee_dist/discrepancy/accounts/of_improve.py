@@ -56,6 +56,7 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
+NOTHING_APART = "nothing is left above the noise"
 EACH = "each of "
 NAMED = 3
 """Effects that a headline names."""
@@ -145,7 +146,10 @@ def improve_account(
     lines += beside_floor(last.error_heldout, found.noise_floor, not settled)
     if found.left:
         lines.append(left_text(found.left, bool(steps)))
-    error = before_and_after(problem, first.error_heldout, last.error_heldout, found.noise_floor)
+    if word is not None:
+        lines.append(apart_text(word))
+    on = "" if word is None else last.held_out
+    error = before_and_after(problem, first.error_heldout, last.error_heldout, found.noise_floor, on)
     share = f"{percent(max(0.0, min(found.explained, 1.0)))} of the error above the noise is explained"
     if len(found.ladder) == 1:
         head = f"Nothing was added: {NOTHING_BEYOND if unsure else found.stopped}."
@@ -180,6 +184,13 @@ def improve_account(
     good = settled and not warnings and not unsure and not any(ties.values())
     more = (*(word.lines if word is not None else ()), *also, *lines, *held_out_notes(problem), *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
+
+
+def apart_text(word: LastWord) -> str:
+    """What the model leaves of the trials that took no part: its error says how much that is, and not where."""
+    if word.left:
+        return left_text(word.left, word.changed, TRIALS_APART)
+    return f"On {TRIALS_APART} {'no curve stands out, and all together are more than noise' if word.more else NOTHING_APART}."
 
 
 def may_be_nothing(found: Improvement, terms: Sequence[Term]) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ee_dist.basics.names import counted
 from ee_dist.discrepancy.evidence.intervals import (
     ALL_OF_IT,
     BESIDE_GUESSES,
@@ -38,7 +39,7 @@ def ranges(
     terms: Hypothesis, parameters: Sequence[ParameterReport], named: Sequence[Term], robot: Robot, several: bool
 ) -> str:
     """The 95 % intervals of the values of ``named`` terms, of a model of these ``terms``; ``several``: more than one was found,
-    and each is said of which."""
+    and each is said of which. Of others only that there are more: a table has them."""
     told_of: dict[str, list[str]] = {t.name: [] for t in named}
     for p in parameters:
         term = terms[p.term]
@@ -48,7 +49,9 @@ def ranges(
             range_ += f", of which {EITHER}" if p.flag == EITHER else ""
             told_of[term.name].append(f"{quantity(term, p.name, robot)} {range_ if sure else p.flag or range_}".strip())
     out = [(f"{placed(name)}: " if several else "") + ", ".join(values) for name, values in told_of.items() if values]
-    return f"; {called(parameters)}: {'; '.join(out)}" if out else ""
+    others = sum(terms[p.term].name not in told_of for p in parameters)
+    more = f"; and {counted(others, 'more value')}, as the table of values has them" if others else ""
+    return f"; {called(parameters)}: {'; '.join(out)}{more}" if out else ""
 
 
 def rest_text(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:
@@ -57,12 +60,15 @@ def rest_text(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[
     if not doubted:
         return []
     text = f"Intervals are {WIDER}: an effect that is not in the model may have gone into the values."
-    # A value that is flagged is told already.
-    worst = [terms[p.term] for p in doubted if p.doubt == ALL_OF_IT and not p.flag]
+    # A value that is flagged is told already, and counted.
+    every = [p for p in doubted if p.doubt == ALL_OF_IT]
+    worst = [terms[p.term] for p in every if not p.flag]
     names = [placed(mine[0].name) if len(mine) == 1 else f"{plain(effect)} at {len(mine)} places"
              for effect in dict.fromkeys(t.effect for t in worst)
              if (mine := [*dict.fromkeys(t for t in worst if t.effect == effect)])]  # fmt: skip
-    return [text + (f" It could be all of: {'; '.join(names)}." if names else "")]
+    others = len(every) - len(worst)
+    more = f"; and {counted(others, 'value')} flagged above" if others else ""
+    return [text + (f" It could be all of: {'; '.join(names)}{more}." if names else "")]
 
 
 def flag_texts(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list[str]:

@@ -70,6 +70,8 @@ class Judged:
     residual: Array
     outcome: HeldOut
     dispersion: float
+    error_without: float = math.nan
+    """The held-out error of the model without the proposal, under the same cut."""
     sure: float = 0.0
     """What of the energy is noise beyond doubt."""
     why_not: str = ""
@@ -169,6 +171,7 @@ def judge(
         residual=found.residual,
         outcome=found,
         dispersion=dispersion if math.isfinite(dispersion) else 1.0,
+        error_without=error(base),
         sure=float(problem.sure.sum()),
         why_not=why,
         vague=_vague(problem, found, proposal),

@@ -12,6 +12,7 @@ from ee_dist.discrepancy.importance import added
 from ee_dist.discrepancy.ladder import Improvement
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.weighed_up import TRIALS_APART
 from ee_dist.discrepancy.words import phrase, plain
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
@@ -69,7 +70,7 @@ def explain_page(
     page = _page(problem, measured, "Explain", account, links)
     page.tiles = [
         (problem.told(found.baseline_error), f"{problem.natural_name}, {MODEL}"),
-        *([(problem.told(best.error_heldout), f"{IMPROVED}, held out")] if best else []),
+        *([(problem.told(best.error_heldout), f"{IMPROVED}, on {best.held_out}")] if best else []),
         (problem.told(found.noise_floor), "noise floor"),
         (str(found.tried), "explanations tried"),
     ]
@@ -99,8 +100,8 @@ def improve_page(
     page = _page(problem, measured, "Improve", account, links)
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name}, {MODEL}"),
-        *([(problem.told(last.error_heldout), f"{IMPROVED}, held out")] if changed else []),
-        *([(word.problem.told(word.after), f"{IMPROVED}, never fitted")] if word is not None and changed else []),
+        *([(problem.told(last.error_heldout), f"{IMPROVED}, on {last.held_out}")] if changed else []),
+        *([(word.problem.told(word.after), f"{IMPROVED}, on {TRIALS_APART}")] if word is not None and changed else []),
         (problem.told(found.noise_floor), "noise floor"),
         (str(len(found.terms)), "effects in the model"),
     ]

@@ -16,7 +16,7 @@ from ee_dist.discrepancy.words import percent, placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share
-from ee_dist.tasks.results.tables import candidate_label, kind_of, last_word_rows, standing
+from ee_dist.tasks.results.tables import WITHOUT, candidate_label, kind_of, last_word_rows, standing
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
@@ -212,12 +212,12 @@ def ranking_section(
     best = judged[0]
     kinds = [kind_of(c, best) for c in judged]
     rows = [
-        [str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), *told_gain(c),
-         standing(c, best)]
-        for c in judged
+        ["", WITHOUT, problem.told(best.error_without), "", "", ""],
+        *([str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), *told_gain(c),
+           standing(c, best)] for c in judged),
     ]  # fmt: skip
-    pale = [k for k, kind in enumerate(kinds) if kind == "not"]
-    lead = [k for k, kind in enumerate(kinds) if kind in ("best", "tied")]
+    pale = [k for k, kind in enumerate(kinds, start=1) if kind == "not"]
+    lead = [k for k, kind in enumerate(kinds, start=1) if kind in ("best", "tied")]
     caption = (
         f"How much of the error above the noise each explains, judged on {best.held_out}, with its 95 % interval. Hatched: "
         "refused, as no better than luck or too little."

@@ -113,6 +113,7 @@ def of_judged(problem: Problem, c: Judged) -> dict[str, Any]:
         "error_fit": c.error_fit,
         "error_heldout": c.error_heldout,
         "error_heldout_natural": problem.natural(c.error_heldout),
+        "error_without": c.error_without,
         "held_out": c.held_out,
         "gain_heldout": c.gain,
         "explained": c.explained,

@@ -26,6 +26,8 @@ from ee_dist.tasks.folder import SETTINGS
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, excess_share, step_phrase
 from ee_dist.tasks.results.values import kinds_of, within
 
+WITHOUT = "the model without any of these"
+"""What the errors of candidates stand against."""
 TIED_STANDING = "tied with the best"
 Column = tuple[str, bool]
 """Heading, and whether it holds numbers."""
@@ -58,8 +60,9 @@ def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged]
         return
     best = judged[0]
     rows = [
-        (str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), told_gain(c)[0],
-         standing(c, best)) for c in judged
+        ("", WITHOUT, problem.told(best.error_without), "", ""),
+        *((str(c.rank), candidate_label(c, problem.robot), problem.told(c.error_heldout), told_gain(c)[0],
+           standing(c, best)) for c in judged),
     ]  # fmt: skip
     columns = (("", True), ("effect", False), ("held out", True), ("gain", True), ("", False))
     console.print(_table(title, columns, rows))

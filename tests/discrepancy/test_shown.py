@@ -1,0 +1,73 @@
+"""What is shown is what was found: where it is, of what it is, and against what."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from linear_problem import Linear
+
+from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.accounts.ranges import ranges, rest_text
+from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, NEUTRAL, ParameterReport
+from ee_dist.discrepancy.explain import explain
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.last_word import last_word
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.candidates import parse
+from ee_dist.effects.catalogue import term
+from ee_dist.tasks.results.sections import ranking_section
+from ee_dist.tasks.results.tables import WITHOUT
+
+WEAK = term("motor_weak", "knee_front_left", loss=0.4)
+
+
+@pytest.fixture(scope="module")
+def found():  # type: ignore[no-untyped-def]
+    problem = Linear((WEAK,), motions=4)
+    return problem, improve(problem, [parse(problem.robot, "motor_weak@knee_front_left")])
+
+
+@pytest.mark.parametrize("extra", [0.0, 3.0])
+def test_what_is_left_of_trials_held_out_from_all_of_it_is_told_in_words(found, extra: float) -> None:  # type: ignore[no-untyped-def]
+    problem, improvement = found
+    apart = Linear((WEAK,), seed=7, extra=extra)
+    word = last_word([apart, apart], [(), improvement.terms], apart.channels)
+    lines = improve_account(problem, improvement, word=word).lines
+    (line,) = (w for w in lines if w.startswith("On trials that were held out from all of it "))
+    assert bool(word.left) is bool(extra)
+    told = (
+        ("more than noise is left in 2 curves", *map(str, word.left[:2]))
+        if extra
+        else ("nothing is left above the noise",)
+    )
+    assert all(t in line for t in told)
+
+
+def test_an_error_beside_that_of_trials_apart_says_what_it_is_of(found) -> None:  # type: ignore[no-untyped-def]
+    problem, improvement = found
+    apart = Linear((WEAK,), seed=7)
+    word = last_word([apart, apart], [(), improvement.terms], apart.channels)
+    of = improvement.ladder[-1].held_out
+    assert f"on {of}: model " in improve_account(problem, improvement, word=word).error
+
+
+def test_values_that_a_line_does_not_tell_are_counted_or_named() -> None:
+    robot = Linear(()).robot
+    terms = (WEAK, *(term("viscous_friction", j, damping_nm_s_rad=0.1) for j in ("knee_front_left", "hip_front_left")))
+    sure = ParameterReport(0, "loss", 0.4, 0.3, 0.5, "")
+    vague = [ParameterReport(k, "damping_nm_s_rad", 0.1, 0.0, 0.2, NEUTRAL, ALL_OF_IT) for k in (1, 2)]
+    told = ranges(terms, [sure, *vague], [WEAK], robot, True)
+    assert told.endswith("30 to 50 %; and 2 more values, as the table of values has them")
+    assert "more value" not in ranges((WEAK,), [sure], [WEAK], robot, False)
+    (line,) = rest_text(terms, [replace(sure, doubt=ALL_OF_IT), *vague])
+    assert line.endswith("It could be all of: motor weak at knee front left; and 2 values flagged above.")
+
+
+def test_candidates_stand_beside_the_model_without_them() -> None:
+    problem = Linear((WEAK,), motions=4)
+    found = explain(problem, [parse(problem.robot, f"{e}@knee_front_left") for e in ("motor_weak", "viscous_friction")])
+    section = ranking_section(problem, found.candidates)
+    assert section is not None and section.table is not None
+    assert section.table.rows[0][1:3] == [WITHOUT, problem.told(error(problem.data))]
+    assert section.table.lead == [1] and section.table.rows[1][0] == "1"
