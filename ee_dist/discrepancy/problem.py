@@ -11,17 +11,18 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.discrepancy.recorded import not_compared
+from ee_dist.discrepancy.recorded import bridged, not_compared
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.effect import FAMILIES, Beside
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array, SensorLog
+from ee_dist.trials.log import Array, SensorLog, late
 
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -73,11 +74,19 @@ class Through(NamedTuple):
 
 def joined(series: Sequence[Series]) -> list[Series]:
     """One of each trial and channel, in the order in which they come: stretches of a trial one after another, with a row of NaN
-    between, so that no line is drawn from one to the next."""
+    between, so that no line is drawn from one to the next. So is a gap between readings, over which nothing was measured."""
     parts: dict[tuple[int, int], list[Series]] = {}
     for s in series:
-        parts.setdefault((s.trial, s.channel), []).append(s)
+        parts.setdefault((s.trial, s.channel), []).extend(_pieces(s))
     return [own[0] if len(own) == 1 else _one(own) for own in parts.values()]
+
+
+def _pieces(series: Series) -> list[Series]:
+    ends = [0, *(np.flatnonzero(late(series.times_s)) + 1).tolist(), len(series.times_s)]
+    if len(ends) == 2:
+        return [series]
+    cut = ("times_s", "measured", "predicted")
+    return [replace(series, **{n: getattr(series, n)[a:b] for n in cut}) for a, b in pairwise(ends)]
 
 
 def _one(parts: Sequence[Series]) -> Series:
@@ -233,7 +242,7 @@ class Problem(ABC):
     def notes(self) -> list[str]:
         """What of these measurements is not compared, or not as it was recorded, and why: every verb says so."""
         in_steps = any(t.hardware and t.commands_held is False for t in self.measured)
-        return [IN_STEPS] * in_steps + not_compared(self.measured, self.robot)
+        return [IN_STEPS] * in_steps + not_compared(self.measured, self.robot) + bridged(self.measured)
 
     @property
     def doubts(self) -> str:

@@ -11,6 +11,9 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
+NOT_COMPARED = "not compared. A model goes by commands that were held there: what it leaves right after may be of that"
+"""What becomes of rows that were lost, where a model is simulated."""
+
 
 def means_of(values: Array, recorded: Array) -> Array:
     """(C,) means of values (N, C) over those that were ``recorded`` (N, C); 0 where none was."""
@@ -42,3 +45,14 @@ def not_compared(trials: Sequence[MeasuredTrial], robot: Robot) -> list[str]:
     if never := [name for name, seen in zip(robot.sensor_names, own.T, strict=True) if not seen.any()]:
         line += f"; recorded in none: {listed(never)}"
     return [f"{line}."]
+
+
+def bridged(trials: Sequence[MeasuredTrial], become: str = NOT_COMPARED) -> list[str]:
+    """That rows were lost, and what becomes of those that stand in their place, in a line for people; none where none were."""
+    lost = [(t, int(t.log.bridged.sum())) for t in trials]
+    some = [t for t, rows in lost if rows]
+    if not some:
+        return []
+    rows, of = sum(rows for _, rows in lost), sum(len(t.log) for t in trials)
+    where = f"{counted(len(some), 'trial')}: {listed(t.name for t in some)}"
+    return [f"{rows} of {of} rows lie in gaps between readings ({where}): they are bridged by lines, and {become}."]

@@ -11,10 +11,9 @@ import numpy as np
 from ee_dist.measurements import signals
 from ee_dist.measurements.clocks import Clocked
 from ee_dist.measurements.mapping import Column, Mapping
-from ee_dist.measurements.sampling import GAP
 from ee_dist.measurements.units import factor
 from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import GAP, Array
 
 LONG_S, LONG = 0.25, 20
 """How long, and in how many rows, every reading stays what it was to the last digit: shorter is a late row or two."""

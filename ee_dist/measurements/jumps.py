@@ -22,16 +22,18 @@ TOGETHER, FEWEST = 2, 3
 """Joints that hop in one row, or rows in which one joint hops where only one moves, that are no accident."""
 
 
-def jumps(position: Array, hinge: bool = True) -> tuple[Array, Array]:
+def jumps(position: Array, hinge: bool = True, gaps: Array | None = None) -> tuple[Array, Array]:
     """The steps of a joint's positions (T,) from row to row that are jumps, in rad or m: those by whole turns of a hinge, and the
-    others; none in short logs."""
+    others; none in short logs. ``gaps`` (T - 1,): steps over rows that are known to be lost, in which a joint goes anywhere."""
     steps = np.abs(np.diff(position))
-    steps = steps[np.isfinite(steps)]
+    known, steps = np.isfinite(steps), steps[np.isfinite(steps)]
     if len(steps) < 20:
         return np.zeros(0), np.zeros(0)
     most, nearly_all = np.quantile(steps, [MOST, NEARLY_ALL])
     turns = (np.abs(steps / (2 * math.pi) - 1) < TURN) & (steps > QUICK * most) & hinge
     thrown = (steps > max(LEAST, BEYOND * float(nearly_all))) & ~turns
+    if gaps is not None:
+        thrown &= ~gaps[known]
     return steps[turns], steps[thrown]
 
 
@@ -85,7 +87,7 @@ def jumping(robot: Robot, logs: Sequence[tuple[str, SensorLog]]) -> list[str]:
             continue
         # Between readings a jump is a line.
         for joint, position in zip(robot.motor_names, log.joints[log.readings].T, strict=True):
-            turns, others = jumps(position, robot.joint(joint).kind == "hinge")
+            turns, others = jumps(position, robot.joint(joint).kind == "hinge", log.gaps)
             if len(turns):
                 turned.setdefault(joint, []).append(name)
             if len(others):

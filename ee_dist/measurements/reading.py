@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ee_dist.measurements.clocks import Clocked
 from ee_dist.measurements.held_readings import held_readings
 from ee_dist.measurements.mapping import Column, Mapping
-from ee_dist.measurements.sampling import GAP, filled
-from ee_dist.trials.log import Array
+from ee_dist.measurements.sampling import filled
+from ee_dist.trials.log import GAP, Array
 
 Rows = NDArray[np.intp]
 SHOWN = 3

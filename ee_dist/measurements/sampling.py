@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.table import Table
-from ee_dist.trials.log import Array
+from ee_dist.trials.log import GAP, Array
 
 EVEN = 0.02
 """Steps that differ by less than this share of their median count as even."""
@@ -24,8 +24,6 @@ SLACK = 1e-3
 """Share of a step by which a time stamp may be late and still be the row's own."""
 FILLED = 1.5
 """Rows for each reading from which most rows are no readings, and only those that are count."""
-GAP = 5.0
-"""Steps longer than this many medians are gaps."""
 AGAIN = 0.2
 """Share of the rows that may bear the time of the row before: loggers that stamp to the millisecond, or when they write, have
 some."""

@@ -13,10 +13,18 @@ from ee_dist.robots.model import Robot
 
 Array = NDArray[Any]
 """Of float64 where nothing else is said."""
+GAP = 5.0
+"""Times between readings longer than this many medians are gaps."""
 
 
 class LogError(ValueError):
     """A sensor log whose arrays contradict one another."""
+
+
+def late(at: Array) -> NDArray[np.bool_]:
+    """(K - 1,) which steps between times, or rows, (K,) are gaps."""
+    steps = np.diff(at)
+    return np.asarray(steps > GAP * np.median(steps)) if len(steps) else np.zeros(0, dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +87,19 @@ class SensorLog:
     def readings(self) -> Array:
         """(K,) the rows in which the sensors were read: all of them, or what an import did not fill in."""
         return np.arange(len(self)) if self.filled is None else np.flatnonzero(~self.filled)
+
+    @property
+    def gaps(self) -> NDArray[np.bool_]:
+        """(K - 1,) whether readings were lost from one of them to the next."""
+        return late(self.readings)
+
+    @property
+    def bridged(self) -> NDArray[np.bool_]:
+        """(T,) rows in gaps between readings: an import drew lines there, and held commands."""
+        rows, out = self.readings, np.zeros(len(self), dtype=bool)
+        for k in np.flatnonzero(self.gaps):
+            out[rows[k] + 1 : rows[k + 1]] = True
+        return out
 
     @property
     def finite(self) -> bool:

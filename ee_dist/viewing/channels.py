@@ -190,7 +190,8 @@ def _send_states(
 
 
 def send_scalars(stream: rr.RecordingStream, place: str, series: Sequence[tuple[float, SensorLog, Array]]) -> None:
-    """Scalars at ``place``: of each log, from its start on, one number a row."""
+    """Scalars at ``place``: of each log, from its start on, one number a row; none where rows were lost, so that no line is
+    drawn over a gap as if it had been measured."""
     at: list[Array] = []
     values: list[Array] = []
     if not series:
@@ -198,5 +199,5 @@ def send_scalars(stream: rr.RecordingStream, place: str, series: Sequence[tuple[
     for start, log, numbers in series:
         # A row without a number after the last one keeps a line from running on into the next trial.
         at += [start + seconds_of(log), np.array([start + interval_s(log)])]
-        values += [numbers, np.array([np.nan])]
+        values += [np.where(log.bridged, np.nan, numbers), np.array([np.nan])]
     stream.send_columns(place, [times(np.concatenate(at))], rr.Scalars.columns(scalars=np.concatenate(values)))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from linear_problem import Linear
 
@@ -13,11 +15,12 @@ from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, NEUTRAL, Parameter
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.last_word import last_word
-from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.problem import Series, error, joined
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.effects.catalogue import term
 from ee_dist.tasks.results.sections import ranking_section
 from ee_dist.tasks.results.tables import WITHOUT
+from ee_dist.viewing import channels
 
 WEAK = term("motor_weak", "knee_front_left", loss=0.4)
 
@@ -71,3 +74,26 @@ def test_candidates_stand_beside_the_model_without_them() -> None:
     assert section is not None and section.table is not None
     assert section.table.rows[0][1:3] == [WITHOUT, problem.told(error(problem.data))]
     assert section.table.lead == [1] and section.table.rows[1][0] == "1"
+
+
+def test_rows_that_were_lost_are_told_and_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = Linear((), motions=2)
+    log, filled = problem.measured[0].log, np.zeros(len(problem.measured[0].log), dtype=bool)
+    filled[200:260] = True
+    log = replace(log, filled=filled)
+    problem.measured = (replace(problem.measured[0], log=log), problem.measured[1])
+    (note,) = problem.notes
+    assert note.startswith(
+        "60 of 1600 rows lie in gaps between readings (1 trial: trial 0): they are bridged by lines, and not"
+    )
+
+    read = log.readings
+    (whole,) = joined([Series(0, 0, "rad", log.times_s[read], *2 * (log.commands[read, 0],))])
+    assert (
+        np.isnan(whole.measured).sum() == 1 and np.isnan(whole.predicted[200]) and len(whole.times_s) == len(read) + 1
+    )
+
+    sent: list[np.ndarray] = []
+    monkeypatch.setattr(channels.rr.Scalars, "columns", lambda scalars: sent.append(scalars))
+    channels.send_scalars(SimpleNamespace(send_columns=lambda *_: None), "place", [(0.0, log, log.commands[:, 0])])  # type: ignore[arg-type]
+    np.testing.assert_array_equal(np.isnan(sent[0]), [*filled, True])

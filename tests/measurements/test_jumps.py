@@ -108,3 +108,12 @@ def test_rows_that_were_stamped_late_beside_a_gap_of_the_times_are_not_lost() ->
     evenly = np.r_[position[kept], np.full(int((~kept).sum()), position[kept][-1])]
     (line,) = losing_time([("swing", log(evenly))])
     assert "at 4 places, in swing at 0.9" in line
+
+
+def test_what_a_joint_did_while_rows_were_lost_is_no_question() -> None:
+    swing, filled = 2.0 * np.sin(1.5 * T), np.zeros(len(T), dtype=bool)
+    filled[300:350] = True
+    bridged = np.where(filled, np.interp(T, T[~filled], swing[~filled]), swing)
+    assert jumping(ROBOT, [("swing", log(bridged, filled))]) == []
+    # The same jump where no row is known to be lost is one.
+    assert jumping(ROBOT, [("swing", replace(log(swing), joints=np.where(T > 3.0, swing - 1.0, swing)[:, None]))])

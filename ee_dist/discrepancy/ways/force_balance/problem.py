@@ -20,6 +20,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, at_one_pace, evenly_read
 from ee_dist.discrepancy.problem import Layout, Problem, Series
+from ee_dist.discrepancy.recorded import bridged
 from ee_dist.discrepancy.ways.force_balance.balance import INSTANT_S, Balance, told_by
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED, left_to_give
 from ee_dist.discrepancy.ways.force_balance.floor import floor_of
@@ -60,6 +61,7 @@ class ForceBalance(Problem):
         logs, pace_s = at_one_pace(own)
         thinned = any(a is not b for a, b in zip(own, logs, strict=True))
         as_read, trials = trials, [replace(t, log=log) for t, log in zip(trials, logs, strict=True)]
+        self.gaps = bridged(as_read, "compared as if they had been read: cut the records there")
         # Nor does a step of a simulation limit what a drive may have: how light a rotor its controller leaves steady.
         robot = replace(robot, time_step_s=INSTANT_S)
         self.robot, self.measured = robot, tuple(trials)
@@ -246,7 +248,7 @@ class ForceBalance(Problem):
 
     @property
     def notes(self) -> list[str]:
-        lines = []
+        lines = [*self.gaps]
         unknown = tuple(name for name in self.unjudged if name not in self.held)
         if unknown:
             they_move = "it moves" if len(unknown) == 1 else "they move"
