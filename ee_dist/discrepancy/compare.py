@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,11 +16,12 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
 PARTED = 9.0
-"""Mean square of a value, over its noise floor, at which prediction and measurement have parted."""
+"""Square of a value, by the weight of its trial, at which prediction and measurement have parted."""
 MOVING_SHARE = 0.05
 """Speed, as a share of the largest one of the joint in the trial, from which a joint counts as moving."""
 SPEED_OVER_S = 0.04
 """Time over which a position is averaged before its change is a speed; three readings at least."""
+MOVING, AT_REST = "moving", "at rest"
 NEAR_LIMIT = 0.8
 """Share of half the range beyond which a joint is near its limit."""
 
@@ -69,7 +71,7 @@ class Comparison:
 def compare(problem: Problem, residual: Array) -> Comparison:
     """Where the residual (n,) of a model sits."""
     floor, source = problem.noise_floor()
-    names = [f"{t} ({k + 1})" for k, t in enumerate(problem.trials)]
+    names = [f"{t} ({number})" for number, t in zip(problem.numbers, problem.trials, strict=True)]
     return Comparison(
         error(residual),
         floor,
@@ -86,7 +88,14 @@ def compare(problem: Problem, residual: Array) -> Comparison:
 
 def trial_name(problem: Problem, trial: int) -> str:
     """With its number: repeats have one name."""
-    return problem.trials[trial] if len(problem.trials) == 1 else f"{trial + 1}. {problem.trials[trial]}"
+    return problem.trials[trial] if len(problem.trials) == 1 else f"{problem.numbers[trial]}. {problem.trials[trial]}"
+
+
+def of_all_regimes(regimes: Sequence[RegimeReport]) -> float:
+    """The error of all that is sorted by what joints were doing: what they moved in, and rested in, is all of it."""
+    parts = [r for r in regimes if r.name in (MOVING, AT_REST)]
+    values = sum(r.values for r in parts)
+    return float(np.sqrt(sum(r.error**2 * r.values for r in parts) / values)) if values else 0.0
 
 
 def heat(problem: Problem, residual: Array) -> Array:
@@ -153,7 +162,7 @@ def _parted(problem: Problem, residual: Array, k: int) -> float | None:
     touch = {s.name for s in problem.robot.sensors if s.kind == "touch"}
     for c in np.flatnonzero([name not in touch for name in problem.channels]):
         mine = np.flatnonzero((problem.trial_of == k) & (problem.channel_of == c) & layout.reading)
-        loud = (residual[mine] ** 2 > PARTED).astype(int)
+        loud = (residual[mine] ** 2 > PARTED * problem.weight_of(k)).astype(int)
         hits = np.flatnonzero(loud[:-2] + loud[1:-1] + loud[2:] == 3)
         if len(hits):
             at = float(layout.time_s[mine[hits[0]]])
@@ -259,7 +268,7 @@ def _states(robot: Robot, c: Circumstances, j: int, foot: int | None, at: Array)
     speed, position, load = c.speed[at, j], c.position[at, j], c.load[at, j]
     moving = np.abs(speed) > MOVING_SHARE * max(float(np.abs(c.speed[:, j]).max()), 1e-12)
     found = {
-        "moving": moving, "at rest": ~moving, "moving up": moving & (speed > 0), "moving down": moving & (speed < 0)
+        MOVING: moving, AT_REST: ~moving, "moving up": moving & (speed > 0), "moving down": moving & (speed < 0)
     }  # fmt: skip
     low, high = joint.ends
     half, middle = (high - low) / 2, (high + low) / 2

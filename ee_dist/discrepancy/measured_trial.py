@@ -70,6 +70,8 @@ class MeasuredTrial:
     """Of a stretch from within a record, how it begins."""
     not_recorded: frozenset[str] = frozenset()
     """Sensors that nobody recorded in it: its log holds where they are taken to have stood, and nothing of that is compared."""
+    number: int = 0
+    """Its number in its log, from 1 on; 0: it is counted with those that stand beside it."""
 
     def recorded(self, robot: Robot) -> Array:
         """(S,) which of a robot's channels were recorded."""

@@ -128,6 +128,8 @@ class Problem(ABC):
     natural_name: str = "error"
     """What ``natural`` gives, in a user's words."""
     natural_unit: str = "standard deviations"
+    averaged: str = "what is compared"
+    """What ``raw`` values are, beside the rows of a log."""
     families: frozenset[str] = frozenset(FAMILIES)
     """Families of effects that can show in this way of comparing."""
     switches: bool = True
@@ -248,6 +250,11 @@ class Problem(ABC):
     def doubts(self) -> str:
         """What about these measurements is to be put right before anything that is found in them is believed; empty: nothing."""
         return ""
+
+    @cached_property
+    def numbers(self) -> tuple[int, ...]:
+        """Those of the trials in their log, from 1 on: of some that were chosen too."""
+        return tuple(t.number or k for k, t in enumerate(self.measured, start=1))
 
     @cached_property
     def trials(self) -> tuple[str, ...]:

@@ -114,6 +114,7 @@ def load(config: Config) -> Measurements:
                     hardware,
                     between == LINES,
                     not_recorded=frozenset(t.not_recorded),
+                    number=len(trials) + 1,
                 )
             )
             names.append(TrialName(len(trials), file.stem, t.name))

@@ -73,6 +73,7 @@ class Finding:
     """One result. ``verdict`` is a sentence; ``lines`` say below it how large the error is and how sure all of it; errors and
     ``floor`` are in ``unit``.
 
+    ``rms_of``: what the root mean squares of the channels are of.
     ``model`` is the model as it was given, ``better`` that with what was found (improve, or the best candidate).
     """
 
@@ -85,6 +86,7 @@ class Finding:
     floor: float | None = None
     unit: str = "standard deviations"
     channels: tuple[ChannelError, ...] = ()
+    rms_of: str = ""
     candidates: tuple[Candidate, ...] = ()
     ladder: tuple[Rung, ...] = ()
     better: Account | None = None

@@ -61,7 +61,7 @@ def channel_table(found: Finding) -> list[str]:
         unit = "" if c.unit in ("", "1") else f" {c.unit}"
         where = f"{plain(c.worst_case)}, {c.worst_from_s:.1f} s" if c.worst_case else ""
         lines.append(f"| {plain(c.name)} | {c.error:.3g} | {bar(c.error, largest)} | {c.rmse:.3g}{unit} | {where} |")
-    return lines
+    return [*lines, "", f"RMS: of {found.rms_of}."] if found.rms_of else lines
 
 
 def candidate_table(candidates: Sequence[Candidate]) -> list[str]:

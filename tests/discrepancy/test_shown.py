@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from linear_problem import Linear
+from rich.console import Console
 
+from ee_dist.discrepancy.accounts.of_compare import PARTS, compare_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.accounts.ranges import ranges, rest_text
+from ee_dist.discrepancy.compare import RegimeReport, compare, of_all_regimes, trial_name
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, NEUTRAL, ParameterReport
+from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.explain import explain
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.last_word import last_word
 from ee_dist.discrepancy.problem import Series, error, joined
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.effects.catalogue import term
-from ee_dist.tasks.results.sections import ranking_section
-from ee_dist.tasks.results.tables import WITHOUT
+from ee_dist.tasks.results.sections import channels_section, ranking_section, regimes_section
+from ee_dist.tasks.results.tables import WITHOUT, show_comparison
 from ee_dist.viewing import channels
 
 WEAK = term("motor_weak", "knee_front_left", loss=0.4)
@@ -97,3 +102,45 @@ def test_rows_that_were_lost_are_told_and_not_drawn(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(channels.rr.Scalars, "columns", lambda scalars: sent.append(scalars))
     channels.send_scalars(SimpleNamespace(send_columns=lambda *_: None), "place", [(0.0, log, log.commands[:, 0])])  # type: ignore[arg-type]
     np.testing.assert_array_equal(np.isnan(sent[0]), [*filled, True])
+
+
+def test_trials_have_the_numbers_of_their_log() -> None:
+    problem = Linear((WEAK,), motions=2)
+    problem.measured = tuple(replace(t, name="again", number=n) for t, n in zip(problem.measured, (3, 7), strict=True))
+    residual = np.full(len(problem.data), 4.0)
+    found, left = compare(problem, residual), leftovers(problem, residual)
+    assert [trial_name(problem, k) for k in range(2)] == ["3. again", "7. again"]
+    assert [*found.parted_s] == ["again (3)", "again (7)"]
+    account = compare_account(problem, found, left)
+    (line,) = (x for x in account.lines if x.startswith(PARTS))
+    assert all(f"{n}. again at " in line for n in (3, 7)) and {str(g).split(" during ")[1][:8] for g in left} == {
+        "3. again",
+        "7. again",
+    }
+
+
+def test_where_they_part_is_by_the_weight_of_a_trial_as_the_worst_window_is() -> None:
+    class Weighed(Linear):
+        def weight_of(self, trial: int) -> float:
+            return 100.0 if trial else 1.0
+
+    problem = Weighed((), motions=2)
+    assert [*compare(problem, np.full(len(problem.data), 4.0)).parted_s.values()] == [0.0, None]
+
+
+def test_regimes_and_root_mean_squares_say_what_they_are_of() -> None:
+    problem = Linear((WEAK,), motions=2)
+    problem.averaged = "means over 0.02 s"
+    found = compare(problem, problem.data)
+    found.regimes[:] = [
+        RegimeReport("moving", 3.0, 0.9, 0.6),
+        RegimeReport("at rest", 1.0, 0.1, 0.2),
+        RegimeReport("high load", 9.0, 0, 0.1),
+    ]
+    assert of_all_regimes(found.regimes) == pytest.approx(np.sqrt(5.6 / 0.8))
+    assert "joints' readings, 2.65 in all" in regimes_section(problem, found).caption
+    assert "rmse: root mean square of means over 0.02 s" in channels_section(problem, found).caption
+    console = Console(width=100, record=True, file=io.StringIO())
+    show_comparison(console, problem, found)
+    said = " ".join(console.export_text().split())
+    assert "channels (rmse: of means over 0.02 s)" in said and "regimes (joints' readings, 2.65 in all)" in said

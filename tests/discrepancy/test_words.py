@@ -189,6 +189,7 @@ def compared(error: float, left: list[Leftover]) -> Account:
         channels=("a_b", "command_b"),
         curves=((0, "a_b"), (0, "command_b")),
         trials=("sway",),
+        numbers=(1,),
     )
     return compare_account(problem, found, left)  # type: ignore[arg-type]
 

@@ -21,6 +21,7 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.problem import TIMES_NOISE, Problem
 from ee_dist.discrepancy.words import plain
 
+PARTS = "Measurement and prediction first differ clearly, three values in a row far beyond the noise"
 CLOSE = 1.1
 """Times the noise floor up to which a model is nearly right."""
 
@@ -31,9 +32,9 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     off = problem.told(found.error)
     lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}.", *assumed_text(problem.robot)]
     lines += beside_floor(found.error, found.noise_floor, bool(left))
-    first = zip(problem.trials, found.parted_s.values(), strict=False)
-    parted = [f"{k}. {t} at {s:.2f} s" for k, (t, s) in enumerate(first, start=1) if s is not None]
-    lines.append("Measurement and prediction first differ clearly: " + ("; ".join(parted) or "nowhere") + ".")
+    first = zip(problem.numbers, problem.trials, found.parted_s.values(), strict=False)
+    parted = [f"{k}. {t} at {s:.2f} s" for k, t, s in first if s is not None]
+    lines.append(f"{PARTS}: {'; '.join(parted) or 'nowhere'}.")
     if left:
         lines.append(left_text(left, False))
     if ratio < CLOSE and not left:

@@ -26,7 +26,7 @@ MANY = 1000
 class Leftover:
     """A place where more is left than noise. ``z``: by how many standard deviations; ``excess``: energy above noise;
     ``trend``: whether it drifts slowly (True) or scatters (False). ``index`` of the trial: repeats have one name, and are told
-    with their number where ``repeated``."""
+    with their ``number`` in the log where ``repeated``."""
 
     trial: str
     channel: str
@@ -35,10 +35,11 @@ class Leftover:
     trend: bool
     index: int = 0
     repeated: bool = False
+    number: int = 0
 
     def __str__(self) -> str:
         shape = "slow" if self.trend else "quick"
-        trial = f"{self.index + 1}. {self.trial}" if self.repeated else self.trial
+        trial = f"{self.number or self.index + 1}. {self.trial}" if self.repeated else self.trial
         far = f"{self.z:.0f}" if self.z < MANY else f"more than {MANY}"
         return f"{self.channel} during {trial} ({shape}, {far} standard deviations above noise)"
 
@@ -86,7 +87,9 @@ def leftovers(problem: Problem, residual: Array, limit: float = LIMIT) -> list[L
             if z > limit:
                 excess, trend = float(energy[c] - floor[c]), bool(slow_z >= quick_z)
                 repeated = problem.trials.count(trial) > 1
-                found.append(Leftover(trial, problem.channels[c], float(z), excess, trend, k, repeated))
+                found.append(
+                    Leftover(trial, problem.channels[c], float(z), excess, trend, k, repeated, problem.numbers[k])
+                )
     return sorted(found, key=lambda g: -g.z)
 
 

@@ -131,6 +131,7 @@ def _finding(problem: Problem, where: Comparison, account: Account, model: Hypot
         in_unit(problem, where.noise_floor),
         unit_of(problem),
         channels,
+        rms_of=problem.averaged,
         next_command=account.then,
         lead=account.lead,
     )

@@ -16,7 +16,7 @@ from ee_dist.discrepancy.words import percent, placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share
-from ee_dist.tasks.results.tables import WITHOUT, candidate_label, kind_of, last_word_rows, standing
+from ee_dist.tasks.results.tables import WITHOUT, candidate_label, kind_of, last_word_rows, regimes_of, standing
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
@@ -257,7 +257,8 @@ def regimes_section(problem: Problem, found: Comparison) -> Section:
     errors = [drawn(problem, r.error) for r in regimes]
     figure = figures.bars([r.name for r in regimes], errors, axis_of(problem), drawn(problem, found.noise_floor))
     table = Table(["regime", "error", "share of the excess", "share of the data"], rows, (1, 2, 3))
-    return Section("By regime", "Joint channels, sorted by what their joint was doing at the time.", figure, table)
+    caption = f"Sorted by what a joint was doing at the time: {regimes_of(problem, found)}."
+    return Section("By regime", caption, figure, table)
 
 
 def channels_section(problem: Problem, found: Comparison, after: Comparison | None = None, most: int = 14) -> Section:
@@ -280,7 +281,7 @@ def channels_section(problem: Problem, found: Comparison, after: Comparison | No
         drawn(problem, found.noise_floor),
         None if after is None else [drawn(problem, later[c.name].normalised) for c in shown],
     )
-    caption = f"Root mean square in the channel's own unit, and {axis_of(problem)}."
+    caption = f"rmse: root mean square of {problem.averaged}, in the channel's own unit. Error: {axis_of(problem)}."
     if len(first) > most:
         caption += f" Bars: the {len(shown)} largest."
     legend = [] if after is None else [(MODEL, figures.PREDICTED), (IMPROVED, figures.IMPROVED)]

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import told_gain
-from ee_dist.discrepancy.compare import Comparison
+from ee_dist.discrepancy.compare import Comparison, of_all_regimes
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, called
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
@@ -48,11 +48,16 @@ def show_comparison(console: Console, problem: Problem, found: Comparison) -> No
          f"{c.worst_trial}, {c.worst_from_s:.1f} to {c.worst_to_s:.1f} s") for c in found.channels[:8]
     ]  # fmt: skip
     columns = (("channel", False), ("rmse", True), ("error", True), ("worst", False))
-    console.print(_table("Where it fails: channels", columns, rows))
+    console.print(_table(f"Where it fails: channels (rmse: of {problem.averaged})", columns, rows))
     ordered = sorted(found.regimes, key=lambda r: -r.error)
     rows2 = [(r.name, problem.told(r.error), excess_share(found, r), percent(r.values)) for r in ordered]
     columns = (("regime", False), ("error", True), ("share of excess", True), ("of data", True))
-    console.print(_table("Where it fails: regimes", columns, rows2))
+    console.print(_table(f"Where it fails: regimes ({regimes_of(problem, found)})", columns, rows2))
+
+
+def regimes_of(problem: Problem, found: Comparison) -> str:
+    """What regimes are regimes of: not of all that the error of a model counts."""
+    return f"joints' readings, {problem.told(of_all_regimes(found.regimes))} in all"
 
 
 def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged], title: str) -> None:

@@ -70,7 +70,7 @@ class CompareView(View):
                 charts.bars([r.name for r in regimes], [r.error for r in regimes], seen.found.noise_floor)
             )
         if topics & {"seen", "place"}:
-            names = [f"{k + 1}. {t}" for k, t in enumerate(problem.trials)]
+            names = [f"{k}. {t}" for k, t in zip(problem.numbers, problem.trials, strict=True)]
             cells = by_trial(problem, np.nan_to_num(seen.residual, posinf=0.0))
             self.map.draw(charts.heat(cells, problem.channels, names, place))
         self.curves.draw(await of(session.do(sight.series, seen.terms, place)))

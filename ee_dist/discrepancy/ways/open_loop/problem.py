@@ -138,10 +138,10 @@ class OpenLoop(Problem):
         self.views = Views(
             robot, self.parts, tuple(self.slices), tuple(self._data), self.weights, block, window, self.soft
         )
+        self.averaged = f"means over {block * (spacing or robot.time_step_s):.3g} s"
         self.error_definition = (
             "root mean square over channels and time of the residual in standard deviations of its noise "
-            f"and of equally good models (means over {block * (spacing or robot.time_step_s):.3g} s, softened beyond "
-            f"{self.soft:g})"
+            f"and of equally good models ({self.averaged}, softened beyond {self.soft:g})"
         )
 
     @property
