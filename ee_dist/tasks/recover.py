@@ -35,6 +35,7 @@ from ee_dist.tasks.config import Config, ConfigError, ScenarioConfig, one_of
 from ee_dist.tasks.observers import Beliefs, Measured, Recorder
 from ee_dist.tasks.outcome import Gaits, Score, score
 from ee_dist.tasks.progress import PassProgress, starting
+from ee_dist.tasks.results.commands import with_seeds
 from ee_dist.tasks.run_digest import ResultDigest
 from ee_dist.tasks.scene import drawn
 from ee_dist.tasks.summary import (
@@ -159,7 +160,10 @@ def run(config: Config, options: Options, out: Path) -> None:
             doubt_seed,
         )
         known = {} if truth is None else {"truth": json.dumps([t.as_dict() for t in truth])}
-        writer.finish({"result_digest": digest.hex, "doubt": json.dumps(last.as_dict()), **known})
+        told_too = {"caution": QUICK} if config.budget.name == "quick" else {}
+        if scenario.number > 0:
+            told_too["again"] = with_seeds(out, scenario.number)
+        writer.finish({"result_digest": digest.hex, "doubt": json.dumps(last.as_dict()), **known, **told_too})
     hardware.close()
     refused = gaits.compensating if options.gaits == "walking" else ()
     final = score(result.intact, result.trials, result.hypotheses[-1], hidden, refused)

@@ -24,6 +24,8 @@ from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.subject import Subject
 from ee_dist.robots.system import System
 
+TOLD = ("truth", "doubt", "caution", "again")
+"""What recordings say of themselves in sentences, or what sentences are made of."""
 INTACT = "intact"
 """Name of the trial before the change."""
 
@@ -110,7 +112,8 @@ def title_of(run: RunRecord) -> str:
 
 
 def finding(run: RunRecord) -> list[str]:
-    """What came out, before anything else: the last belief, how well it does with it, how sure, what next."""
+    """What came out, before anything else: the last belief, how well it does with it, how sure, what its terminal warned of, what
+    next."""
     trials, believed, subject = hardware_trials(run), beliefs(run), subject_of(run.robot)
     if not believed or len(trials) < 3:
         return []
@@ -133,9 +136,10 @@ def finding(run: RunRecord) -> list[str]:
     lines[-1] += "."
     if doubt := doubt_of(run):
         lines.append(f"**{doubt.words}**" if doubt.said else doubt.words)
-    scenario = run.metadata.get("scenario", "")
-    if scenario.isdigit() and int(scenario):
-        lines.append(f"Next, how much of it is luck: `python -m ee_dist -m +scenario={scenario} seed=0,1,2`")
+    if caution := run.metadata.get("caution"):
+        lines.append(caution)
+    if again := run.metadata.get("again"):
+        lines.append(f"Next, how much of it is luck: `{again}`")
     return [text for line in lines for text in (line, "")]
 
 
@@ -176,7 +180,7 @@ def result_text(run: RunRecord) -> str:
 def details_text(run: RunRecord) -> str:
     """Everything that the recording says about itself, for the tab behind the first one."""
     lines = ["# About this run", "", "| key | value |", "|---|---|"]
-    lines += [f"| {key} | {value} |" for key, value in sorted(run.metadata.items()) if key not in ("truth", "doubt")]
+    lines += [f"| {key} | {value} |" for key, value in sorted(run.metadata.items()) if key not in TOLD]
     last = [h for h in run.hypotheses if h.final or h.stage != EVOLVING]
     for pass_index in sorted({h.pass_index for h in last}):
         lines += ["", f"## Diagnosis {pass_index + 1}: its last population, and what was made of the best", ""]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import yaml
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from rerun.chunk import RrdReader
@@ -131,6 +133,12 @@ def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
 
     assert f"**Believed in the end: {told(believed[-1])}.**" in scene
     assert doubt_from(summary["doubt"]).words in scene, "and what it does not say"
+    assert ("say little" in out) is ("say little" in scene) is (summary["budget"] == "quick")
+    (again,) = re.findall(r"how much of it is luck: `(.+)`", scene)
+    words = shlex.split(again)
+    asked = yaml.safe_load((folder / "config" / "overrides.yaml").read_text())
+    kept = [w for w in asked if not w.startswith(("hydra.", "seed=", "+scenario=", "overwrite="))]
+    assert words[3] == "-m" and words[5] == "seed=0,1,2" and words[6:] == kept and "evaluator=serial" in kept
 
     progress = [line.split("believes: ")[1] for line in out.splitlines() if "believes: " in line]
     assert progress == [told(h) for h in believed]

@@ -6,9 +6,16 @@ import os
 import re
 import shlex
 from collections.abc import Sequence
+from pathlib import Path
+
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
 
 from ee_dist.robots.model import Robot
+from ee_dist.robots.untrusted import UntrustedError, text_of
 from ee_dist.tasks.config import AUTO, Config
+from ee_dist.tasks.folder import SETTINGS
 from ee_dist.tasks.trial_choice import entries
 from ee_dist.trials.family import driven
 
@@ -83,3 +90,32 @@ def simulated(config: Config) -> list[str]:
     if config.plugins:
         words.append(f"plugins=[{','.join(map(_quoted, config.plugins))}]")
     return words
+
+
+LARGEST = 2**20
+"""Bytes of what a run was asked for."""
+
+
+def told_to(folder: Path) -> list[str]:
+    """The words that a run in ``folder`` was asked for; none where they are not beside it. Not those that say where it lies."""
+    try:
+        words = OmegaConf.to_container(OmegaConf.create(text_of(folder / SETTINGS / "overrides.yaml", LARGEST)))
+    except (OSError, UntrustedError, YAMLError, OmegaConfBaseException, ValueError):
+        return []
+    if not isinstance(words, list):
+        return []
+    asked = [str(w) for w in words if not str(w).startswith(("resume=", "overwrite=", "hydra."))]
+    # A sweep notes the scenario in quotes, which a shell would need quotes for.
+    return [w.replace("'", "") if w.startswith("+scenario=") else w for w in asked]
+
+
+def repeating(folder: Path) -> str:
+    """What repeats a run; nothing where nobody knows what it was asked for."""
+    words = told_to(folder)
+    return command(words) if words else ""
+
+
+def with_seeds(folder: Path, scenario: int) -> str:
+    """What repeats a run with three seeds, and all else as it was."""
+    own = [w for w in told_to(folder) if not w.startswith(("+scenario=", "scenario=", "seed="))]
+    return command(["-m", f"+scenario={scenario}", "seed=0,1,2", *own])

@@ -8,15 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
-from yaml import YAMLError
-
 from ee_dist.basics.quoted import quoted
 from ee_dist.robots.untrusted import UntrustedError, json_of, text_of
 from ee_dist.tasks.config import ConfigError
-from ee_dist.tasks.folder import SETTINGS
-from ee_dist.tasks.results.commands import command
+from ee_dist.tasks.results.commands import repeating
 from ee_dist.tasks.results.study_table import method, row
 
 FILE = "runs.json"
@@ -59,7 +54,7 @@ def runs_of(told_by: Mapping[Path, Run], earlier: Sequence[Path]) -> list[Run]:
             continue
         _check(content, path)
         # Before their way of repair counts as one: the command is of what the run was told.
-        again = _command(path.parent)
+        again = repeating(path.parent)
         found.append({**content, "metric": method(content), "folder": str(path.parent), "command": again})
     for path in earlier:
         found += _kept(path / FILE if path.is_dir() else path)
@@ -112,16 +107,3 @@ def _summary(path: Path) -> Run:
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: not a summary; take it out of the folder")
     return content
-
-
-def _command(folder: Path) -> str:
-    """What repeats a run, in the words that it was asked for; nothing where they are not beside it."""
-    try:
-        words = OmegaConf.to_container(OmegaConf.create(text_of(folder / SETTINGS / "overrides.yaml", LARGEST)))
-    except (OSError, UntrustedError, YAMLError, OmegaConfBaseException, ValueError):
-        return ""
-    if not isinstance(words, list):
-        return ""
-    asked = [str(w) for w in words if not str(w).startswith(("resume=", "overwrite=", "hydra."))]
-    # A sweep notes the scenario in quotes, which a shell would need quotes for.
-    return command([w.replace("'", "") if w.startswith("+scenario=") else w for w in asked])
