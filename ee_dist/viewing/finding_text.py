@@ -1,4 +1,5 @@
-"""A finding in words and tables: the first thing to read in a scene. Markdown."""
+"""A finding in words and tables: the first thing to read in a scene. Markdown. A viewer cuts rows that are wider than its window:
+names, which may be, stand behind the numbers."""
 
 from __future__ import annotations
 
@@ -56,11 +57,11 @@ def channel_table(found: Finding) -> list[str]:
     if not any(c.error for c in ranked):
         return [f"All {len(ranked)} channels agree exactly: every error is 0."]
     largest = max(c.error for c in ranked)
-    lines = [f"| channel | error{_unit(found)} | | RMS | worst |", "|---|---|---|---|---|"]
+    lines = [f"| error{_unit(found)} | | RMS | channel | worst |", "|---|---|---|---|---|"]
     for c in ranked:
         unit = "" if c.unit in ("", "1") else f" {c.unit}"
         where = f"{plain(c.worst_case)}, {c.worst_from_s:.1f} s" if c.worst_case else ""
-        lines.append(f"| {plain(c.name)} | {c.error:.3g} | {bar(c.error, largest)} | {c.rmse:.3g}{unit} | {where} |")
+        lines.append(f"| {c.error:.3g} | {bar(c.error, largest)} | {c.rmse:.3g}{unit} | {plain(c.name)} | {where} |")
     return [*lines, "", f"RMS: of {found.rms_of}."] if found.rms_of else lines
 
 
@@ -69,11 +70,11 @@ def candidate_table(candidates: Sequence[Candidate]) -> list[str]:
     if not candidates:
         return ["No candidate was judged."]
     largest = max(c.gain for c in candidates)
-    lines = ["| # | missing effect | gain | | 95 % interval | |", "|---|---|---|---|---|---|"]
+    lines = ["| # | gain | | 95 % interval | | missing effect |", "|---|---|---|---|---|---|"]
     for k, c in enumerate(candidates):
         name = f"**{c.label}**" if c.kind in (BEST, TIED) else c.label
         gain, told = percent_within(c.gain, c.low, c.high), percents(c.low, c.high)
-        lines.append(f"| {k + 1} | {name} | {gain} | {bar(c.gain, largest)} | {told} | {c.kind} |")
+        lines.append(f"| {k + 1} | {gain} | {bar(c.gain, largest)} | {told} | {c.kind} | {name} |")
     return lines
 
 
@@ -82,11 +83,15 @@ def ladder_table(found: Finding) -> list[str]:
     if not found.ladder:
         return []
     largest = max(r.error_heldout for r in found.ladder)
-    lines = [f"| # | model | error held out{_unit(found)} | | in the fit | held out |", "|---|---|---|---|---|---|"]
+    # The model as it was given was fitted to nothing; of one kind of data that was held out a line says which.
+    cuts = list(dict.fromkeys(r.held_out for r in found.ladder[1:]))
+    lines = [f"| # | error held out{_unit(found)} | | in the fit | model |", "|---|---|---|---|---|"]
     for k, rung in enumerate(found.ladder):
         fit = "" if rung.error_fit is None else f"{rung.error_fit:.3g}"
-        lines.append(f"| {k} | {rung.label} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} "
-                     f"| {rung.held_out} |")  # fmt: skip
+        on = f" (held out: {rung.held_out})" if len(cuts) > 1 and rung.held_out else ""
+        lines.append(
+            f"| {k} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} | {rung.label}{on} |"
+        )
     if found.floor is not None:
-        lines.append(f"| | *noise alone* | {found.floor:.3g} | {bar(found.floor, largest)} | | |")
-    return lines
+        lines.append(f"| | {found.floor:.3g} | {bar(found.floor, largest)} | | *noise alone* |")
+    return [*lines, "", f"Held out: {cuts[0]}."] if len(cuts) == 1 and cuts[0] else lines

@@ -35,7 +35,7 @@ def parted(
     figure.add_vrect(x0=around[0], x1=around[1], fillcolor="#8899aa", opacity=0.14, line_width=0, layer="below")
     styled(figure, 420)
     figure.update_yaxes(title_text=unit, row=1, col=1)
-    figure.update_yaxes(title_text="difference", row=2, col=1)
+    figure.update_yaxes(title_text=f"difference, {unit}" if unit else "difference", row=2, col=1)
     figure.update_xaxes(title_text="s", row=2, col=1)
     return figure
 

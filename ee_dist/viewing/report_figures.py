@@ -38,6 +38,10 @@ class Cloud:
     after: Array | None = None
 
 
+RANKS = {"best": "#1769aa", "tied": "#67a9d8", "earned": "#8fa3b5", "not": "rgba(136,153,170,0.12)"}
+"""Colours of candidates, by what became of them."""
+
+
 def styled(figure: go.Figure, height: int) -> go.Figure:
     """On the colour of the page, which draws texts and lines in what suits it."""
     figure.update_layout(
@@ -73,7 +77,7 @@ def proof(curve: Overlay, names: Sequence[str], around: tuple[float, float]) -> 
     figure.add_hline(y=0, line={"color": "#8899aa", "width": 1}, row=2, col=1)
     styled(figure, 400)
     figure.update_yaxes(title_text="" if curve.unit == "1" else curve.unit, row=1, col=1)
-    figure.update_yaxes(title_text="residual", row=2, col=1)
+    figure.update_yaxes(title_text="residual" if curve.unit == "1" else f"residual, {curve.unit}", row=2, col=1)
     figure.update_xaxes(title_text="s", row=2, col=1)
     return figure
 
@@ -145,7 +149,6 @@ def ranking(
     names: Sequence[str], gains: Sequence[float], intervals: Sequence[tuple[float, float]], kinds: Sequence[str]
 ) -> go.Figure:
     """Gain on held-out data with its interval, in percent. ``kinds``: best, tied, earned or not (hatched)."""
-    colours = {"best": "#1769aa", "tied": "#67a9d8", "earned": "#8fa3b5", "not": "rgba(136,153,170,0.12)"}
     low = [max(0.0, 100 * (g - i[0])) for g, i in zip(gains, intervals, strict=True)]
     high = [max(0.0, 100 * (i[1] - g)) for g, i in zip(gains, intervals, strict=True)]
     figure = go.Figure(
@@ -154,7 +157,7 @@ def ranking(
             y=[wrapped(n) for n in names],
             orientation="h",
             marker={
-                "color": [colours[k] for k in kinds],
+                "color": [RANKS[k] for k in kinds],
                 "pattern": {
                     "shape": ["/" if k == "not" else "" for k in kinds],
                     "fgcolor": "#8899aa",

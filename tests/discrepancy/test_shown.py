@@ -23,7 +23,13 @@ from ee_dist.discrepancy.last_word import last_word
 from ee_dist.discrepancy.problem import Series, error, joined
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.effects.catalogue import term
-from ee_dist.tasks.results.sections import channels_section, ranking_section, regimes_section
+from ee_dist.tasks.results.sections import (
+    channels_section,
+    heat_section,
+    ranking_section,
+    regimes_section,
+    trials_section,
+)
 from ee_dist.tasks.results.tables import WITHOUT, show_comparison
 from ee_dist.viewing import channels
 
@@ -79,6 +85,8 @@ def test_candidates_stand_beside_the_model_without_them() -> None:
     assert section is not None and section.table is not None
     assert section.table.rows[0][1:3] == [WITHOUT, problem.told(error(problem.data))]
     assert section.table.lead == [1] and section.table.rows[1][0] == "1"
+    # A colour is named where it is drawn, and no other.
+    assert [name for name, _ in section.legend] == ["best"]
 
 
 def test_rows_that_were_lost_are_told_and_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,6 +148,9 @@ def test_regimes_and_root_mean_squares_say_what_they_are_of() -> None:
     assert of_all_regimes(found.regimes) == pytest.approx(np.sqrt(5.6 / 0.8))
     assert "joints' readings, 2.65 in all" in regimes_section(problem, found).caption
     assert "rmse: root mean square of means over 0.02 s" in channels_section(problem, found).caption
+    for section in (regimes_section, trials_section, channels_section):
+        assert [name for name, _ in section(problem, found).legend] == ["model"]
+    assert "one scale for all channels" in heat_section(problem, problem.data).caption
     console = Console(width=100, record=True, file=io.StringIO())
     show_comparison(console, problem, found)
     said = " ".join(console.export_text().split())

@@ -18,7 +18,7 @@ from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.config import Config
 from ee_dist.tasks.explained import explained
 from ee_dist.tasks.plan import another_seed, nothing_tied
-from ee_dist.tasks.results.plan_page import account_of, of_plan, plan_page
+from ee_dist.tasks.results.plan_page import UNITS, account_of, of_plan, plan_page
 from ee_dist.trials.excitation import parse
 from ee_dist.trials.family import Limits
 
@@ -117,6 +117,7 @@ def test_who_has_a_real_robot_is_not_sent_to_a_simulated_one():
     assert real.first[-1] == "Next: send plan.csv to the robot, and import its log beside the others (task=import)."
     assert not any("Next:" in line for line in simulated.first), "the command follows"
     assert real.headline == simulated.headline
+    assert UNITS in real.lines
 
 
 def test_what_no_trial_tells_apart_stands_in_the_first_line_and_leaves_the_question_open():

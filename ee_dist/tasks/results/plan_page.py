@@ -26,6 +26,7 @@ from ee_dist.viewing.report import Page, Section, Table
 
 Explanations = Sequence[tuple[str, Hypothesis]]
 CSV = "plan.csv"
+UNITS = "Amplitudes are shares of half the range of each joint, separations are in standard deviations."
 SHOWN = 10
 """Trials in the tables."""
 
@@ -64,6 +65,7 @@ def account_of(
         else "Their values count as certain, as they were fitted: a trial may promise more than it keeps.",
         f"The commands, for a robot of your own: {CSV}. On a simulated one: {trial}",
     ]
+    lines.append(UNITS)
     if every_s:
         lines.append(
             f"Predicted of sensors that are read every {1000 * every_s:.3g} ms, as in the measurements: read more often, they "
@@ -175,7 +177,14 @@ def plan_page(
         figures.parted(shown.times_s, shown.curves, names, sensor.unit, around, found.closest),
     )
     rows = _rows(robot, found)
-    columns = ["motion", "seconds", "amplitude", "seed", "separation", "judgement"]
+    columns = [
+        "motion",
+        "seconds",
+        "amplitude, of half the range",
+        "seed",
+        "separation, standard deviations",
+        "judgement",
+    ]
     pale = [k for k, r in enumerate(rows) if r[-1] == "not enough"]
     of = _shown_of(robot, found)
     caption = f"Predicted distance of {_deciding(found)} on it, in standard deviations."

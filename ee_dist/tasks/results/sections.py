@@ -16,7 +16,15 @@ from ee_dist.discrepancy.words import percent, placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.robots.ranges import unit_at
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, excess_share
-from ee_dist.tasks.results.tables import WITHOUT, candidate_label, kind_of, last_word_rows, regimes_of, standing
+from ee_dist.tasks.results.tables import (
+    TIED_STANDING,
+    WITHOUT,
+    candidate_label,
+    kind_of,
+    last_word_rows,
+    regimes_of,
+    standing,
+)
 from ee_dist.tasks.results.values import Kind
 from ee_dist.trials.log import Array
 from ee_dist.viewing import report_figures as figures
@@ -24,6 +32,8 @@ from ee_dist.viewing.curves import MOST as POINTS
 from ee_dist.viewing.curves import Overlay, browser, rows_of, thinned
 from ee_dist.viewing.report import Section, Table
 
+RANKED = {"best": "best", "tied": TIED_STANDING, "earned": "earned its place too"}
+"""What the bars of candidates are, by kind, but for those that were refused, which are hatched."""
 MARK = "mark of what was found"
 MARKS = 2
 """Effects whose mark is told in words."""
@@ -135,7 +145,7 @@ def heat_section(problem: Problem, residual: Array, after: Array | None = None) 
     unique = [f"{n}{' ' * segments[:i].count(n)}" for i, n in enumerate(segments)]
     caption = (
         "Each cell is the error of one channel in one window of time. What is near the background is noise, red is what the "
-        "model gets wrong."
+        "model gets wrong: one scale for all channels, whatever the noise of each. A label is when a window begins."
     )
     there = has_values(problem)
     if not there.all():
@@ -229,7 +239,8 @@ def ranking_section(
         kinds,
     )
     columns = ["rank", "effect", f"{problem.natural_name}, held out", "gain", "95 % interval", "judgement"]
-    return Section(heading, caption, figure, Table(columns, rows, (0, 2, 3, 4), lead, pale))
+    legend = [(RANKED[k], figures.RANKS[k]) for k in RANKED if k in kinds]
+    return Section(heading, caption, figure, Table(columns, rows, (0, 2, 3, 4), lead, pale), legend=legend)
 
 
 def trials_section(problem: Problem, found: Comparison) -> Section:
@@ -241,7 +252,8 @@ def trials_section(problem: Problem, found: Comparison) -> Section:
         axis_of(problem),
         drawn(problem, found.noise_floor),
     )
-    return Section("By trial", "", figure, Table(["trial", problem.natural_name], rows, (1,)))
+    table = Table(["trial", problem.natural_name], rows, (1,))
+    return Section("By trial", "", figure, table, legend=[(MODEL, figures.PREDICTED)])
 
 
 def last_word_section(word: LastWord) -> Section:
@@ -258,7 +270,7 @@ def regimes_section(problem: Problem, found: Comparison) -> Section:
     figure = figures.bars([r.name for r in regimes], errors, axis_of(problem), drawn(problem, found.noise_floor))
     table = Table(["regime", "error", "share of the excess", "share of the data"], rows, (1, 2, 3))
     caption = f"Sorted by what a joint was doing at the time: {regimes_of(problem, found)}."
-    return Section("By regime", caption, figure, table)
+    return Section("By regime", caption, figure, table, legend=[(MODEL, figures.PREDICTED)])
 
 
 def channels_section(problem: Problem, found: Comparison, after: Comparison | None = None, most: int = 14) -> Section:
@@ -284,5 +296,5 @@ def channels_section(problem: Problem, found: Comparison, after: Comparison | No
     caption = f"rmse: root mean square of {problem.averaged}, in the channel's own unit. Error: {axis_of(problem)}."
     if len(first) > most:
         caption += f" Bars: the {len(shown)} largest."
-    legend = [] if after is None else [(MODEL, figures.PREDICTED), (IMPROVED, figures.IMPROVED)]
+    legend = [(MODEL, figures.PREDICTED), *([] if after is None else [(IMPROVED, figures.IMPROVED)])]
     return Section("By channel", caption, figure, table, legend=legend)
