@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from linear_problem import Linear
 from rich.console import Console
+from way_samples import measured, samples
 
 from ee_dist.discrepancy.accounts.of_compare import PARTS, compare_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
@@ -22,6 +23,7 @@ from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.last_word import last_word
 from ee_dist.discrepancy.problem import Series, error, joined
 from ee_dist.discrepancy.search.candidates import parse
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.effects.catalogue import term
 from ee_dist.tasks.results.sections import (
     channels_section,
@@ -155,3 +157,13 @@ def test_regimes_and_root_mean_squares_say_what_they_are_of() -> None:
     show_comparison(console, problem, found)
     said = " ".join(console.export_text().split())
     assert "channels (rmse: of means over 0.02 s)" in said and "regimes (joints' readings, 2.65 in all)" in said
+
+
+def test_forces_over_rows_that_were_lost_are_said_to_be_compared() -> None:
+    trials = measured("arm")
+    filled = np.zeros(len(trials[0].log), dtype=bool)
+    filled[100:140] = True
+    lost = (replace(trials[0], log=replace(trials[0].log, filled=filled)), *trials[1:])
+    said = [line for line in ForceBalance(lost, samples()["arm"].robot).notes if "gaps between readings" in line]
+    assert len(said) == 1 and "compared as if they had been read" in said[0]
+    assert not any("gaps" in line for line in ForceBalance(trials, samples()["arm"].robot).notes)
