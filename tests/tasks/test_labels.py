@@ -20,7 +20,7 @@ from ee_dist.viewing.curves import Overlay
 
 
 def test_a_trial_is_told_from_its_repeat() -> None:
-    several, one = SimpleNamespace(trials=("sway", "sway")), SimpleNamespace(trials=("sway",))
+    several, one = SimpleNamespace(trials=("sway", "sway"), numbers=(1, 2)), SimpleNamespace(trials=("sway",))
     assert [trial_name(several, k) for k in range(2)] == ["1. sway", "2. sway"]  # type: ignore[arg-type]
     assert trial_name(one, 0) == "sway"  # type: ignore[arg-type]
 
