@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -117,3 +118,29 @@ def test_a_joint_whose_torques_are_another_share_of_the_need_is_remarked(tmp_pat
     (told,) = [n for n in proposed(tmp_path, robot, log(robot, tau=(0.58, 1.0))).notes if "torques: " in n]
     assert "tau1, tau2 are 0.58 (shoulder) times what the motion needs" in told and "those of others 1 (elbow)" in told
     assert not [n for n in proposed(tmp_path, robot, log(robot, tau=(0.9, 1.1))).notes if "torques: " in n]
+
+
+def test_efforts_in_milliamperes_are_currents(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path)
+    frame = log(robot, effort=1.0).rename(columns={f"effort{k}": f"effort{k}_mA" for k in (1, 2)})
+    found = proposed(tmp_path, robot, frame)
+    assert not torques(found) and not found.questions
+    assert any(n.startswith("motor currents (effort1_mA, effort2_mA) are left out") for n in found.notes)
+    alone = proposed(tmp_path, robot, frame.drop(columns=["cmd1", "cmd2"]))
+    assert any("are motor currents; say task.gains" in q for q in alone.questions)
+
+
+@pytest.mark.parametrize("times", [1.0, 1000.0])
+def test_numbers_that_no_drive_could_give_are_no_newton_metres(tmp_path: Path, times: float) -> None:
+    robot = robot_of(tmp_path)
+    frame = log(robot, tau=times)
+    led, alone = (proposed(tmp_path, robot, f) for f in (frame, frame.drop(columns=["cmd1", "cmd2"])))
+    beyond = times > 1
+    assert bool(torques(led)) is not beyond and not led.questions
+    assert bool([n for n in led.notes if "where its drive gives 5 at most: no N.m, and left out" in n]) is beyond
+    assert (
+        bool([q for q in alone.questions if "where its drive gives 5 at most: currents? say task.gains" in q]) is beyond
+    )
+    # Limits that were guessed say nothing of it.
+    guessed = replace(robot, assumed=tuple((j, "torque_limit") for j in robot.motor_names))
+    assert not [n for n in proposed(tmp_path, guessed, frame).notes if "where its drive gives" in n]
