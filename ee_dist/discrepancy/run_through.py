@@ -18,6 +18,8 @@ STRAYS = 2.0
 """Times as far off, run through, as another explanation that goes before it then,"""
 AS_GOOD = 2.0
 """if by windows it leaves more, and no more than so many times as much."""
+MANY, NO_WORSE = 4, 1.2
+"""Numbers of one step that mimic anything by windows, and times as far off as the model without it that they may be."""
 ASTRAY = "run through without starting anew it is off by {off}, {other} by {by}"
 
 
@@ -39,7 +41,10 @@ def that_hold_run_through(
             for k, whole in zip(earned, off, strict=True)
             if float(j.held.sum()) <= float(k.held.sum()) <= AS_GOOD * float(j.held.sum())
         ]
-        best, name = min([*rivals, (as_it_is, "the model without it")], key=lambda r: r[0].size)
-        if STRAYS * best.size <= mine.size:
+        rivals = [r for r in rivals if STRAYS * r[0].size <= mine.size]
+        if (NO_WORSE if j.proposal.size >= MANY else STRAYS) * as_it_is.size <= mine.size:
+            rivals.append((as_it_is, "the model without it"))
+        if rivals:
+            best, name = min(rivals, key=lambda r: r[0].size)
             j.why_not = ASTRAY.format(off=mine.told, other=name, by=best.told)
     return list(judged) if all(j.earned for j in earned) else ranked(judged)

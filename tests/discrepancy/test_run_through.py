@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from way_samples import evaluator_for, samples
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem, Through
-from ee_dist.discrepancy.run_through import AS_GOOD, STRAYS, that_hold_run_through
+from ee_dist.discrepancy.run_through import AS_GOOD, MANY, STRAYS, that_hold_run_through
 from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
 from ee_dist.effects.catalogue import Hypothesis, apply, term
 from ee_dist.engines.contract import Rollout
@@ -67,8 +68,9 @@ class Windows:
 class Stand:
     """A judged explanation with what is asked of one."""
 
-    def __init__(self, name: str, held: float) -> None:
+    def __init__(self, name: str, held: float, numbers: int = 1) -> None:
         self.name, self.held, self.why_not, self.hypothesis = name, np.array([held]), "", ()
+        self.proposal = SimpleNamespace(size=numbers)
 
     @property
     def earned(self) -> bool:
@@ -95,6 +97,16 @@ def test_what_strays_goes_behind(
     found = that_hold_run_through(Windows(off), (), (), judged)  # type: ignore[arg-type]
     assert [j.name for j in found if not j.earned] == lost
     assert all("run through" in j.why_not and "mrad" in j.why_not for j in found if not j.earned)
+
+
+@pytest.mark.parametrize(("numbers", "earned"), [(1, True), (MANY - 1, True), (MANY, False)])
+def test_many_numbers_must_do_as_well_run_through_as_the_model_without_them(
+    monkeypatch: pytest.MonkeyPatch, numbers: int, earned: bool
+) -> None:
+    monkeypatch.setattr("ee_dist.discrepancy.run_through.ranked", list)
+    (j,) = that_hold_run_through(Windows([20.0, 27.0]), (), (), [Stand("guesses", 12.0, numbers)])  # type: ignore[arg-type, list-item]
+    assert j.earned is earned
+    assert earned or "off by 27 mrad, the model without it by 20 mrad" in j.why_not
 
 
 def test_ways_without_windows_say_nothing_of_it() -> None:
