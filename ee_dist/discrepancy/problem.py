@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.discrepancy.blocked import blocked
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.recorded import bridged, not_compared
 from ee_dist.effects.catalogue import Hypothesis
@@ -244,7 +245,8 @@ class Problem(ABC):
     def notes(self) -> list[str]:
         """What of these measurements is not compared, or not as it was recorded, and why: every verb says so."""
         in_steps = any(t.hardware and t.commands_held is False for t in self.measured)
-        return [IN_STEPS] * in_steps + not_compared(self.measured, self.robot) + bridged(self.measured)
+        left_out = not_compared(self.measured, self.robot) + bridged(self.measured)
+        return [IN_STEPS] * in_steps + left_out + blocked(self.measured, self.robot)
 
     @property
     def doubts(self) -> str:

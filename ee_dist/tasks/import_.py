@@ -119,7 +119,12 @@ def run(config: Config, options: Options, out: Path) -> None:
     write_summary(out, "import", config, options, watch, digest_of(records), rest)
     for line in (*(f"note: {n}" for n in notes), *text.splitlines()):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    apart = "" if pieces is None else f", pieces of {len(found)}: {listed(r.name for r in records)}"
+    # What was told of rows and ranges is of the recordings as they came.
+    apart = (
+        ""
+        if pieces is None
+        else f", pieces of {len(found)} that are told whole above: {listed(r.name for r in records)}"
+    )
     console.print(
         f"wrote {os.path.relpath(out / options.output)}: {len(records)} trial(s) of {robot.name}{apart}",
         highlight=False,

@@ -99,7 +99,11 @@ def test_the_command_line_cuts_what_it_imports(tmp_path, command, whole):
     pd.DataFrame(columns).to_csv(tmp_path / "long.csv", index=False)
     ask = (f"measured={tmp_path / 'long.csv'}", "robot=servo_pendulum", f"hydra.run.dir={tmp_path / 'out'}")
     status, said, _ = command(*ask, "task.pieces=4")
-    assert status == 0 and "3 trial(s) of servo_pendulum, pieces of 1: long 0-4 s, long 4-8 s, long 8-12 s" in said
+    assert (
+        status == 0
+        and "3 trial(s) of servo_pendulum, pieces of 1 that are told whole above: long 0-4 s, long 4-8 s, long 8-12 s"
+        in said
+    )
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     trials = read_run(tmp_path / "out" / "measured.mcap").trials
     assert summary["pieces"] == [t.name for t in trials] and len(summary["trials"]) == 1

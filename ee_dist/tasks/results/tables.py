@@ -100,7 +100,9 @@ def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
         (step_phrase(r, problem), problem.told(r.error_fit), problem.told(r.error_heldout), *([r.held_out] * several))
         for r in found.ladder
     ]
-    columns = (("step", False), ("fitted", True), ("held out", True), *([("what was held out", False)] * several))
+    # What comes later changes the values of what came first.
+    step = "step, with its values then" if sum(bool(r.added) for r in found.ladder) > 1 else "step"
+    columns = ((step, False), ("fitted", True), ("held out", True), *([("what was held out", False)] * several))
     of = f"; held out: {found.cuts[0]}" if len(found.cuts) == 1 else ""
     table = _table(f"The ladder: {problem.natural_name}{of}", columns, rows)
     table.add_section()

@@ -1,0 +1,101 @@
+"""Joints that something in their way held: a gripper that closes on a cube, a door that is ajar.
+
+No effect of the catalogue is of a thing that is there at one time and not at another. What is asked of such a joint and not
+done goes into play, springs and zeros at it, which tell nothing of the joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from ee_dist.basics.names import counted, listed
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.robots.model import Robot
+from ee_dist.trials.log import Array
+
+STILL_S = 0.3
+"""How long a joint stands, at least, to be held."""
+STILL, FAR = 0.01, 0.1
+"""Shares of what a joint moved in all: within which it stands, and from which it is far from what it is asked for."""
+USUAL = 4.0
+"""Times as far as it stands from its command at other times, in the middle."""
+ONE_PLACE, BEYOND = 0.25, 0.5
+"""Shares of how far it is from its command: within which it stands each time, and by which it went further at another."""
+TWICE = 2
+"""Times from which that is no accident."""
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A time in which a joint stood ``at`` a place while it was asked ``further``, by so much."""
+
+    trial: int
+    at: float
+    further: float
+
+
+def blocked(trials: Sequence[MeasuredTrial], robot: Robot) -> list[str]:
+    """A line for people for each joint that stood at one place while asked for more, and went beyond it at other times."""
+    lines = []
+    for k, drive in enumerate(robot.drives):
+        columns = [i for i, s in enumerate(robot.sensors) if s.kind == "position" and s.target == drive.joint]
+        if drive.command != "position" or not columns:
+            continue
+        own = [t for t in trials if t.real and t.recorded(robot)[columns[0]]]
+        stands = _held([t.log.sensors[:, columns[0]] for t in own], [t.log.commands[:, k] for t in own], own)
+        if stands:
+            unit = "rad" if robot.joint(drive.joint).kind == "hinge" else "m"
+            names = listed(dict.fromkeys(own[s.trial].name for s in stands))
+            at, further = (float(np.median([getattr(s, n) for s in stands])) for n in ("at", "further"))
+            lines.append(
+                f"{drive.joint} stood at {at:.3g} {unit} {counted(len(stands), 'time')} ({names}) while it was asked to go "
+                f"{abs(further):.2g} {unit} further, and went beyond that place at others: was something in its way? No effect "
+                "says so: what is found at it may stand in for that."
+            )
+    return lines
+
+
+def _held(read: Sequence[Array], told: Sequence[Array], trials: Sequence[MeasuredTrial]) -> list[Stand]:
+    """Times in which something held a joint, by what it read and was told (T,) in each trial; none where there were too few, they
+    are at several places, or it never went beyond."""
+    if not read:
+        return []
+    moved = float(np.ptp(np.concatenate(read)))
+    if not moved > 0:
+        return []
+    far: list[Stand] = []
+    usual: list[float] = []
+    for number, (q, c, trial) in enumerate(zip(read, told, trials, strict=True)):
+        for rows in _stands(q, float(np.median(np.diff(trial.log.times_s))), STILL * moved):
+            gap = float(np.median(c[rows] - q[rows]))
+            if abs(gap) > FAR * moved:
+                far.append(Stand(number, float(np.median(q[rows])), gap))
+            else:
+                usual.append(abs(gap))
+    found = []
+    for side in (-1.0, 1.0):
+        mine = [s for s in far if side * s.further > 0]
+        if len(mine) < TWICE:
+            continue
+        least = float(np.median([abs(s.further) for s in mine]))
+        at = np.array([s.at for s in mine])
+        reached = max(float((side * q).max()) for q in read)
+        if least > USUAL * float(np.median(usual or [0.0])) and np.ptp(at) < ONE_PLACE * least:
+            found += mine if reached > float((side * at).max()) + BEYOND * least else []
+    return found
+
+
+def _stands(q: Array, step_s: float, within: float) -> list[slice]:
+    """Rows of each time in which a joint stands, in the order of time: within so much for as long as STILL_S."""
+    width = max(2, round(STILL_S / step_s))
+    if len(q) < width:
+        return []
+    # A window that is still makes all of its rows still.
+    spread = maximum_filter1d(q, width) - minimum_filter1d(q, width)
+    still = maximum_filter1d((spread <= within).astype(np.int8), width) > 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
