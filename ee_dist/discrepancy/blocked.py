@@ -17,14 +17,15 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
-STILL_S = 0.3
-"""How long a joint stands, at least, to be held."""
+STILL_S, LAGS = 0.5, 3.0
+"""How long a joint stands, at least, to be held, and for how many lags: where a slow one turns back it is still for about two."""
 STILL, FAR = 0.01, 0.1
 """Shares of what a joint moved in all: within which it stands, and from which it is far from what it is asked for."""
 USUAL = 4.0
 """Times as far as it stands from its command at other times, in the middle."""
 ONE_PLACE, BEYOND = 0.25, 0.5
-"""Shares of how far it is from its command: within which it stands each time, and by which it went further at another."""
+"""Shares of how far it is from its command: within which it stands each time, and by which it stood further at another, as near
+to its command as usual."""
 TWICE = 2
 """Times from which that is no accident."""
 
@@ -39,59 +40,58 @@ class Stand:
 
 
 def blocked(trials: Sequence[MeasuredTrial], robot: Robot) -> list[str]:
-    """A line for people for each joint that stood at one place while asked for more, and went beyond it at other times."""
+    """A line for people for each joint that stood at one place while asked for more, and beyond it at other times."""
     lines = []
     for k, drive in enumerate(robot.drives):
         columns = [i for i, s in enumerate(robot.sensors) if s.kind == "position" and s.target == drive.joint]
         if drive.command != "position" or not columns:
             continue
         own = [t for t in trials if t.real and t.recorded(robot)[columns[0]]]
-        stands = _held([t.log.sensors[:, columns[0]] for t in own], [t.log.commands[:, k] for t in own], own)
+        least_s = max(STILL_S, LAGS * robot.joint(drive.joint).lag_s)
+        stands = _held([t.log.sensors[:, columns[0]] for t in own], [t.log.commands[:, k] for t in own], own, least_s)
         if stands:
             unit = "rad" if robot.joint(drive.joint).kind == "hinge" else "m"
             names = listed(dict.fromkeys(own[s.trial].name for s in stands))
             at, further = (float(np.median([getattr(s, n) for s in stands])) for n in ("at", "further"))
             lines.append(
                 f"{drive.joint} stood at {at:.3g} {unit} {counted(len(stands), 'time')} ({names}) while it was asked to go "
-                f"{abs(further):.2g} {unit} further, and went beyond that place at others: was something in its way? No effect "
+                f"{abs(further):.2g} {unit} further, and stood beyond that place at others: was something in its way? No effect "
                 "says so: what is found at it may stand in for that."
             )
     return lines
 
 
-def _held(read: Sequence[Array], told: Sequence[Array], trials: Sequence[MeasuredTrial]) -> list[Stand]:
-    """Times in which something held a joint, by what it read and was told (T,) in each trial; none where there were too few, they
-    are at several places, or it never went beyond."""
+def _held(read: Sequence[Array], told: Sequence[Array], trials: Sequence[MeasuredTrial], least_s: float) -> list[Stand]:
+    """Times of ``least_s`` and more in which something held a joint, by what it read and was told (T,) in each trial; none where
+    there were too few, they are at several places, or it never stood beyond."""
     if not read:
         return []
     moved = float(np.ptp(np.concatenate(read)))
     if not moved > 0:
         return []
     far: list[Stand] = []
-    usual: list[float] = []
+    near: list[Stand] = []
     for number, (q, c, trial) in enumerate(zip(read, told, trials, strict=True)):
-        for rows in _stands(q, float(np.median(np.diff(trial.log.times_s))), STILL * moved):
+        width = max(2, round(least_s / float(np.median(np.diff(trial.log.times_s)))))
+        for rows in _stands(q, width, STILL * moved):
             gap = float(np.median(c[rows] - q[rows]))
-            if abs(gap) > FAR * moved:
-                far.append(Stand(number, float(np.median(q[rows])), gap))
-            else:
-                usual.append(abs(gap))
+            (far if abs(gap) > FAR * moved else near).append(Stand(number, float(np.median(q[rows])), gap))
+    usual = float(np.median([abs(s.further) for s in near])) if near else 0.0
     found = []
     for side in (-1.0, 1.0):
         mine = [s for s in far if side * s.further > 0]
-        if len(mine) < TWICE:
+        if len(mine) < TWICE or not near:
             continue
         least = float(np.median([abs(s.further) for s in mine]))
         at = np.array([s.at for s in mine])
-        reached = max(float((side * q).max()) for q in read)
-        if least > USUAL * float(np.median(usual or [0.0])) and np.ptp(at) < ONE_PLACE * least:
+        reached = max(side * s.at for s in near)
+        if least > USUAL * usual and np.ptp(at) < ONE_PLACE * least:
             found += mine if reached > float((side * at).max()) + BEYOND * least else []
     return found
 
 
-def _stands(q: Array, step_s: float, within: float) -> list[slice]:
-    """Rows of each time in which a joint stands, in the order of time: within so much for as long as STILL_S."""
-    width = max(2, round(STILL_S / step_s))
+def _stands(q: Array, width: int, within: float) -> list[slice]:
+    """Rows of each time in which a joint stands, in the order of time: within so much for ``width`` rows."""
     if len(q) < width:
         return []
     # A window that is still makes all of its rows still.

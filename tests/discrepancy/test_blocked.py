@@ -75,6 +75,21 @@ def test_what_an_effect_may_say_is_not_told(floors: list[float], more: dict[str,
     assert blocked(logs(floors, **more), ROBOT) == []
 
 
+def test_a_joint_that_never_stood_beyond_where_it_comes_to_rest_is_not_told() -> None:
+    t = np.arange(0.0, 8.0, STEP_S)
+    told = np.interp(t, [0, 1, 2, 4, 5, 6, 7, 8], [0.4, 0.4, -0.15, -0.15, 0.4, -0.5, 0.4, 0.4])
+    read = np.interp(t, [0, 1.2, 2.2, 4.2, 5.2, 6.2, 7.2, 8], [0.4, 0.4, 0.02, 0.02, 0.4, -0.45, 0.4, 0.4])
+    assert blocked([trial(f"again {k}", told, read) for k in range(2)], ROBOT) == []
+
+
+def test_where_a_slow_joint_turns_back_nothing_held_it() -> None:
+    t = np.arange(0.0, 12.0, STEP_S)
+    wide = np.where(t < 6.0, 0.5, 1.0)
+    told, read = (wide * np.sin(1.6 * (t - late)) * size for late, size in ((0.0, 1.0), (0.2, 0.7)))
+    slow = replace(ROBOT, joints=tuple(replace(j, lag_s=0.2) for j in ROBOT.joints))
+    assert blocked([trial(f"sine {k}", told, read) for k in range(2)], slow) == []
+
+
 def test_nothing_is_told_of_what_is_simulated_here_or_led_otherwise_or_not_recorded() -> None:
     found = logs([0.026, 0.026])
     assert blocked(found, ROBOT)

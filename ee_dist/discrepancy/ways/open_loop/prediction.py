@@ -83,8 +83,7 @@ class ToDigest:
 
     @property
     def key(self) -> str:
-        read = "" if self.rows is None else f":{hashlib.sha256(repr(self.rows).encode()).hexdigest()}"
-        return f"digest:{self.block}:{self.window}{read}{_of_early(self.early)}"
+        return f"digest:{self.block}:{self.window}{_of_read(self.rows)}{_of_early(self.early)}"
 
     def __call__(self, log: SensorLog) -> Digest:
         return digest(of_rows(centred(log.sensors, self.early), self.rows), self.block, self.window)
@@ -102,6 +101,12 @@ class ToSensors:
 
     def __call__(self, log: SensorLog) -> Array:
         return centred(np.array(log.sensors), self.early)
+
+
+@lru_cache(maxsize=1024)
+def _of_read(rows: tuple[int, ...] | None) -> str:
+    """Of hundreds of rows, asked for with each rollout of a stretch."""
+    return "" if rows is None else f":{hashlib.sha256(repr(rows).encode()).hexdigest()}"
 
 
 def _of_early(columns: Sequence[int]) -> str:
