@@ -144,3 +144,15 @@ def test_numbers_that_no_drive_could_give_are_no_newton_metres(tmp_path: Path, t
     # Limits that were guessed say nothing of it.
     guessed = replace(robot, assumed=tuple((j, "torque_limit") for j in robot.motor_names))
     assert not [n for n in proposed(tmp_path, guessed, frame).notes if "where its drive gives" in n]
+
+
+def test_a_command_of_one_joint_alone_is_told_with_what_to_do(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path)
+    frame = log(robot, tau=1.0)
+    found = proposed(tmp_path, robot, frame.drop(columns=["cmd2"]))
+    (told,) = [n for n in found.notes if n.startswith("no commands were found")]
+    assert "cmd1: called commands, and not one for each drive" in told and "fixed_joints" in told
+    (told,) = [
+        n for n in proposed(tmp_path, robot, frame.drop(columns=["cmd1", "cmd2"])).notes if n.startswith("no commands")
+    ]
+    assert told.endswith("a balance of forces is the way to compare")

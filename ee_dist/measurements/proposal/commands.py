@@ -70,7 +70,7 @@ def add_commands(v: View) -> None:
             v.out.notes.append(
                 f"no commands were found: the measured torques are taken as what was asked for{_voltages(v, kind)}"
                 if kind == "torque"
-                else "no commands were found: a balance of forces is the way to compare"
+                else f"no commands were found: a balance of forces is the way to compare{_of_fewer(v)}"
             )
             return
         rivals = " or ".join(s.block.name for s in sorted(found, key=lambda s: -s.score)[:3])
@@ -102,6 +102,18 @@ def add_commands(v: View) -> None:
     certain = chosen.block.reading.command and (kind == "torque" or _goes_with_the_motion(v, chosen.block, kind))
     level = SURE if certain else LIKELY
     v.add("commands", names, chosen.block, units, chosen.why, level)
+
+
+def _of_fewer(v: View) -> str:
+    """What to do with columns that are called commands, and are those of fewer joints than the robot has drives."""
+    asked = {a for t in v.timed.tables for a in t.addresses() if read_name(a).command}
+    taken = {c for b in v.blocks if b.used for c in b.columns}
+    if not (asked := asked - taken):
+        return ""
+    return (
+        f"; {listed(sorted(asked))}: called commands, and not one for each drive: fix the joints that were told nothing and stood "
+        "still ('fixed_joints' of the robot), and log which joint a command is of"
+    )
 
 
 def _voltages(v: View, kind: str) -> str:
