@@ -111,7 +111,7 @@ def _of_fewer(v: View) -> str:
     if not (asked := asked - taken):
         return ""
     return (
-        f"; {listed(sorted(asked))}: called commands, and not one for each drive: fix the joints that were told nothing and stood "
+        f"; {listed(sorted(asked))}: called commands, and not one for each drive: fix joints that were told nothing and stood "
         "still ('fixed_joints' of the robot), and log which joint a command is of"
     )
 
