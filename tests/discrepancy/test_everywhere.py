@@ -82,7 +82,7 @@ class Curved(Problem):
 
 
 class _Trial:
-    setup = ()
+    setup, number = (), 0
 
     def __init__(self, name: str, commands: np.ndarray) -> None:
         self.name = name
