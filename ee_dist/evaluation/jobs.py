@@ -6,7 +6,6 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -51,9 +50,8 @@ class Job:
     rollout: Rollout
     reduction: Reduction
 
-    @cached_property
+    @property
     def key(self) -> str:
-        """Asked for by the cache and by the journal; it is hashed from a dozen arrays."""
         text = f"{self.rollout.key}|{self.reduction.key}"
         return hashlib.sha256(text.encode()).hexdigest()
 
