@@ -59,7 +59,10 @@ class TrialClocks:
             if isinstance(c, Column) and c.table == self.first and kinds.get(n) == "position"
         ]
         table = self._table(self.first)
-        return np.stack([table.numbers(c, gaps=True) for c in read], axis=1) if read else None
+        try:
+            return np.stack([table.numbers(c, gaps=True) for c in read], axis=1) if read else None
+        except MeasurementError:  # What is wrong with a column is said where it is read.
+            return None
 
     def _tell_bunched(self) -> None:
         """Tells of rows that are taken at an even pace; other tables that bear the same stamps follow."""

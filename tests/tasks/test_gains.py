@@ -24,7 +24,8 @@ def test_no_more_than_all_of_it_and_a_loss_is_told_as_one(
     explained: float, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     c = SimpleNamespace(
-        rank=1, terms=(), name="a@b", error_heldout=1.0, explained=explained, gain=explained, interval=(-1.5, 1.2),
+        rank=1, terms=(), name="a@b", error_heldout=1.0, error_without=2.0,
+        explained=explained, gain=explained, interval=(-1.5, 1.2),
         earned=True, why_not="", tied_with=[], held_out="windows",
     )  # fmt: skip
     problem = SimpleNamespace(robot=None, told=str, natural_name="error")
@@ -37,7 +38,7 @@ def test_no_more_than_all_of_it_and_a_loss_is_told_as_one(
     section = ranking_section(problem, [c])  # type: ignore[arg-type, list-item]
     assert section is not None and section.table is not None and section.figure is not None
     (bar,) = section.figure.data[0].x
-    assert section.table.rows[0][3:5] == [said, "-150 to 100 %"] and bar == pytest.approx(100 * min(explained, 1))
+    assert section.table.rows[1][3:5] == [said, "-150 to 100 %"] and bar == pytest.approx(100 * min(explained, 1))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,8 @@ def test_brackets_are_no_markup(name: str, capsys: pytest.CaptureFixture[str]) -
     console = terminal(width=120)
     problem = SimpleNamespace(robot=None, told=str)
     judged = SimpleNamespace(
-        rank=1, terms=(), name="a", error_heldout=1.0, explained=0.5, gain=0.5, interval=(0.4, 0.6), earned=False,
+        rank=1, terms=(), name="a", error_heldout=1.0, error_without=2.0,
+        explained=0.5, gain=0.5, interval=(0.4, 0.6), earned=False,
         why_not=f"not at {name}", tied_with=[]
     )  # fmt: skip
     show_candidates(console, problem, [judged], f"Trials of {name}")  # type: ignore[arg-type, list-item]
