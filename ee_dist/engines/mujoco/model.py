@@ -261,7 +261,10 @@ def _turn(rotation: Quat) -> Array:
 
 def of_length_one(vector: Array) -> Array:
     """To the last bit as MuJoCo's compiler makes it so: what is of length one already is left alone."""
-    length = math.sqrt(sum(v * v for v in vector.tolist()))
+    square = 0.0
+    for v in vector.tolist():  # One by one: from Python 3.12 on sum() of floats rounds once.
+        square += v * v
+    length = math.sqrt(square)
     return vector if abs(length - 1.0) <= ROUNDED else vector / length
 
 
