@@ -295,7 +295,7 @@ class _Reader:
             kind = "fixed"
         axis_element = e.find("axis")
         axis = (1.0, 0.0, 0.0) if axis_element is None else self.vector(axis_element, "xyz", where, (1.0, 0.0, 0.0))
-        length = math.sqrt(sum(v * v for v in axis))
+        length = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
         if kind not in ("fixed", "floating") and length < 1e-9:
             raise self.fail(where, "its axis has no direction (0 0 0)")
         unit = (axis[0] / length, axis[1] / length, axis[2] / length) if length > 1e-9 else (1.0, 0.0, 0.0)
