@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ee_dist.basics.names import counted, listed
+from ee_dist.basics.runs import runs
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -97,5 +98,4 @@ def _stands(q: Array, width: int, within: float) -> list[slice]:
     # A window that is still makes all of its rows still.
     spread = maximum_filter1d(q, width) - minimum_filter1d(q, width)
     still = maximum_filter1d((spread <= within).astype(np.int8), width) > 0
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [slice(first, last) for first, last in runs(still)]

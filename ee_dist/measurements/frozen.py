@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.basics.runs import runs
 from ee_dist.measurements import signals
 from ee_dist.measurements.clocks import Clocked
 from ee_dist.measurements.mapping import Column, Mapping
@@ -46,12 +47,10 @@ def frozen(mapping: Mapping, own: Clocked, table: str, robot: Robot) -> list[Fro
     every = [c for g, _, c in mapping.columns() if c.table == table and g in ("sensors", "torques")]
     same = np.all([np.diff(own.table.numbers(c.column, gaps=True)) == 0 for c in every], axis=0)
     changes = np.flatnonzero(~same)
-    edges = np.flatnonzero(np.diff(np.r_[False, same, False].astype(int)))
     least = max(LONG, GAP * float(np.median(np.diff(changes)))) if len(changes) > 1 else np.inf
     # The reading that is repeated was one, but at the beginning, where nobody knows of when it is.
-    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
-    runs = [(a, b) for a, b in runs if own.times_s[b] - own.times_s[a] >= LONG_S]
-    if not runs:
+    long = [(a, b) for a, b in runs(same) if b - a >= least and own.times_s[b] - own.times_s[a] >= LONG_S]
+    if not long:
         return []
     read: dict[str, dict[str, Array]] = {"position": {}, "velocity": {}}
     for name, c in of_table.items():
@@ -62,7 +61,7 @@ def frozen(mapping: Mapping, own: Clocked, table: str, robot: Robot) -> list[Fro
         own.table.numbers(c.column, gaps=True) for g, _, c in mapping.columns() if g == "commands" and c.table == table
     ]
     found = []
-    for a, b in runs:
+    for a, b in long:
         if why := _goes_on(robot, a, b, own.times_s, read["position"], read["velocity"], asked):
             first = a + 1 if a else 0
             found.append(Frozen(slice(first, b + 1), float(own.times_s[b] - own.times_s[a]), why))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.basics.quoted import quoted
+from ee_dist.basics.runs import runs
 from ee_dist.measurements import signals
 from ee_dist.measurements.report import STUCK_AT
 from ee_dist.measurements.units import TURN, TURNS_ON, UNITS
@@ -322,9 +323,8 @@ def _longest_run(values: Array) -> tuple[int, int]:
 def _cut_off(values: Array, at: NDArray[np.bool_], spread: float) -> bool:
     """Whether two or more stretches at the edge are entered at speed. A smooth peak nears its top slowly: as long before
     a stretch as it lasts, it is close by; a signal that is cut off is still far away."""
-    edges = np.flatnonzero(np.diff(np.r_[False, at, False].astype(int)))
     entered = 0
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
+    for first, last in runs(at):
         before = first - (last - first)
         if last - first >= 5 and before >= 0 and abs(values[before] - values[first]) > CLIPPED_DROP * spread:
             entered += 1

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ee_dist.basics.runs import runs
 from ee_dist.engines.loop import gravity_vector
 from ee_dist.robots.kinematics import compose, part_poses, quat_rotate
 from ee_dist.robots.model import Robot, Shape
@@ -123,8 +124,7 @@ def _below(shape: Shape, placed: Array) -> Array:
 
 def _longest(seen: NDArray[np.bool_]) -> int:
     """Rows of the longest stretch of True."""
-    edges = np.diff(np.concatenate([[0], seen.astype(int), [0]]))
-    return int(np.max(np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1), initial=0))
+    return max((last - first for first, last in runs(seen)), default=0)
 
 
 def _energy(

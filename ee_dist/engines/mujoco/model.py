@@ -117,6 +117,7 @@ class Model:
         self._scratch = mujoco.MjData(m)
         parts = [p.name for p in robot.present_parts]
         self.bodies = np.array([m.body(_body(name)).id for name in parts])
+        self.body_of = dict(zip(parts, self.bodies, strict=True))
         self.root = int(self.bodies[0])
         moving = {j.name for j in robot.present_joints if j.kind != "fixed"}
         self.motors = [k for k, name in enumerate(robot.motor_names) if name in moving]
@@ -143,11 +144,10 @@ class Model:
             inertia[body], turn[body] = principal(part)
         for k, dof in zip(self.motors, self.dof, strict=True):
             rotor[dof] = robot.drives[k].rotor_inertia
-        body_of = dict(zip((p.name for p in robot.present_parts), self.bodies, strict=True))
         if not robot.free_base:
             at[self.root], frame[self.root] = robot.start_position_m, of_length_one(_turn(robot.start_rotation))
         for joint in robot.present_joints:
-            body = body_of[joint.child]
+            body = self.body_of[joint.child]
             at[body], frame[body] = joint.position_m, of_length_one(_turn(joint.rotation))
             if joint.kind != "fixed":
                 axis[self.axes[joint.name]] = of_length_one(np.array(_plain(joint.axis)))

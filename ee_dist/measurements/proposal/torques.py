@@ -93,9 +93,9 @@ def add_torques(v: View) -> None:
         else:
             _tell_rivals(v, [s for s in found if s.score >= 2])
         return
-    current = chosen.block.reading.kind == CURRENT
-    beyond = "" if current or any(sensed) or v.hints.gains is not None else _beyond_the_drives(v, chosen.block)
-    if v.hints.gains is None and not any(sensed) and led(v) and (current or beyond):
+    current, untold = chosen.block.reading.kind == CURRENT, v.hints.gains is None and not any(sensed)
+    beyond = _beyond_the_drives(v, chosen.block) if untold and not current else ""
+    if untold and led(v) and (current or beyond):
         # A robot that is led by its commands is compared without torques.
         what = f"motor currents ({chosen.block.name}) are" if current else f"{chosen.block.name} {beyond}: no N.m, and"
         v.out.notes.append(
