@@ -13,7 +13,8 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques, torques_known
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
-from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun, led
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.ways.free_run.windows import RESTART_S, led
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.effects.targets import gains_are_known
 from ee_dist.engines.one_joint import fits

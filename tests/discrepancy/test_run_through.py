@@ -12,7 +12,8 @@ from way_samples import evaluator_for, samples
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Problem, Through
 from ee_dist.discrepancy.run_through import AS_GOOD, MANY, STRAYS, that_hold_run_through
-from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.ways.free_run.windows import RESTART_S
 from ee_dist.effects.catalogue import Hypothesis, apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands

@@ -12,7 +12,9 @@ from ee_dist.discrepancy.explain import NOTHING_MISSING, explain
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import candidate
-from ee_dist.discrepancy.ways.free_run.problem import GROWN, RESTART_S, FreeRun
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.ways.free_run.starts import GROWN
+from ee_dist.discrepancy.ways.free_run.windows import RESTART_S
 from ee_dist.effects.catalogue import Hypothesis, apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands

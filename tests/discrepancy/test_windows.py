@@ -20,7 +20,9 @@ from ee_dist.discrepancy.problem import error
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import SAME, tells_nothing
-from ee_dist.discrepancy.ways.free_run.problem import ASTRAY, RESTART_S, FreeRun
+from ee_dist.discrepancy.ways.free_run.at_rest import ASTRAY
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.ways.free_run.windows import RESTART_S
 from ee_dist.effects.catalogue import apply, term
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands

@@ -11,7 +11,8 @@ import pytest
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.ways.force_balance.motion import Motion, Processing, motion_of
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
-from ee_dist.discrepancy.ways.free_run.problem import RESTART_S, FreeRun
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.discrepancy.ways.free_run.windows import RESTART_S
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import Robot
 from ee_dist.robots.servo_pendulum import servo_pendulum

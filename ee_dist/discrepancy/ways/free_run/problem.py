@@ -12,21 +12,24 @@ Joints that turn and joints that slide have nothing in common but their noise: e
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
 from ee_dist.basics.altered import altered
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
-from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Layout, Problem, Series, Through, error, joints_of
+from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Problem, Series, Through, error
 from ee_dist.discrepancy.starting import speeds_off
+from ee_dist.discrepancy.ways.free_run.at_rest import doubt, hardly_better, stands_still
+from ee_dist.discrepancy.ways.free_run.layout import lay_out
 from ee_dist.discrepancy.ways.free_run.longer_steps import SLIGHT, every_row_is_known, moved_by
-from ee_dist.discrepancy.ways.free_run.noise import MEAN_ABSOLUTE, noise_by_unit, noiseless
+from ee_dist.discrepancy.ways.free_run.noise import noise_by_unit, noiseless
 from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, ToPositions, in_turn, pieces, spared, thinned
+from ee_dist.discrepancy.ways.free_run.starts import GROWN, grown_by_start, positions_off
+from ee_dist.discrepancy.ways.free_run.windows import led, window_s
+from ee_dist.discrepancy.ways.free_run.words import how_begun, in_unit, of_models, taken_less
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.integral import INTEGRAL
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
@@ -34,26 +37,6 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
 
-RESTART_S = 0.5
-"""Length of windows that start anew from the measured state,"""
-LATE, LAGS = 0.5, 4.0
-"""but of so many lags where a joint was seen to come later than by so much of it: by the end of such a window it has hardly come
-to what it was told, and any soft controller does as well."""
-GROWN = 10.0
-"""Error over that of noise alone, of a perfect model, from which the starts of windows decide: motions that are not stable.
-Below it noise is all of the floor: it is a bound, and hid what was found without it in simulated robots."""
-HARDLY_BETTER = 0.8
-"""Share of the error of a robot that stays where it is, from which a model says next to nothing of the motion."""
-WORSE = 1.5
-"""Times as far off as a robot that stays where it is, from which a model goes the wrong way or too far,"""
-ASTRAY = (
-    "It goes the wrong way, or too far: are sign, scale and unit of commands and positions right, and gains and inertia of the "
-    "description?"
-)
-"""which is asked before"""
-MOVES = "Is there more in the record than rest, and is friction no more than what moved the joints?"
-AT_NOISE = 1.3
-"""Times the noise floor up to which a model is right, be it of a robot at rest."""
 BLOCKS = 6
 """Segments that a record run through in one go is cut into."""
 
@@ -105,7 +88,10 @@ class FreeRun(Problem):
         self.noise = np.array([by_unit.get(robot.sensors[k].unit, np.nan) for k in columns])
         """(C,) mean absolute error that noise alone would leave, in the unit of each channel; NaN of units of which nobody
         recorded any."""
-        self._lay_out(BLOCKS if windows_s is None else 1)
+        names, blocks = [t.name for t in self.measured], BLOCKS if windows_s is None else 1
+        self.layout, self.slices = lay_out(robot, self.columns, names, self.pieces, self.own, blocks)
+        self.weight = self.layout.floor.copy()
+        """(n,) what a value's noise counts: a mean absolute error of 1, by the weight of its trial."""
         grown = self._by_start() if windows_s is not None else np.ones(1)
         if grown.mean() >= GROWN:
             noise = self.layout.floor
@@ -119,45 +105,6 @@ class FreeRun(Problem):
         self.error_definition = (
             f"mean absolute position error over {how}, every trial counting the same (for programs: its square root, in units "
             f"of the noise of the readings, {', '.join(f'{noise:.2g} {unit}' for unit, noise in by_unit.items())})"
-        )
-
-    def _lay_out(self, blocks: int) -> None:
-        """Segments and places of all residual values. A trial's values carry equal weight in sum, whatever its length."""
-        rows, channels = [len(p.rows) for p in self.pieces], [self.own[p.trial] for p in self.pieces]
-        starts = np.cumsum([0, *(count * len(own) for count, own in zip(rows, channels, strict=True))])
-        self.slices = [slice(int(a), int(b)) for a, b in pairwise(starts)]
-        names: list[str] = []
-        of_trial: list[int] = []
-        seg: list[Array] = []
-        time: list[Array] = []
-        for p, count, own in zip(self.pieces, rows, channels, strict=True):
-            width = len(own)
-            block, at = p.window, p.start_s + p.times_s
-            cut = int(block.max()) + 1
-            if cut == 1:
-                cut = min(blocks, max(1, count // 10))
-                block = np.arange(count) * cut // count
-            seg.append(np.repeat(len(names) + block, width))
-            time.append(np.repeat(at, width))
-            names += [f"{self.measured[p.trial].name}@{at[np.argmax(block == b)]:.1f}s" for b in range(cut)]
-            of_trial += [p.trial] * cut
-        segment_of, size = np.concatenate(seg), int(starts[-1])
-        trial_of = np.array(of_trial)[segment_of]
-        values = np.bincount(trial_of)
-        self.weight = (values[values > 0].mean() / np.maximum(values, 1))[trial_of]
-        sensors = [self.robot.sensors[k] for k in self.columns]
-        self.layout = Layout(
-            segments=tuple(names),
-            trial_of_segment=np.array(of_trial),
-            segment_of=segment_of,
-            channel_of=np.concatenate([np.tile(own, count) for own, count in zip(channels, rows, strict=True)]),
-            time_s=np.concatenate(time),
-            reading=np.ones(size, dtype=bool),
-            floor=self.weight.copy(),
-            known=np.zeros(size),
-            channels=tuple(s.name for s in sensors),
-            units=tuple(s.unit for s in sensors),
-            joint_of_channel=joints_of(self.robot, [s.target for s in sensors]),
         )
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
@@ -191,31 +138,13 @@ class FreeRun(Problem):
         return out
 
     def _by_start(self) -> Array:
-        """(n,) by how much more than noise a perfect model would leave, for it starts from what was measured: where a motion is
-        not stable, a pole that stands upright, what is wrong with that grows until the window ends. By the robot as it is
-        described, a standard deviation beside each measured position and speed."""
-        jobs, count = [], []
-        of_trial = [
-            (self._simulated(k, ()), self._positions_off(k), speeds_off(t, self.robot))
-            for k, t in enumerate(self.measured)
+        """(n,) by how much more than noise a perfect model would leave, for it starts from what was measured."""
+        noise = self.noise
+        starts = [
+            (self._simulated(k, ()), positions_off(self.robot, self.columns, own, noise), speeds_off(t, self.robot))
+            for k, (t, own) in enumerate(zip(self.measured, self.own, strict=True))
         ]
-        for p in self.pieces:
-            model, positions, speeds = of_trial[p.trial]
-            beside = [p, *p.beside(positions, speeds)]
-            jobs += [Job(b.rollout(model, len(p.log), False), ToPositions(self.columns, p.rows)) for b in beside]
-            count.append(len(beside))
-        found, grown = iter(self.evaluator.evaluate(jobs)), []
-        for p, many in zip(self.pieces, count, strict=True):
-            own, *others = (np.asarray(next(found), dtype=float) for _ in range(many))
-            with np.errstate(invalid="ignore", over="ignore"):
-                spread = np.sqrt(sum(((o - own) ** 2 for o in others), np.zeros_like(own))) * MEAN_ABSOLUTE / self.noise
-            grown.append(np.hypot(1.0, np.where(np.isfinite(spread), spread, 0.0))[:, self.own[p.trial]].ravel())
-        return np.concatenate(grown)
-
-    def _positions_off(self, trial: int) -> Array:
-        """(M,) standard deviations of the joint positions that a simulation of a trial starts from."""
-        joints = {self.robot.sensors[self.columns[c]].target: self.noise[c] for c in self.own[trial]}
-        return np.array([joints.get(m, 0.0) / MEAN_ABSOLUTE for m in self.robot.motor_names])
+        return grown_by_start(self.pieces, starts, self.columns, self.own, noise, self.evaluator)
 
     def _models(self, hypotheses: Sequence[Hypothesis], trials: Collection[int], steps: int) -> dict[int, list[Robot]]:
         """What is simulated for each hypothesis, so many rows at a time, by trial; trials in which the robot was held alike share
@@ -258,13 +187,13 @@ class FreeRun(Problem):
 
     def told(self, error: float) -> str:
         value = self.natural(error)
-        return _told(value, self.units[0]) if len(self.units) == 1 else f"{value:.3g} {self.natural_unit}"
+        return in_unit(value, self.units[0]) if len(self.units) == 1 else f"{value:.3g} {self.natural_unit}"
 
     def told_by_unit(self, residual: Array) -> str:
         """The mean absolute position error of a residual (n,), of joints of each kind in their own unit."""
         off, unit_of = np.abs(self.raw(residual)), np.array(self.layout.units)[self.channel_of]
         # Every trial counts the same, as it does in the error.
-        return " and ".join(_told(float(np.average(off[m], weights=self.weight[m])), u)
+        return " and ".join(in_unit(float(np.average(off[m], weights=self.weight[m])), u)
                             for u in self.units for m in [unit_of == u])  # fmt: skip
 
     def raw(self, residual: Array) -> Array:
@@ -338,20 +267,8 @@ class FreeRun(Problem):
 
     @property
     def notes(self) -> list[str]:
-        lines = super().notes
-        if self.one_in > 1:
-            whole = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)
-            lines.append(
-                f"So that the search ends, one in {self.one_in} of the windows is simulated, of {whole:.0f} s in steps of "
-                f"{1e3 * self.steps * self.robot.time_step_s:g} ms; compare takes all of them."
-            )
-        if self.steps > 1:
-            step_ms = 1e3 * self.robot.time_step_s
-            lines.append(
-                f"So that the search ends, it goes in steps of {self.steps * step_ms:g} ms, by which the robot as described is "
-                f"off by less than a tenth of the noise floor; compare goes in steps of {step_ms:g} ms."
-            )
-        return lines
+        seconds = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)
+        return super().notes + taken_less(self.one_in, self.steps, self.robot.time_step_s, seconds)
 
     def remarks(self, hypothesis: Hypothesis) -> list[str]:
         return self.other_errors(hypothesis)
@@ -365,33 +282,23 @@ class FreeRun(Problem):
     def other_errors(self, *models: Hypothesis) -> list[str]:
         out = []
         if len(self.units) > 1:
-            out += [f"Mean absolute position error: {_listed([self.told_by_unit(r) for r in self.residuals(models)])}."]
+            each = [self.told_by_unit(r) for r in self.residuals(models)]
+            out += [f"Mean absolute position error: {of_models(each)}."]
         if led(self.robot):
             other = self._in_windows if self.windows_s is None else self._whole
-            how = "Run through without starting anew"
-            if other.windows_s is not None:
-                how = f"Started anew from the measured state every {other.windows_s:g} s"
             rows = other.residuals(models)
             each = [other.told(error(r)) if len(self.units) == 1 else other.told_by_unit(r) for r in rows]
-            out += [f"{how}: {_listed(each)}."]
-        rest = self.says_nothing(models[-1])
-        if not rest:
-            return out
-        worse = error(self.residuals([models[-1]])[0]) > WORSE * self._at_rest
-        return [*out, f"{rest[0].upper()}{rest[1:]}. {ASTRAY + ' ' if worse else ''}{MOVES}"]
+            out += [f"{how_begun(other.windows_s)}: {of_models(each)}."]
+        if rest := self.says_nothing(models[-1]):
+            out += [doubt(rest, error(self.residuals([models[-1]])[0]), self._at_rest)]
+        return out
 
     def says_nothing(self, model: Hypothesis) -> str:
         """One with enough friction stands still, and most of a record is often rest."""
         if self.windows_s is None:
             return ""
-        off = error(self.residuals([model])[0])
-        least = max(AT_NOISE * self.noise_floor()[0], math.sqrt(HARDLY_BETTER) * self._at_rest)
-        if least <= off < math.inf:
-            return (
-                f"a robot that stays where each window begins would be off by {self.told(self._at_rest)}, this model is by "
-                f"{self.told(off)}: it says next to nothing of the motion"
-            )
-        return self.never_moves(model)
+        off, noise = error(self.residuals([model])[0]), self.noise_floor()[0]
+        return hardly_better(off, self._at_rest, noise, self.told) or self.never_moves(model)
 
     def never_moves(self, model: Hypothesis) -> str:
         """By the whole record, of a robot that controllers lead."""
@@ -399,13 +306,7 @@ class FreeRun(Problem):
             return ""
         whole = self._whole
         described, through = (error(r) for r in whole.residuals([(), model]))
-        rest = whole._at_rest
-        if not described < math.sqrt(HARDLY_BETTER) * rest <= through < math.inf:
-            return ""
-        return (
-            f"run through without starting anew a robot that never moves would be off by {whole.told(rest)}, this model is by "
-            f"{whole.told(through)}, and as it is described by {whole.told(described)}: it says next to nothing of the motion"
-        )
+        return stands_still(described, through, whole._at_rest, whole.told)
 
     @cached_property
     def _at_rest(self) -> float:
@@ -437,23 +338,3 @@ class FreeRun(Problem):
         """(trials,) mean absolute position error of each trial, in ``natural_unit``."""
         residual = self.residuals([hypothesis])[0]
         return np.array([self.natural(self.trial_error(residual, k)) for k in range(len(self.measured))])
-
-
-def window_s(robot: Robot) -> float:
-    """How long windows of a robot are, by what was seen of it."""
-    lag = max((robot.joint(d.joint).lag_s for d in robot.drives), default=0.0)
-    return RESTART_S if lag <= LATE * RESTART_S else round(LAGS * lag, 1)
-
-
-def led(robot: Robot) -> bool:
-    """Whether controllers hold the joints to what is commanded."""
-    return any(d.command in ("position", "speed") for d in robot.drives)
-
-
-def _listed(each: Sequence[str]) -> str:
-    """Of one model, or of one and of another made from it."""
-    return each[0] if len(each) == 1 else f"model {each[0]}, improved model {each[-1]}"
-
-
-def _told(value: float, unit: str) -> str:
-    return f"{value:.3g} {unit}" if value >= 1 else f"{1e3 * value:.3g} {'mrad' if unit == 'rad' else 'mm'}"
