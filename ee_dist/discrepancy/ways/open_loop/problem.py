@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
 from ee_dist.discrepancy.problem import EVENT, Index, Problem, Series
 from ee_dist.discrepancy.recorded import means_of, row_by_row
@@ -24,18 +23,17 @@ from ee_dist.discrepancy.ways.open_loop.in_units import InUnits, farther_off, in
 from ee_dist.discrepancy.ways.open_loop.layout import lay_out
 from ee_dist.discrepancy.ways.open_loop.predictability import MEMBERS, ensemble
 from ee_dist.discrepancy.ways.open_loop.prediction import (
-    Digest,
     Predictor,
     ToSensors,
     digest,
     of_rows,
-    predicted_commands,
     report,
     rollout_of,
 )
+from ee_dist.discrepancy.ways.open_loop.residual import command_residuals, residual_of
 from ee_dist.discrepancy.ways.open_loop.scale import Scale, channel_scale, no_more_than_places
+from ee_dist.discrepancy.ways.open_loop.set_ups import SetUps
 from ee_dist.discrepancy.ways.open_loop.stretches import (
-    SETTLED_S,
     STRETCH_S,
     Stretch,
     at_most,
@@ -46,10 +44,11 @@ from ee_dist.discrepancy.ways.open_loop.stretches import (
     too_long,
     unsettled,
 )
-from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, by_steps, frozen, moving
+from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, digest_held, moving
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
-from ee_dist.discrepancy.ways.open_loop.views import Views, command_scale
-from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, Weights, soften, weigh
+from ee_dist.discrepancy.ways.open_loop.views import Views
+from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, Weights, weigh
+from ee_dist.discrepancy.ways.open_loop.words import begun_in_motion, counted_less, some_of_it, uncompared
 from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
 from ee_dist.effects.effect import Beside
 from ee_dist.effects.groups import members_of
@@ -68,8 +67,6 @@ SAVED = 0.6
 """Share of the rows that the beginning of trials may have, to be worth a look by itself."""
 AT_ONCE = 16
 """Values that a contact or a reversal is in."""
-NOTED = 1.2
-"""Times that channels count less, from which it is told."""
 
 
 class OpenLoop(Problem):
@@ -112,7 +109,7 @@ class OpenLoop(Problem):
         self.window = max(1, window // self.block) * self.block
         block, window = self.block, self.window
         self._members, self._before = members, before
-        self._setups: dict[Hypothesis, dict[int, tuple[Robot, Robot]]] = {}
+        self._set_ups = SetUps()
         self.scale = scale or channel_scale(robot, self.measured)
         self._unmodelled, self.gained, self.calibrated = unmodelled or {}, gained, unmodelled is not None
         self.predictor = Predictor(trials, robot, evaluator, block, window)
@@ -121,9 +118,7 @@ class OpenLoop(Problem):
         read = [of_rows(t.log.sensors, r) for t, r in zip(trials, rows, strict=True)]
         # What is simulated has steps only where its sensors are described to.
         self._data = [
-            _without_steps(digest(values, block, window), values, window)
-            if t.commands_held
-            else digest(values, block, window)
+            digest_held(values, block, window) if t.commands_held else digest(values, block, window)
             for t, values in zip(trials, read, strict=True)
         ]
         self._moving = [
@@ -252,29 +247,14 @@ class OpenLoop(Problem):
 
     @property
     def notes(self) -> list[str]:
-        lines = super().notes + [
-            f"Most {kind} sensors repeat readings more often than the model's (coarse steps, rows that were filled "
-            "in): how often they do is not compared."
-            for kind in sorted(self.weights.repeating)
-        ]
-        led = forgets(self.robot, self.measured)
-        if moving := [t.name for t in self.measured if led and unsettled(t, self.robot)]:
-            begun = f"{counted(len(moving), 'trial')} that begin{'s' if len(moving) == 1 else ''} in motion ({listed(moving)})"
-            why = "nobody knows what the controllers were told before"
-            lines.append(f"The first {SETTLED_S:g} s of {begun} is simulated and not compared: {why}.")
-        if self.scale.loosened > NOTED:
-            lines.append(
-                "What joints report beside their positions is to count no more than these do, and the robot as described is off "
-                f"by {self.scale.loosened:.3g} times more in it than in positions: so many times more of it counts as one."
-            )
+        lines = super().notes + uncompared(self.weights.repeating)
+        if forgets(self.robot, self.measured):
+            lines += begun_in_motion([t.name for t in self.measured if unsettled(t, self.robot)])
+        lines += counted_less(self.scale.loosened)
         if self._whole is not None:
             compared = sum(self._rows) * (reading_s(self.measured) or self.robot.time_step_s)
             lasting = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)
-            parts = counted(len(self.parts), "stretch", "stretches")
-            lines.append(
-                f"So that the search ends, it goes by {compared:.0f} of the {lasting:.0f} s, in {parts}, each begun from the "
-                "measured positions; compare takes all of it."
-            )
+            lines.append(some_of_it(len(self.parts), compared, lasting))
         return lines
 
     def residuals(self, hypotheses: Sequence[Hypothesis], trials: Sequence[int] | None = None) -> Array:
@@ -299,49 +279,17 @@ class OpenLoop(Problem):
             mine, trial = digests[place * len(models) : (place + 1) * len(models)], self.parts[k].run
             first, last = self.slices[k].start, self.slices[k].stop
             if isinstance(trial.driver, Network):
-                sent = self._command_residuals(trial, models)
+                sent = command_residuals(trial, models, self.robot, self.block, self.soft)
                 out[:, last - sent.shape[1] : last] = sent
                 last -= sent.shape[1]
             for row, d in zip(out, mine, strict=True):
-                row[first:last] = self._compare(k, d)
+                row[first:last] = residual_of(self._data[k], d, self.weights, k, self._moving[k], self.robot, self.soft)
 
     def _held(self, models: Sequence[Robot], part: int) -> list[Robot]:
         """The models as they are held in a part of a trial; those held alike share them, for a robot's digest is not free."""
         run = self.parts[part].run
-        held = self._set_up(models, run.setup)
+        held = self._set_ups.held(models, run.setup)
         return held if run.begun is None else [run.begun.later(m) for m in held]
-
-    def _set_up(self, models: Sequence[Robot], setup: Hypothesis) -> list[Robot]:
-        if not setup:
-            return list(models)
-        known = self._setups.setdefault(setup, {})
-        for m in models:
-            if id(m) not in known:
-                known[id(m)] = (m, apply(m, setup))
-        held = [known[id(m)][1] for m in models]
-        if len(known) > 2000:
-            known.clear()
-        return held
-
-    def _compare(self, part: int, predicted: Digest) -> Array:
-        measured, own = self._data[part], self.weights.own[part]
-        if not predicted.finite:
-            return np.full((len(measured.means) + 2 * len(measured.rough)) * len(own), np.inf)
-        shape = (measured.means.astype(float) - predicted.means) / self.weights.deviation[part]
-        grain = (
-            np.log((measured.rough + self.weights.tiny) / self.weights.rough(predicted))
-            / self.weights.grain_deviation[part]
-        )
-        compared = np.array([x.kind not in self.weights.repeating for x in self.robot.sensors])
-        texture = np.stack([grain, frozen(measured, predicted, self.window) * compared * self._moving[part]], axis=1)
-        return np.concatenate([soften(v[..., own], self.soft).ravel() for v in (shape, texture)])
-
-    def _command_residuals(self, trial: MeasuredTrial, models: Sequence[Robot]) -> Array:
-        sent = predicted_commands(trial, models)
-        rows = len(trial.log) // self.block * self.block
-        gap = (trial.log.commands[:, None] - sent)[:rows].reshape(-1, self.block, *sent.shape[1:]).mean(axis=1)
-        values = soften(gap / command_scale(self.robot), self.soft)
-        return np.ascontiguousarray(np.moveaxis(values, 1, 0)).reshape(len(models), -1)
 
     def noise_floor(self) -> tuple[float, str]:
         source = self.scale.source
@@ -397,10 +345,3 @@ class OpenLoop(Problem):
         jobs = [Job(r, ToSensors(t.early(self.robot))) for t, r in zip(runs, rollouts, strict=True)]
         true = self.evaluator.evaluate(jobs)
         return [report(m, v) for m, v in zip(models, true, strict=True)]
-
-
-def _without_steps(found: Digest, values: Array, window: int) -> Digest:
-    """The digest of a real log (R, S) without repeats that its sensors' steps explain."""
-    return replace(
-        found, repeated=np.maximum(found.repeated - by_steps(values, window), 0.0).astype(found.repeated.dtype)
-    )

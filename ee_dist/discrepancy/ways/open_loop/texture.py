@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.recorded import means_of
-from ee_dist.discrepancy.ways.open_loop.prediction import Digest, block_sums
+from ee_dist.discrepancy.ways.open_loop.prediction import Digest, block_sums, digest
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -37,6 +38,14 @@ def by_steps(values: Array, window: int) -> Array:
     change, finest = _changes(values)
     one_step = (change > 0) & (change < 1.5 * finest)
     return np.asarray(block_sums(one_step.astype(float), window) / (2 * window))
+
+
+def digest_held(values: Array, block: int, window: int) -> Digest:
+    """The digest of a real log (R, S) without repeats that its sensors' steps explain."""
+    found = digest(values, block, window)
+    return replace(
+        found, repeated=np.maximum(found.repeated - by_steps(values, window), 0.0).astype(found.repeated.dtype)
+    )
 
 
 def _changes(values: Array) -> tuple[Array, Array]:
