@@ -8,7 +8,7 @@ import numpy as np
 
 from ee_dist.robots.kinematics import Array, compose, part_poses, quat_rotate
 from ee_dist.robots.model import Robot, Shape
-from ee_dist.robots.urdf import turn_of_rpy
+from ee_dist.robots.urdf_attributes import turn_of_rpy
 
 UPWARDS = np.eye(3)
 

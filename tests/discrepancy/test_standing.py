@@ -17,7 +17,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.robots.model import Part, Robot, Shape
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.robots.standing import lowest_m, stood
-from ee_dist.robots.urdf import turn_of_rpy
+from ee_dist.robots.urdf_attributes import turn_of_rpy
 from ee_dist.tasks.config import Config, EngineConfig
 from ee_dist.tasks.wiring import engine_maker
 from ee_dist.trials.log import Array, SensorLog

@@ -26,7 +26,8 @@ from ee_dist.export.urdf import rpy_of, urdf_text
 from ee_dist.robots.describe import load_robot
 from ee_dist.robots.model import CONTINUOUS_M, CONTINUOUS_RAD, Robot
 from ee_dist.robots.quadruped_lab import quadruped_lab
-from ee_dist.robots.urdf import read_urdf, turn_of_rpy
+from ee_dist.robots.urdf import read_urdf
+from ee_dist.robots.urdf_attributes import turn_of_rpy
 
 ARM = Path(__file__).parents[2] / "docs" / "examples" / "arm.yaml"
 QUADRUPED = quadruped_lab()

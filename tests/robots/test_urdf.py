@@ -18,7 +18,8 @@ from ee_dist.robots.describe import load_robot, read_body, robot_of
 from ee_dist.robots.described import robot_of_body
 from ee_dist.robots.model import RobotError
 from ee_dist.robots.serial import robot_from_json, robot_to_json
-from ee_dist.robots.urdf import UrdfError, read_urdf, turn_of_rpy
+from ee_dist.robots.urdf import read_urdf
+from ee_dist.robots.urdf_attributes import UrdfError, turn_of_rpy
 from ee_dist.trials.noise import channel_range
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
