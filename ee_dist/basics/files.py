@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files and folders: written whole or not at all, and found, or found free, by their names."""
 
 from __future__ import annotations
 
@@ -51,3 +51,16 @@ def repeated(files: Sequence[Path]) -> Path | None:
             return file
         known.add(real(file))
     return None
+
+
+def fresh(folder: Path) -> Path:
+    """The folder, or with a number behind it the first that does not exist."""
+    return numbered(folder) if folder.exists() else folder
+
+
+def numbered(folder: Path) -> Path:
+    """The first that does not exist of the folder with 2, 3, ... behind its name."""
+    number = 2
+    while (found := folder.with_name(f"{folder.name}_{number}")).exists():
+        number += 1
+    return found

@@ -17,7 +17,7 @@ from typing import Any
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig, OmegaConf
 
-from ee_dist.basics.files import write_whole
+from ee_dist.basics.files import numbered, write_whole
 from ee_dist.basics.quoted import quoted
 from ee_dist.tasks.config import ConfigError
 
@@ -91,10 +91,7 @@ def free_name(folder: Path) -> Path:
     """The folder, or with a number behind it the first that does not exist: two runs may start in one second."""
     if not held(folder) and not (folder / LOCK).exists():
         return folder
-    number = 2
-    while (found := folder.with_name(f"{folder.name}_{number}")).exists():
-        number += 1
-    return found
+    return numbered(folder)
 
 
 @contextmanager

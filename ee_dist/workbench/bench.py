@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.search.candidates import Candidate, known
-from ee_dist.discrepancy.words import quantity
+from ee_dist.discrepancy.words import placed, quantity
 from ee_dist.effects.catalogue import Hypothesis, Term
 from ee_dist.robots.model import Robot
 
@@ -117,6 +117,14 @@ class Bench:
 
     def stepped(self, *steps: Step) -> Bench:
         return replace(self, ladder=(*self.ladder, *steps))
+
+    def by_hand(self, error: float) -> Bench:
+        """The ladder with what a hand did: one rung for the same set of effects, however long their sliders are moved."""
+        on = " and ".join(placed(e.name) for e in self.entries if e.on) or "nothing"
+        step = Step(f"by hand: {on}", error, None)
+        if self.ladder and self.ladder[-1].name == step.name:
+            return replace(self, ladder=(*self.ladder[:-1], step))
+        return self.stepped(step)
 
     def _with(self, index: int, entry: Entry) -> Bench:
         return replace(self, entries=(*self.entries[:index], entry, *self.entries[index + 1 :]))

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ee_dist.basics.files import fresh
 from ee_dist.robots.describe import robot_of
 from ee_dist.tasks.config import Config, ConfigError, EngineConfig, RobotConfig
 from ee_dist.tasks.results.commands import command, setting
-from ee_dist.workbench.session import Session, fresh
+from ee_dist.workbench.session import Session
 
 if TYPE_CHECKING:
     from ee_dist.tasks.import_ import Options

@@ -8,63 +8,45 @@ from __future__ import annotations
 
 import contextlib
 import io
-import threading
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+from ee_dist.basics.files import fresh
 from ee_dist.discrepancy.ladder import UNFITTED
-from ee_dist.discrepancy.problem import Series, error
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.tasks.config import AUTO, Config, EvaluatorConfig
-from ee_dist.tasks.errors import USER_ERRORS, defect
+from ee_dist.tasks.errors import USER_ERRORS
 from ee_dist.tasks.measurements import Measurements, load
 from ee_dist.tasks.results.commands import command, setting
 from ee_dist.tasks.ways import way_of
-from ee_dist.trials.log import Array
 from ee_dist.workbench import commands, saved, verbs
 from ee_dist.workbench.bench import Bench, Step, bench_of
+from ee_dist.workbench.one_thread import OneThread
 from ee_dist.workbench.results import Compared, Explained, Improved
 from ee_dist.workbench.saved import Saved
-from ee_dist.workbench.sight import Place, Seen, Sight
+from ee_dist.workbench.sight import Glance, Place, Seen, Sight
 from ee_dist.workbench.verbs import Ended, Request
 from ee_dist.workbench.worker import BUSY, BusyError, Progress, Worker
 
-T = TypeVar("T")
 STEPS = "steps"
 MODEL_FILE = "model.yaml"
 MOST_UNDONE = 200
-AT_ONCE = 3
-"""Trials up to which all are simulated at each move of a slider."""
-MANY_ROWS = 50_000
-"""Rows of all trials from which their simulation takes half a second and more: not while a hand is on a slider."""
 
 
 class NothingOpenError(ValueError):
     """There is no log on the bench."""
 
 
-@dataclass(frozen=True, eq=False)
-class Glance:
-    """What a hand on a slider sees: one channel of one trial, and errors as the sight of the moment weighs them. ``error``:
-    over all trials; None where these are so many that it is asked for when the hand pauses, or rests (``Session.at_pauses``)."""
-
-    terms: Hypothesis
-    series: Series | None
-    residual: Array
-    trial_error: float
-    error: float | None
-
-
-class Session:
-    """``folder`` is where it writes. ``busy`` is told in ``progress``; ``notice`` is the last thing to tell the user."""
+class Session(OneThread):
+    """``busy`` is told in ``progress``. Topics that listeners hear: opened, model, seen, explained, progress, kept, notice."""
 
     def __init__(self, config: Config, by: str, folder: Path) -> None:
-        self.config, self.by, self.folder = config, by, folder
+        super().__init__(folder, (*USER_ERRORS, BusyError, NothingOpenError))
+        self.config, self.by = config, by
         # Here single simulations are wanted at once: no Ray, and no cache that grows with every move of a slider.
         self.live = replace(config, evaluator=EvaluatorConfig("serial", cache=False, recent=True))
         self.measured: Measurements | None = None
@@ -76,64 +58,16 @@ class Session:
         self.shown: Compared | None = None
         """The model that is looked at in 3-D, which need not be the one that was kept."""
         self.commands: tuple[str, ...] = ()
-        self.notice = ""
         self.worker = Worker(self._heard, self._ended)
         self._began: str | None = None
         self._past: list[Bench] = []
         self._gripped = False
         self._slid: tuple[int, frozenset[str]] | None = None
         self._files: dict[Hypothesis, Path | str | None] = {}
-        self._listeners: list[Callable[[str], None]] = []
-        self._one = ThreadPoolExecutor(1, "ee_dist bench")
-        self._guard = threading.Lock()
-
-    # -- threads and listeners -----------------------------------------------------------------------------------------
-
-    def do(self, act: Callable[..., T], *arguments: Any) -> Future[T]:
-        """Run it on the session's thread, after what runs there."""
-        return self._one.submit(act, *arguments)
-
-    def attempt(self, act: Callable[..., T | None], *arguments: Any) -> Future[T | None]:
-        """The same, where what goes wrong is told to the user, in a line, and gives None."""
-        return self.do(self._attempted, act, *arguments)
-
-    def _attempted(self, act: Callable[..., T | None], *arguments: Any) -> T | None:
-        try:
-            return act(*arguments)
-        except (*USER_ERRORS, BusyError, NothingOpenError) as error:
-            self.say(" ".join(str(error).split()))
-        except OSError as error:
-            self.say(f"{error.filename or 'the folder of this session'}: {error.strerror or error}")
-        except Exception as error:
-            self.say(defect(error, self.folder))
-        return None
-
-    def listen(self, told: Callable[[str], None]) -> Callable[[], None]:
-        """``told`` hears what changed (topics: opened, model, seen, explained, progress, kept, notice), from any thread. What is
-        returned ends it."""
-        with self._guard:
-            self._listeners.append(told)
-
-        def end() -> None:
-            with self._guard:
-                if told in self._listeners:
-                    self._listeners.remove(told)
-
-        return end
-
-    def tell(self, topic: str) -> None:
-        with self._guard:
-            listeners = list(self._listeners)
-        for told in listeners:
-            told(topic)
-
-    def say(self, text: str) -> None:
-        self.notice = text
-        self.tell("notice")
 
     def close(self) -> None:
         self.worker.close()
-        self._one.shutdown(wait=False, cancel_futures=True)
+        super().close()
 
     # -- what is open --------------------------------------------------------------------------------------------------
 
@@ -221,20 +155,12 @@ class Session:
             self._remember()
         self._slid, self._gripped = (index, frozenset(values)), True
         self.bench = bench
-        return self.glance(place)
-
-    def glance(self, place: Place) -> Glance:
-        sight, terms = self._sight(), self.bench.terms
-        few = len(sight.problem.trials) <= AT_ONCE and self.at_pauses
-        # Few trials are one batch of the engine, and take hardly longer than one.
-        residual = sight.whole_residual(terms) if few else sight.trial_residual(terms, place[0])
-        whole = error(residual) if few else None
-        return Glance(terms, sight.series(terms, place), residual, sight.trial_error(residual, place[0]), whole)
+        return self._sight().glance(self.bench.terms, place)
 
     @property
     def at_pauses(self) -> bool:
         """Whether the error over all trials is there soon enough to be looked at while a hand is still on a slider."""
-        return sum(len(t.log) for t in self._sight().measured.trials) < MANY_ROWS
+        return self._sight().at_pauses
 
     def glance_whole(self) -> float:
         """The error over all trials, as the sight of the moment weighs it."""
@@ -272,7 +198,7 @@ class Session:
             self.sight = self._sight().weighed(terms)
             self.seen = self.sight.seen(terms)
             if step:
-                self.bench = _by_hand(self.bench, self.seen.found.error)
+                self.bench = self.bench.by_hand(self.seen.found.error)
                 self._note("compare", terms)
         self._save()
         self.tell("seen")
@@ -408,21 +334,3 @@ class Session:
         self._files.setdefault(found.terms, found.folder / MODEL_FILE)
         self.tell("model")
         self.settle(step=False)
-
-
-def _by_hand(bench: Bench, error: float) -> Bench:
-    """The ladder with what a hand did: one rung for the same set of effects, however long their sliders are moved."""
-    on = " and ".join(placed(e.name) for e in bench.entries if e.on) or "nothing"
-    step = Step(f"by hand: {on}", error, None)
-    if bench.ladder and bench.ladder[-1].name == step.name:
-        return replace(bench, ladder=(*bench.ladder[:-1], step))
-    return bench.stepped(step)
-
-
-def fresh(folder: Path) -> Path:
-    """The folder, or with a number behind it the first that does not exist."""
-    number, found = 1, folder
-    while found.exists():
-        number += 1
-        found = folder.with_name(f"{folder.name}_{number}")
-    return found

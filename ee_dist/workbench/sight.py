@@ -20,6 +20,10 @@ from ee_dist.trials.log import Array
 
 Place = tuple[int, int]
 """A trial and a channel, by number."""
+AT_ONCE = 3
+"""Trials up to which all are simulated at each move of a slider."""
+MANY_ROWS = 50_000
+"""Rows of all trials from which their simulation takes half a second and more: not while a hand is on a slider."""
 AGAINST = ("position", "speed", "command", "load")
 
 
@@ -34,6 +38,18 @@ class Seen:
     @property
     def finite(self) -> bool:
         return bool(np.isfinite(self.residual).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Glance:
+    """What a hand on a slider sees: one channel of one trial, and errors as the sight of the moment weighs them. ``error``:
+    over all trials; None where these are so many that it is asked for when the hand pauses, or rests (``Sight.at_pauses``)."""
+
+    terms: Hypothesis
+    series: Series | None
+    residual: Array
+    trial_error: float
+    error: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +106,18 @@ class Sight:
         if not found:
             return None
         return replace(found[0], trial=trial)
+
+    def glance(self, terms: Hypothesis, place: Place) -> Glance:
+        few = len(self.problem.trials) <= AT_ONCE and self.at_pauses
+        # Few trials are one batch of the engine, and take hardly longer than one.
+        residual = self.whole_residual(terms) if few else self.trial_residual(terms, place[0])
+        whole = error(residual) if few else None
+        return Glance(terms, self.series(terms, place), residual, self.trial_error(residual, place[0]), whole)
+
+    @property
+    def at_pauses(self) -> bool:
+        """Whether the error over all trials is there soon enough to be looked at while a hand is still on a slider."""
+        return sum(len(t.log) for t in self.measured.trials) < MANY_ROWS
 
     def clouds(self, residual: Array, place: Place) -> list[Cloud]:
         """The residual (n,) of a channel in a trial against what its joint did there; none where it belongs to no joint."""

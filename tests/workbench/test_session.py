@@ -102,7 +102,7 @@ def test_what_takes_long_is_not_simulated_while_a_hand_is_on_a_slider(session, m
     session.add(FRICTION)
     place = session.place()
     assert session.at_pauses and session.slide(0, {"torque_nm": 0.05}, place, FRICTION).error is not None
-    monkeypatch.setattr("ee_dist.workbench.session.MANY_ROWS", 100)
+    monkeypatch.setattr("ee_dist.workbench.sight.MANY_ROWS", 100)
     moved = session.slide(0, {"torque_nm": 0.1}, place, FRICTION)
     assert not session.at_pauses and moved.error is None and moved.trial_error > 0
     session.release()

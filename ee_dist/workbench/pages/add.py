@@ -15,7 +15,7 @@ from ee_dist.workbench.bench import Entry
 from ee_dist.workbench.pages.curves import Curves
 from ee_dist.workbench.pages.slider import Slider
 from ee_dist.workbench.pages.view import Latest, View, heading, of, quiet
-from ee_dist.workbench.session import Glance
+from ee_dist.workbench.sight import Glance
 
 STEPS = 400
 """Positions of a slider."""
