@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,66 +86,84 @@ def guessed_text(terms: Hypothesis) -> str:
     return GUESSED.format(late=", and how late commands come," if any(t.effect == LATE for t in terms) else "")
 
 
+class Fitted(NamedTuple):
+    """Parts at their best values u, and the energy that they leave."""
+
+    parts: tuple[Candidate, ...]
+    u: Array
+    energy: float
+
+
 def assumed_drives(
     search: Search, pool: Iterable[Candidate], taken: Iterable[str] = ()
 ) -> tuple[Proposal, Array] | None:
     """Gains and friction of all drives whose position gain was assumed, with the weight that their controllers carry where it is
     much, and values u to fit them from; None where none was, where it is ``taken`` (names of candidates) already, or where the
     pool has not the gain and another of these effects."""
-    robot, pool = search.problem.robot, list(pool)
+    robot, pool, taken = search.problem.robot, list(pool), {*taken}
     joints, names = robot.assumed_joints("kp"), {c.effect.name for c in pool}
     if not joints or TOGETHER[0] not in names:
         return None
     found = [c for name in TOGETHER if name in names for c in _at(robot, _by_factor(robot, name, joints), joints)]
     parts = tuple(as_slow(search.problem, c) for c in found)
-    if len(parts) < 2 or {c.name for c in parts} & set(taken):
+    if len(parts) < 2 or {c.name for c in parts} & taken:
         return None
-    best, u, energy = _fitted(search, joints, parts)
-    carried = tuple(c for c in pool if c.effect.name == CARRIED and c.name not in taken)
-    noise = float(search.problem.floor[search.everything].sum())
-    if carried:
+    noise = _noise(search)
+
+    def offered(effect: str) -> tuple[Candidate, ...]:
+        return tuple(c for c in (_at(robot, effect, joints) if effect in names else ()) if c.name not in taken)
+
+    near = _fitted(search, joints, parts)
+    if carried := tuple(c for c in pool if c.effect.name == CARRIED and c.name not in taken):
         other = _fitted(search, joints, (*parts, *carried))
-        if other[2] - noise < LESS * (energy - noise):
-            best, u, energy = other
-    late = tuple(as_slow(search.problem, c) for c in _at(robot, LATE, joints) if LATE in names and c.name not in taken)
-    alone = _farther(search, best, u, energy)
-    ahead = _at(robot, AHEAD, joints) if AHEAD in names and _sooner(robot, joints) else []
-    if ahead and ahead[0].name not in taken:
-        other = _farther(search, *_fitted(search, joints, (*best, *ahead)))
-        less = 1.0 if _ended(*alone[:2]) and not _ended(*other[:2]) else LESS
-        if other[2] - noise < less * (alone[2] - noise):
-            best, alone = (*best, *ahead), other
-    if late and _lag(robot, joints):
-        other = _farther(search, *_fitted(search, joints, (*best, *late)))
-        alone = other if other[2] - noise < LESS * (alone[2] - noise) else alone
-    model, u = Model(alone[0]), alone[1]
+        near = other if _leaves_less(other, near, noise) else near
+    parts, best = near.parts, _farther(search, near)
+    ahead = offered(AHEAD) if _sooner(robot, joints) else ()
+    late = offered(LATE) if _lag(robot, joints) else ()
+    for more, within_bounds in ((ahead, True), (late, False)):
+        if not more:
+            continue
+        other = _farther(search, _fitted(search, joints, (*parts, *more)))
+        # An end that a guess no longer comes to is a reason of its own.
+        share = 1.0 if within_bounds and _ended(best) and not _ended(other) else LESS
+        if _leaves_less(other, best, noise, share):
+            parts, best = (*parts, *more), other
+    model = Model(best.parts)
     # The gain stays; nobody is told that no torque is missing.
-    keep = at_work(model, u, 1)
-    return Proposal(tuple(model.parts[k] for k in keep), LABEL), np.concatenate([u[model.places[k]] for k in keep])
+    keep = at_work(model, best.u, 1)
+    return Proposal(tuple(model.parts[k] for k in keep), LABEL), np.concatenate([best.u[model.places[k]] for k in keep])
 
 
-def _farther(
-    search: Search, parts: tuple[Candidate, ...], u: Array, energy: float
-) -> tuple[tuple[Candidate, ...], Array, float]:
+def _noise(search: Search) -> float:
+    """Energy that noise alone leaves."""
+    return float(search.problem.floor[search.everything].sum())
+
+
+def _leaves_less(one: Fitted, other: Fitted, noise: float, share: float = LESS) -> bool:
+    """Whether one leaves less than a share of what the other leaves above the noise."""
+    return one.energy - noise < share * (other.energy - noise)
+
+
+def _farther(search: Search, found: Fitted) -> Fitted:
     """The same with more room where a guess ended as far from it as it may go: from what was found one may go as far again, as
     somebody would who wrote that into the description. Kept where it takes much off what is left."""
-    noise = float(search.problem.floor[search.everything].sum())
+    noise = _noise(search)
     for _ in range(AGAIN):
-        if energy <= NEAR**2 * noise or not _ended(parts, u):
+        if found.energy <= NEAR**2 * noise or not _ended(found):
             break
-        terms = Model(parts).hypothesis(u)
+        terms = Model(found.parts).hypothesis(found.u)
         robot = apply(search.problem.robot, terms)
-        wider = tuple(_with_room(robot, c, term.values) for c, term in zip(parts, terms, strict=True))
-        (fit,) = follow_valley(search, [(Model(wider), values_of(wider, terms))], search.everything)
-        if fit.energy - noise >= LESS * (energy - noise):
+        parts = tuple(_with_room(robot, c, term.values) for c, term in zip(found.parts, terms, strict=True))
+        (fit,) = follow_valley(search, [(Model(parts), values_of(parts, terms))], search.everything)
+        if fit.energy - noise >= LESS * (found.energy - noise):
             break
-        parts, u, energy = wider, fit.u, fit.energy
-    return parts, u, energy
+        found = Fitted(parts, fit.u, fit.energy)
+    return found
 
 
-def _ended(parts: Sequence[Candidate], u: Array) -> bool:
+def _ended(found: Fitted) -> bool:
     """Whether one of the parts did so."""
-    return any(_ends(c, u[at]) for c, at in zip(parts, Model(tuple(parts)).places, strict=True))
+    return any(_ends(c, found.u[at]) for c, at in zip(found.parts, Model(found.parts).places, strict=True))
 
 
 def _ends(c: Candidate, u: Array) -> bool:
@@ -168,10 +187,8 @@ def _with_room(robot: Robot, c: Candidate, values: Sequence[tuple[str, float]]) 
     return replace(c, bounds=tuple(found))
 
 
-def _fitted(
-    search: Search, joints: Sequence[str], parts: tuple[Candidate, ...]
-) -> tuple[tuple[Candidate, ...], Array, float]:
-    """The parts with their best values u from the best of a grid of starts, and the energy that they leave."""
+def _fitted(search: Search, joints: Sequence[str], parts: tuple[Candidate, ...]) -> Fitted:
+    """The parts, fitted from the best of a grid of starts."""
     model = Model(parts)
     starts = _starts(search.problem.robot, joints, model)
     energies = [
@@ -181,7 +198,7 @@ def _fitted(
     best = [starts[k] for k in np.argsort(energies, kind="stable")[:STARTS]]
     fits = follow_valley(search, [(model, u) for u in best], search.everything)
     fit = min(fits, key=lambda f: f.energy)
-    return parts, fit.u, fit.energy
+    return Fitted(parts, fit.u, fit.energy)
 
 
 def of_one_guess(model: Model) -> set[int]:
