@@ -3,55 +3,22 @@ knew may be."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from linear_problem import ROBOT as LINEAR
-from linear_problem import Linear
+from assumed_samples import DRIER, STIFFER, guessed, the_problem
 from way_samples import Sample, measure, problem_by, samples
 
-from ee_dist.discrepancy.accounts.of_compare import compare_account
-from ee_dist.discrepancy.accounts.of_explain import _rivals, explain_account
-from ee_dist.discrepancy.assumed import GUESS, LABEL, assumed_drives, guessed_text, of_one_guess, puts_right
-from ee_dist.discrepancy.compare import compare
-from ee_dist.discrepancy.everywhere import instead
-from ee_dist.discrepancy.evidence import judge
-from ee_dist.discrepancy.examine import Current, Effort, examine
-from ee_dist.discrepancy.explain import explain
+from ee_dist.discrepancy.assumed import LABEL, assumed_drives, puts_right
+from ee_dist.discrepancy.examine import Current, examine
 from ee_dist.discrepancy.lags import with_lags
-from ee_dist.discrepancy.problem import Problem, error
-from ee_dist.discrepancy.pruning import units_of
-from ee_dist.discrepancy.search.candidates import Proposal, candidate, candidates
+from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.candidates import candidate, candidates
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import as_slow
 from ee_dist.discrepancy.search.search import Search
-from ee_dist.effects.catalogue import Hypothesis, apply, find, term
-from ee_dist.robots.model import Robot
-from ee_dist.trials.log import Array
-
-STIFFER, DRIER = 6.0, (0.3, 0.2)
-
-
-def guessed(robot: Robot, fields: tuple[str, ...] = ("kp", "kd", "rotor_inertia")) -> Robot:
-    """Described with controllers several times as stiff, because nobody knew them."""
-    drives = tuple(replace(d, kp=STIFFER * d.kp, kd=3.0 * d.kd) for d in robot.drives)
-    return replace(robot, drives=drives, assumed=tuple((d.joint, f) for d in drives for f in fields))
-
-
-@cache
-def the_problem(limit: float = 0.0) -> Problem:
-    """``limit``: share of the stated torque limit that the robot has not."""
-    sample: Sample = samples()["arm"]
-    hidden = (term("torque_limit", "all_joints", loss=limit),) if limit else ()
-    hidden += tuple(
-        term("coulomb_friction", j, torque_nm=c) for j, c in zip(sample.robot.motor_names, DRIER, strict=True)
-    )
-    return problem_by("open_loop", measure(sample, hidden), guessed(sample.robot))
-
+from ee_dist.effects.catalogue import apply, find, term
 
 TWELVE = 12.0
 """Times as strong as they are that all drives were taken to be."""
@@ -210,18 +177,6 @@ def test_a_controller_that_knows_how_fast_its_goal_goes_is_no_stiffer_one(knows:
     assert better < 0.2 * as_it_is
 
 
-def test_no_motor_is_called_weak_beside_a_guess() -> None:
-    """A torque is too small only beside one that somebody knew: with guessed gains it is these that are wrong."""
-    robot = samples()["arm"].robot
-    joint = robot.motor_names[0]
-    assert f"motor_weak@{joint}" in {c.name for c in candidates(robot)}
-    unknown = guessed(robot)
-    assert "motor_weak" not in {c.effect.name for c in candidates(unknown)}
-    assert {f"position_gain@{joint}", f"speed_gain@{joint}"} <= {c.name for c in candidates(unknown)}
-    assert f"motor_weak@{joint}" in {c.name for c in candidates(unknown, only=["motor_weak"])}, "who asks is answered"
-    assert [c.name for c in candidates(unknown, only=[f"motor_weak@{joint}"])] == [f"motor_weak@{joint}"]
-
-
 def test_a_limit_that_was_stated_for_want_of_a_better_one_is_found_with_them() -> None:
     problem = the_problem(limit=0.75)
     proposal, u = assumed_drives(Search(problem), candidates(problem.robot)) or pytest.fail("nothing was proposed")
@@ -266,220 +221,11 @@ def test_some_joints_of_several_are_named_one_by_one() -> None:
     assert {c.target for c in proposal.parts} == {"elbow"}
 
 
-def test_what_puts_them_right_stays_while_everything_is_fitted_and_nothing_else_does() -> None:
-    some = replace(guessed(samples()["arm"].robot), assumed=(("elbow", "kp"),))
-    of = {c: puts_right(some, candidate(some, *c)) for c in (
-        ("speed_gain", "elbow"), ("torque_limit", "elbow"), ("speed_gain", "shoulder"), ("speed_gain", "all_joints"),
-        ("zero_offset", "elbow"),
-    )}  # fmt: skip
-    assert [c for c, stays in of.items() if stays] == [("speed_gain", "elbow"), ("torque_limit", "elbow")]
-    parts = tuple(
-        candidate(some, *c) for c in (("speed_gain", "elbow"), ("zero_offset", "elbow"), ("deadband", "elbow"))
-    )
-    current = Current(parts, np.array([0.1, 0.1, 0.1]))
-    assert list(instead(some, current, 0)) == [[0], [0, 2]]
-    assert list(instead(samples()["arm"].robot, current, 0)) == [[], [0, 2]], "nothing was assumed"
-
-
 def test_a_gain_is_looked_for_farther_off_where_it_was_assumed() -> None:
     robot = samples()["arm"].robot
     known, open_ = (candidate(r, "position_gain", "elbow") for r in (robot, guessed(robot)))
     assert known.bounds == ((0.2, 5.0),)
     assert open_.bounds[0][0] < 0.05
-
-
-def rotors(twice: bool = True, marked: bool = True) -> Problem:
-    """A small arm with motors of two sizes, described with rotors half as heavy as they are, because somebody guessed at them."""
-    sample = samples()["arm"]
-    true = replace(sample.robot, drives=tuple(
-        replace(d, rotor_inertia=r) for d, r in zip(sample.robot.drives, (0.06, 0.02), strict=True)
-    ))  # fmt: skip
-    drives = tuple(replace(d, rotor_inertia=d.rotor_inertia / (2.0 if twice else 1.0)) for d in true.drives)
-    assumed = tuple((d.joint, "rotor_inertia") for d in drives) if marked else ()
-    measured = measure(replace(sample, robot=true), ())
-    return problem_by("open_loop", measured, replace(true, drives=drives, assumed=assumed))
-
-
-def test_guessed_rotors_are_off_by_one_number_before_any_sound_motor_is_blamed() -> None:
-    problem = rotors()
-    pool = candidates(problem.robot, only=["motor_weak", "rotor_inertia", "rotor_factor", "command_delay", "part_mass"])
-    assert [c.name for c in pool if c.guess] == ["rotor_factor@all_joints", "rotor_inertia@all_joints"]
-    found = explain(problem, pool)
-    assert found.best is not None and found.best.name == "rotor_factor@all_joints"
-    assert dict(found.best.terms[0].values)["factor"] == pytest.approx(2.0, rel=0.1)
-    assert "rotor_inertia@each of 2 joints" in found.best.tied_with
-    assert GUESS in explain_account(problem, found, None).lines
-    said = compare_account(problem, compare(problem, problem.residuals([()])[0]), []).lines
-    assert "The description only assumed rotor_inertia of 2 drives: explain and improve look there first." in said
-
-
-def test_what_does_better_and_does_not_go_first_is_told() -> None:
-    """A dozen numbers at sound parts that leave less than a few guesses, which go before them."""
-    problem = rotors()
-    found = explain(problem, candidates(problem.robot, only=["rotor_inertia", "rotor_factor", "command_delay"]))
-    best = found.best
-    assert best is not None
-    account = explain_account(problem, found, None)
-    assert "does better" not in account.sure
-    assert "Of 9 explanations 2 others do as well" in account.sure
-    other = next(c for c in found.candidates if c.name == "rotor_inertia@shoulder")
-    other.held = 0.5 * best.held
-    said = explain_account(problem, found, None).sure
-    assert "Of 9 explanations 1 does better, where nothing was guessed (" in said, (
-        "it has one number, as the guess does"
-    )
-    assert "), and 2 others do as well" in said
-    assert "1 does better, by more numbers where nothing was guessed (a)" in _rivals(9, (), "", ["a"], True)
-
-
-def test_a_factor_on_rotors_is_proposed_only_where_unequal_ones_were_guessed() -> None:
-    names = {c.effect.name for c in candidates(rotors(marked=False).robot)}
-    assert "rotor_inertia" in names and "rotor_factor" not in names
-    even = replace(rotors().robot, drives=tuple(replace(d, rotor_inertia=0.01) for d in rotors().robot.drives))
-    guesses = [c.name for c in candidates(even) if c.guess]
-    assert guesses == ["rotor_inertia@all_joints"], "as much more at each is the same"
-    one = replace(rotors().robot, assumed=(("elbow", "rotor_inertia"), ("elbow", "kp")))
-    assert [c.name for c in candidates(one) if c.guess] == ["position_gain@elbow", "rotor_inertia@elbow"]
-
-
-def test_guessed_rotors_beside_guessed_gains_are_off_by_a_factor_too() -> None:
-    problem = rotors()
-    robot = replace(problem.robot, assumed=(*problem.robot.assumed, *((j, "kp") for j in problem.robot.motor_names)))
-    problem.robot = robot
-    proposal, u = assumed_drives(Search(problem), candidates(robot)) or pytest.fail("nothing was proposed")
-    found = {t.effect: dict(t.values) for t in Model(proposal.parts).hypothesis(u)}
-    assert "rotor_inertia" not in found and found["rotor_factor"]["factor"] == pytest.approx(2.0, rel=0.1)
-    assert puts_right(robot, candidate(robot, "rotor_factor", "all_joints"))
-
-
-JOINTS = LINEAR.motor_names
-
-
-def linear(hidden: Hypothesis, twins: bool = False) -> Linear:
-    """Its first joint's rotor was assumed; of ``twins`` a weak motor there leaves the same mark."""
-
-    class Guessed(Linear):
-        def shift(self, hypothesis: Hypothesis) -> Array:
-            same = term("motor_weak", JOINTS[0], loss=0.4)
-            return super().shift(tuple(same if twins and t.target == JOINTS[0] else t for t in hypothesis))
-
-    problem = Guessed(hidden)
-    problem.robot = replace(LINEAR, assumed=((JOINTS[0], "rotor_inertia"),))
-    return problem
-
-
-def test_a_guessed_controller_is_put_right_as_a_whole_or_not_at_all() -> None:
-    """Gain, damping and rotor, of which a log may tell ratios alone; a limit that is never reached goes as anything else."""
-    robot = replace(LINEAR, assumed=tuple((j, f) for j in LINEAR.motor_names for f in ("kp", "kd", "torque_limit")))
-    names = ("position_gain", "speed_gain", "torque_limit", "coulomb_friction")
-    model = Model(tuple(candidate(robot, n, "all_joints") for n in names))
-    assert of_one_guess(model) == {0, 1}
-    assert units_of(model, 0, len(names)) == [[2], [3]]
-    alone = Model((model.parts[0], *model.parts[2:]))
-    assert of_one_guess(alone) == set() and units_of(alone, 0, 3) == [[0], [1], [2]]
-    known = Model(tuple(candidate(LINEAR, n, "all_joints") for n in names))
-    assert of_one_guess(known) == set()
-
-
-def test_of_what_is_tied_a_guess_goes_before_a_sound_part() -> None:
-    problem = linear((term("motor_weak", JOINTS[0], loss=0.4),), twins=True)
-    pool = [candidate(problem.robot, "motor_weak", JOINTS[0]), candidate(problem.robot, "rotor_inertia", JOINTS[0])]
-    assert [c.guess for c in pool] == [False, True]
-    found = explain(problem, pool)
-    assert [c.name for c in found.tied] == [c.name for c in reversed(pool)]
-    unmarked = linear((term("motor_weak", JOINTS[0], loss=0.4),), twins=True)
-    unmarked.robot = LINEAR
-    found = explain(unmarked, [candidate(LINEAR, c.effect, c.target) for c in pool])
-    assert [c.name for c in found.tied] == [c.name for c in pool]
-
-
-def test_one_set_of_values_for_drives_that_were_guessed_at_is_a_guess_and_one_for_each_joint_is_not() -> None:
-    robot = guessed(samples()["arm"].robot)
-
-    def proposal(effects: Sequence[str], *targets: str) -> Proposal:
-        return Proposal(tuple(candidate(robot, e, t) for e in effects for t in targets))
-
-    assert proposal(["position_gain", "coulomb_friction"], "all_joints").guess
-    assert not proposal(["coulomb_friction", "position_gain"], "all_joints").guess
-    assert not proposal(["position_gain"], "shoulder", "elbow").guess
-    assert not proposal(["position_gain"], "all_joints", "elbow").guess
-
-
-@pytest.mark.parametrize(("size", "first"), [(6, "guess"), (7, "each"), (4, "guess")])
-def test_a_guess_goes_before_as_many_numbers_that_it_is_tied_with(
-    monkeypatch: pytest.MonkeyPatch, size: int, first: str
-) -> None:
-    """Though not with what is best of all, which has more numbers and is tied with those."""
-
-    def judged(name: str, size: int, guess: bool, left: float) -> SimpleNamespace:
-        proposal = SimpleNamespace(parts=(), size=size, guess=guess)
-        return SimpleNamespace(
-            name=name, proposal=proposal, vague=False, earned=True, stands=True, held=np.array([left])
-        )
-
-    found = [judged("most", 12, False, 1.0), judged("each", 6, False, 1.2), judged("guess", size, True, 1.3)]
-    monkeypatch.setattr(judge, "tied", lambda one, other: {one.name, other.name} != {"most", "guess"})
-    order = judge.ranked(found)  # type: ignore[arg-type]
-    assert order[0].name == first
-    assert set(order[0].tied_with) == {"most", "each", "guess"} - {first}
-
-
-@pytest.mark.parametrize(
-    ("gain", "size", "first"), [(0.5, 6, "guess"), (0.3, 6, "each"), (0.5, 12, "each"), (0.5, 11, "guess")]
-)
-def test_few_guesses_go_before_many_numbers_at_sound_parts(
-    monkeypatch: pytest.MonkeyPatch, gain: float, size: int, first: str
-) -> None:
-    """A deadband at each of twelve joints leaves less than gains that were guessed, as long as these are as they were guessed."""
-
-    def judged(name: str, size: int, guess: bool, gain: float) -> SimpleNamespace:
-        proposal = SimpleNamespace(parts=(), size=size, guess=guess)
-        return SimpleNamespace(
-            name=name, proposal=proposal, vague=False, earned=True, stands=True, held=np.array([1.0 - gain]), gain=gain
-        )
-
-    monkeypatch.setattr(judge, "tied", lambda *_: False)
-    order = judge.ranked([judged("each", 12, False, 0.8), judged("guess", size, True, gain)])  # type: ignore[arg-type,list-item]
-    assert [order[0].name, [j.rank for j in order]] == [first, [1, 2]]
-    assert order[0].tied_with == [], "what it goes before does not do as well"
-    # One number that all share at sound parts takes off more than the guess does: each by itself is the same, and more.
-    shared = judged("shared", 1, False, gain + 0.1)
-    many = [judged("each", 12, False, 0.8), judged("guess", size, True, gain), shared]
-    assert judge.ranked(many)[0].name == "each"  # type: ignore[arg-type]
-    less = [*many[:2], judged("shared", 1, False, gain - 0.1)]
-    assert judge.ranked(less)[0].name == first  # type: ignore[arg-type]
-
-
-def test_a_guess_is_judged_beside_whatever_promises_more() -> None:
-    hidden = (term("motor_weak", JOINTS[1], loss=0.4), term("rotor_inertia", JOINTS[0], added_kg_m2=0.1))
-    problem = linear(hidden)
-    pool = candidates(problem.robot, only=["motor_weak", "rotor_inertia"])
-    effort = Effort(first=1, second=1, starts=1, final=1)
-    judged = {c.name for c in explain(problem, pool, effort=effort).candidates}
-    assert judged == {f"motor_weak@{JOINTS[1]}", f"rotor_inertia@{JOINTS[0]}"}
-
-
-def test_a_robot_is_the_same_whatever_was_assumed_of_it() -> None:
-    robot = samples()["arm"].robot
-    marked = replace(robot, assumed=(("elbow", "kp"),))
-    assert marked == robot
-    assert marked.digest == robot.digest
-    assert apply(marked, (term("coulomb_friction", "elbow", torque_nm=0.1),)).assumed == marked.assumed
-
-
-def test_it_is_told_that_the_description_only_guessed() -> None:
-    problem = the_problem()
-    found = compare(problem, problem.residuals([()])[0])
-    said = compare_account(problem, found, []).lines
-    assert (
-        "The description only assumed kp, kd, rotor_inertia of 2 drives: explain and improve look there first." in said
-    )
-    pool = candidates(problem.robot, only=["position_gain", "speed_gain", "coulomb_friction", "part_mass"])
-    lines = explain_account(problem, explain(problem, pool), None).lines
-    assert guessed_text(()) in lines
-    assert "late" in guessed_text((term("command_delay", "all_joints", delay_s=0.01),)) and "late" not in guessed_text(
-        ()
-    )
 
 
 def test_friction_that_slows_as_back_emf_does_is_worth_trying_where_the_stated_speed_is_nobodys() -> None:

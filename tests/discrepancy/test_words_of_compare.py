@@ -1,0 +1,56 @@
+"""What compare says: agreement only where nothing stands out."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from ee_dist.discrepancy.accounts.account import Account
+from ee_dist.discrepancy.accounts.of_compare import compare_account
+from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.robots.servo_pendulum import servo_pendulum
+
+
+def compared(error: float, left: list[Leftover]) -> Account:
+    found = SimpleNamespace(
+        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={},
+        channels=[SimpleNamespace(name="a_b", normalised=error), SimpleNamespace(name="command_b", normalised=0.0)],
+
+        unsure=[],
+    )  # fmt: skip
+    problem = SimpleNamespace(
+        robot=servo_pendulum(),
+        told=str,
+        natural=lambda e: e**2,
+        natural_name="error",
+        natural_unit="mm",
+        notes=[],
+        doubts="",
+        channels=("a_b", "command_b"),
+        curves=((0, "a_b"), (0, "command_b")),
+        trials=("sway",),
+        numbers=(1,),
+    )
+    return compare_account(problem, found, left)  # type: ignore[arg-type]
+
+
+def test_an_error_below_its_floor_gets_a_word() -> None:
+    assert not [line for line in compared(1.05, []).lines if "below" in line or "within chance" in line]
+    assert "The error is at the floor, within chance." in compared(0.98, []).lines
+    assert any(line.startswith("The error is below the floor: the noise was") for line in compared(0.9, []).lines)
+
+
+def test_a_small_error_is_no_agreement_where_a_channel_stands_out() -> None:
+    calm, loud = compared(1.02, []), compared(1.02, [Leftover("sway", "a_b", 7.0, 3.0, True)])
+    assert calm.good and calm.headline.startswith("The model agrees") and calm.advice.startswith("Next: nothing")
+    assert not loud.good and "nearly right" in loud.headline and "most of all at a b" in loud.headline
+    assert "1 of 1 curve (1 channel in 1 trial) differs by more than noise" in loud.sure and not loud.advice
+
+
+def test_what_is_next_is_said_once_and_among_the_words() -> None:
+    calm, loud = compared(1.02, []), compared(1.02, [Leftover("sway", "a_b", 7.0, 3.0, True)])
+    assert loud.followed("type this").words.count("Next: type this") == 1
+    assert [w for w in calm.followed("type this").words if w.startswith("Next")] == [calm.advice]
+
+
+def test_times_the_floor_are_those_of_the_errors_that_are_told() -> None:
+    assert "9 times what noise alone would leave" in compared(3.0, []).headline, "the way tells squares"
