@@ -49,7 +49,7 @@ from ee_dist.tasks.summary import (
 from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.unfinished import remembered
 from ee_dist.tasks.wiring import build_system, engine_maker, evaluator_name, evaluator_of, hardware_of
-from ee_dist.viewing.story import told
+from ee_dist.viewing.story import share_text, told
 
 GAITS = ("walking", "any")
 """What counts as function restored: a distance that was walked, or, as in the paper, any."""
@@ -116,7 +116,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     }
     console.print(f"Scenario {scenario.label}: {scenario.title}. Seed {config.seed}, budget {config.budget.name}, "
                   f"{config.engine.name}.", highlight=False)  # fmt: skip
-    if body and config.hardware.limits().moves:
+    quick, limited = config.budget.name == "quick", body is not None and config.hardware.limits().moves
+    if limited:
         console.print(LIMITED, highlight=False)
     path = out / "recovery.mcap"
     digest = ResultDigest()
@@ -159,14 +160,17 @@ def run(config: Config, options: Options, out: Path) -> None:
             noise,
             doubt_seed,
         )
+        refused = gaits.compensating if options.gaits == "walking" else ()
+        final = score(result.intact, result.trials, result.hypotheses[-1], hidden, refused)
+        verdict = verdict_of(gaits.cheats, final, truth is not None)
         known = {} if truth is None else {"truth": json.dumps([t.as_dict() for t in truth])}
-        told_too = {"caution": QUICK} if config.budget.name == "quick" else {}
+        told_too = {"verdict": verdict}
+        if cautions := [LIMITED] * limited + [QUICK] * quick:
+            told_too["caution"] = " ".join(cautions)
         if scenario.number > 0:
             told_too["again"] = with_seeds(out, scenario.number)
         writer.finish({"result_digest": digest.hex, "doubt": json.dumps(last.as_dict()), **known, **told_too})
     hardware.close()
-    refused = gaits.compensating if options.gaits == "walking" else ()
-    final = score(result.intact, result.trials, result.hypotheses[-1], hidden, refused)
     summary = write_summary(out, "recover", config, options, watch, digest.hex, {
         "scenario": scenario.name or scenario.number,
         "title": scenario.title,
@@ -183,6 +187,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "recovered_fraction": final.recovered_fraction,
         "counted_fraction": final.counted_fraction,
         "restored": final.restored,
+        "verdict": verdict,
         "gaits": {"counted": options.gaits, "no_gait": [list(c) for c in gaits.cheats]},
         "diagnosis": None if truth is None else _diagnosis(final),
         "doubt": last.as_dict(),
@@ -192,8 +197,8 @@ def run(config: Config, options: Options, out: Path) -> None:
     })  # fmt: skip
     recording = drawn(path)
     wall, _ = watch.read()
-    _print(console, subject, result, truth, final, gaits.cheats, last)
-    if config.budget.name == "quick":
+    _print(console, subject, result, truth, verdict, last)
+    if quick:
         console.print(QUICK, highlight=False)
     saved = 1 - counts.simulated / max(counts.asked, 1)
     console.print(
@@ -239,8 +244,7 @@ def _print(
     subject: Subject,
     result: Recovery,
     truth: Hypothesis | None,
-    final: Score,
-    cheats: Sequence[tuple[str, ...]],
+    verdict: str,
     last: Doubt,
 ) -> None:
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
@@ -251,9 +255,9 @@ def _print(
     table.add_column(f"what the {subject.noun} believed", overflow="fold")
 
     def share(value: float) -> str:
-        return f"{value / result.intact:.0%}" if result.intact > 0 else "-"
+        return share_text(value, result.intact) or "-"
 
-    table.add_row("intact", f"{result.intact:.2f}", "100%", "", "nothing is wrong")
+    table.add_row("intact", f"{result.intact:.2f}", "100 %", "", "nothing is wrong")
     table.add_row("after the change", f"{result.after:.2f}", share(result.after), "", "")
     for k, reached in enumerate(result.trials):
         table.add_row(
@@ -262,14 +266,16 @@ def _print(
     table.add_section()
     table.add_row("truth", "", "", "", "not known" if truth is None else lines(truth))
     console.print(table)
-    verdict = "restored" if final.restored else "not restored"
-    console.print(
-        f"Function {verdict}: best trial {final.recovered_fraction:.0%} of intact."
-        + _unwalked(cheats, final)
-        + ("" if truth is None else f" Diagnosis: {named(final.found, final.true, final.invented)}."),
-        highlight=False,
-    )
+    console.print(verdict, highlight=False)
     console.print(last.words, highlight=False)
+
+
+def verdict_of(cheats: Sequence[tuple[str, ...]], final: Score, known: bool) -> str:
+    """What came out, in the words of the terminal, the recording, its scene and the summary; ``known``: whether the truth is."""
+    restored = "restored" if final.restored else "not restored"
+    diagnosis = f" Diagnosis: {named(final.found, final.true, final.invented)}." if known else ""
+    best = _share(final.recovered_fraction)
+    return f"Function {restored}: best trial {best} of intact.{_unwalked(cheats, final)}{diagnosis}"
 
 
 def named(found: int, true: int, invented: int) -> str:
@@ -287,8 +293,12 @@ def _unwalked(cheats: Sequence[tuple[str, ...]], final: Score) -> str:
     counted = ""
     if final.counted_fraction != final.recovered_fraction:
         best = final.counted_fraction
-        counted = f" Best that walks: {best:.0%}." if math.isfinite(best) else " None walks."
+        counted = f" Best that walks: {_share(best)}." if math.isfinite(best) else " None walks."
     return f" No gait: {', '.join(told)}.{counted}"
+
+
+def _share(fraction: float) -> str:
+    return f"{100 * fraction:.0f} %" if math.isfinite(fraction) else "no share"
 
 
 def lines(hypothesis: Hypothesis) -> str:

@@ -24,7 +24,7 @@ from ee_dist.recovery.kinds import subject_of
 from ee_dist.recovery.subject import Subject
 from ee_dist.robots.system import System
 
-TOLD = ("truth", "doubt", "caution", "again")
+TOLD = ("truth", "doubt", "verdict", "caution", "again")
 """What recordings say of themselves in sentences, or what sentences are made of."""
 INTACT = "intact"
 """Name of the trial before the change."""
@@ -112,8 +112,8 @@ def title_of(run: RunRecord) -> str:
 
 
 def finding(run: RunRecord) -> list[str]:
-    """What came out, before anything else: the last belief, how well it does with it, how sure, what its terminal warned of, what
-    next."""
+    """What came out, before anything else: the last belief, how well it does with it, how sure, what its terminal concluded and
+    warned of, what next."""
     trials, believed, subject = hardware_trials(run), beliefs(run), subject_of(run.robot)
     if not believed or len(trials) < 3:
         return []
@@ -134,6 +134,9 @@ def finding(run: RunRecord) -> list[str]:
             f"; it foresaw {subject.measure(subject.value(foreseen.log))} for the last trial, which went {went}"
         )
     lines[-1] += "."
+    if verdict := run.metadata.get("verdict"):
+        # The best trial may have been no gait: without this, its share of intact would read like a success.
+        lines.append(verdict)
     if doubt := doubt_of(run):
         lines.append(f"**{doubt.words}**" if doubt.said else doubt.words)
     if caution := run.metadata.get("caution"):

@@ -22,7 +22,8 @@ from ee_dist.engines.pybullet.engine import PyBulletEngine
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.records import DIAGNOSIS, HARDWARE, PREDICTION, REPAIR
 from ee_dist.recovery.doubt import doubt_from
-from ee_dist.tasks.recover import named
+from ee_dist.tasks.outcome import Score
+from ee_dist.tasks.recover import named, verdict_of
 from ee_dist.viewing.story import told
 
 KEYS = {
@@ -84,6 +85,16 @@ def test_what_a_diagnosis_names_is_a_sentence(counts, said):
     assert named(*counts) == said
 
 
+def test_a_distance_that_was_not_walked_is_no_success_of_the_verdict():
+    cheats = ((), (), ("on its back",))
+    said = verdict_of(cheats, Score(1.2, float("nan"), False, 1, 1, 0), known=True)
+    assert said.startswith(
+        "Function not restored: best trial 120 % of intact. No gait: trial 1 on its back. None walks."
+    )
+    assert said.endswith("Diagnosis: 1 of 1 true effect at its place, and nothing else.")
+    assert "Diagnosis" not in verdict_of(cheats, Score(1.2, 0.5, False, 0, 0, 0), known=False), "of what nobody knows"
+
+
 def test_plain_mcap_lists_every_trial_and_hypothesis(finished):
     folder, _, _ = finished
     counts: dict[str, int] = {}
@@ -132,6 +143,8 @@ def test_what_the_loop_believed_is_the_same_wherever_it_is_shown(finished):
     assert [float(error) for error, _ in rows] == pytest.approx(summary["diagnosis_error"], rel=1e-2)
 
     assert f"**Believed in the end: {told(believed[-1])}.**" in scene
+    assert summary["verdict"] in scene and summary["verdict"] in " ".join(out.split()), "and what came out"
+    assert summary["verdict"].startswith("Function restored" if summary["restored"] else "Function not restored")
     assert doubt_from(summary["doubt"]).words in scene, "and what it does not say"
     assert ("say little" in out) is ("say little" in scene) is (summary["budget"] == "quick")
     (again,) = re.findall(r"how much of it is luck: `(.+)`", scene)
