@@ -9,8 +9,8 @@ import pytest
 from linear_problem import Linear
 from way_samples import measure, problem_by, samples
 
-from ee_dist.discrepancy.accounts.account import curves_of
-from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.discrepancy.accounts.account import curves_of, left_text
+from ee_dist.discrepancy.evidence.left import Leftover, leftovers
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import EVENT, Layout
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
@@ -78,6 +78,12 @@ def test_repeats_of_a_motion_are_told_apart() -> None:
     left = leftovers(p, residual)
     assert curves_of(left) == 2 and {g.index for g in left} == {4, 5}
     assert {str(g).split(" (")[0] for g in left} == {"channel 3 during 5. sway", "channel 3 during 6. sway"}
+
+
+def test_a_trial_keeps_its_name_where_it_is_told() -> None:
+    """It is what held_out= takes."""
+    left = Leftover("slow_sines", "joint_1_position", 9.0, 1.0, True)
+    assert "joint 1 position during slow_sines (slow, 9 standard deviations" in left_text([left], after=False)
 
 
 @pytest.mark.parametrize("real", [True, False])

@@ -179,7 +179,9 @@ def left_text(left: Sequence[Leftover], after: bool, on: str = "") -> str:
     """``on``: which trials, where they are others than those of the problem."""
     head = "Even with it, more than noise is left in" if after else "It sits in"
     head = f"On {on} more than noise is left in" if on else head
-    return f"{head} {counted(curves_of(left), 'curve')}; worst: {'; '.join(plain(str(g)) for g in left[:3])}."
+    # A trial keeps its name, by which it is held out.
+    worst = [str(replace(g, channel=plain(g.channel))) for g in left[:3]]
+    return f"{head} {counted(curves_of(left), 'curve')}; worst: {'; '.join(worst)}."
 
 
 def left_beside_noise(left: Sequence[Leftover], terms: Hypothesis, robot: Robot) -> Sequence[Leftover]:
