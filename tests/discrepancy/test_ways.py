@@ -86,7 +86,9 @@ def test_a_ripple_over_position_is_told_with_its_wavelength() -> None:
         assert ripple.wavelength == pytest.approx(0.02, rel=0.02)
         assert ripple.share > 0.9 and ripple.repeats > 0.9 and ripple.passes >= 3
     lines = describe(found, "N", "m")
-    assert "a ripple of 0.019" in lines[-1]
+    assert "a ripple of 0.0199 m" in lines[-1] or "a ripple of 0.02 m" in lines[-1]
+    assert all(re.search(r" % of the time, .* % of the residual's energy, [\d.e-]+ N \(mean [+-][\d.e-]+ N\)", line)
+               for line in lines[1 : 1 + len(found.regimes)]), "each number with its unit"  # fmt: skip
     # What does not repeat with position is not called a ripple, and what changes with direction is told by regime.
     other = remains("carriage", np.sign(v) + noise, x, v, a)
     means = {r.name: r.mean for r in other.regimes}
@@ -97,6 +99,9 @@ def test_a_ripple_over_position_is_told_with_its_wavelength() -> None:
 def test_what_a_way_alone_can_say_is_said_in_words() -> None:
     balance, free = problem("stage", "force_balance"), problem("pendulum", "free_run")
     assert any("near a reversal" in line for line in balance.remarks(()))
+    # What people read is a share: the definition is of that number, and says what programs get.
+    definition = balance.error_definition
+    assert "as a share of that of the measured force" in definition and f"{balance.told(1.0)} of that" in definition
     assert isinstance(balance, ForceBalance) and isinstance(free, FreeRun)
     regimes = {r.name: r for r in balance.remains(()).regimes}
     assert regimes["cruising up"].mean > 15 and regimes["cruising down"].mean < -15, "20 N of friction"

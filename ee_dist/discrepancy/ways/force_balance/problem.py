@@ -99,8 +99,8 @@ class ForceBalance(Problem):
         self._lay_out(forces)
         p, smooth = self.processing, self.processing.filter_for(pace_s)
         self.error_definition = (
-            "root mean square of the force left over, in standard deviations of the measured force's noise "
-            f"({self.noise_share:.2%} of its root mean square); positions and forces through a {smooth}, central "
+            "root mean square of the force left over, as a share of that of the measured force (for programs: in standard "
+            f"deviations of its noise, {100 * self.noise_share:.3g} % of that); positions and forces through a {smooth}, central "
             f"differences, decimated by {p.keep_every}"
             + (f", all trials at the {1 / pace_s:.4g} Hz of the one that was read the most seldom" if thinned else "")
         )

@@ -134,12 +134,12 @@ def describe(found: Remains, unit: str, length: str) -> Sequence[str]:
     # As many digits for both: rounded coarser, a maximum may look less than its root mean square.
     lines = [f"{found.motor}: {found.rms:.3g} {unit} root mean square, {found.largest:.3g} {unit} at most{several}"]
     lines += [
-        f"  {r.name}: {r.time_share:.0%} of the time, {r.energy_share:.0%} of the residual's energy, {r.rms:.2f} {unit} "
-        f"(mean {r.mean:+.2f})"
+        f"  {r.name}: {_percent(r.time_share)} of the time, {_percent(r.energy_share)} of the residual's energy, "
+        f"{r.rms:.3g} {unit} (mean {r.mean:+.3g} {unit})"
         for r in found.regimes
     ]
     lines += [
-        f"  going {r.direction}: {_again(r)}; a ripple of {r.wavelength:.4g} {length} takes {r.share:.0%}"
+        f"  going {r.direction}: {_again(r)}; a ripple of {r.wavelength:.3g} {length} takes {_percent(r.share)}"
         for r in found.ripples
     ]
     return lines
@@ -148,4 +148,8 @@ def describe(found: Remains, unit: str, length: str) -> Sequence[str]:
 def _again(r: Ripple) -> str:
     if math.isnan(r.repeats):
         return "no two passes are over the same positions"
-    return f"{r.repeats:.0%} of it repeats on each of {r.passes} passes"
+    return f"{_percent(r.repeats)} of it repeats on each of {r.passes} passes"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
