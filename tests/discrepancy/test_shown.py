@@ -150,6 +150,8 @@ def test_regimes_and_root_mean_squares_say_what_they_are_of() -> None:
     assert of_all_regimes(found.regimes) == pytest.approx(np.sqrt(5.6 / 0.8))
     assert "joints' readings, 2.65 in all" in regimes_section(problem, found).caption
     assert "rmse: root mean square of means over 0.02 s" in channels_section(problem, found).caption
+    rmse = channels_section(problem, found).table.rows[0][1]
+    assert rmse.startswith(f"{found.channels[0].rmse:.3g}"), "as many digits as in the terminal"
     for section in (regimes_section, trials_section, channels_section):
         assert [name for name, _ in section(problem, found).legend] == ["model"]
     assert "one scale for all channels" in heat_section(problem, problem.data).caption

@@ -279,9 +279,9 @@ def channels_section(problem: Problem, found: Comparison, after: Comparison | No
     rows, first = [], [c for c in found.channels if not later or c.name in later]
     for c in first:
         unit = "" if c.unit == "1" else f" {c.unit}"
-        row = [plain(c.name), f"{c.rmse:.4g}{unit}", problem.told(c.normalised)]
+        row = [plain(c.name), f"{c.rmse:.3g}{unit}", problem.told(c.normalised)]
         if after is not None:
-            row += [f"{later[c.name].rmse:.4g}{unit}", problem.told(later[c.name].normalised)]
+            row += [f"{later[c.name].rmse:.3g}{unit}", problem.told(later[c.name].normalised)]
         rows.append([*row, c.worst_trial, f"{c.worst_from_s:.1f} to {c.worst_to_s:.1f} s"])
     columns = ["channel", "rmse", "error"] + ([] if after is None else [f"rmse, {IMPROVED}", f"error, {IMPROVED}"])
     table = Table([*columns, "worst trial", "when"], rows, tuple(range(1, len(columns))))
