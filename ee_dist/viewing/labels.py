@@ -10,6 +10,9 @@ from typing import Any
 LOSS = -25.0
 """Percent to which a chart of gains goes on at the left: a candidate that fits by heart may lose any number of times as much."""
 
+STANDOFF = 8
+"""Pixels from names to their axis. Blanks behind a name are behind the last of its lines only, which then stands off farther."""
+
 
 def wrapped(name: str, width: int = 30) -> str:
     """A label of an axis in lines of some characters."""

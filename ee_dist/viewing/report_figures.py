@@ -12,7 +12,7 @@ from plotly.subplots import make_subplots
 
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
-from ee_dist.viewing.labels import cut_marks, left_edge, wrapped
+from ee_dist.viewing.labels import STANDOFF, cut_marks, left_edge, wrapped
 
 MEASURED, PREDICTED, IMPROVED = "#4a90d9", "#e08a00", "#2e9e62"
 """What was measured, what the model says, and the improved one: the same in every figure."""
@@ -181,7 +181,7 @@ def ranking(
     figure.update_xaxes(title_text="gain above the noise, held out (%)", range=[left_edge(intervals), 104])
     for mark in cut_marks(names, gains, intervals):
         figure.add_annotation(mark)
-    figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
+    figure.update_yaxes(autorange="reversed", automargin=True, ticklabelstandoff=STANDOFF)
     figure.update_layout(margin={"l": 20, "r": 20, "t": 10, "b": 45}, hovermode="closest")
     return figure
 
@@ -253,7 +253,7 @@ def values(title: str, at: Sequence[tuple[str, float, float, float]], neutral: f
     )  # fmt: skip
     figure.add_vline(x=neutral, line={"color": "#8899aa", "width": 1})
     styled(figure, 78 + sum(10 + 14 * (1 + name.count("<br>")) for name in names))
-    figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ", type="category")
+    figure.update_yaxes(autorange="reversed", automargin=True, ticklabelstandoff=STANDOFF, type="category")
     figure.update_layout(
         title={"text": title, "font": {"size": 12}, "x": 0.02, "y": 0.97},
         hovermode="closest",
@@ -331,7 +331,7 @@ def bars(
                          annotation_position="top")  # fmt: skip
     styled(figure, 110 + (24 if after is None else 34) * len(names))
     figure.update_xaxes(title_text=label, rangemode="tozero")
-    figure.update_yaxes(autorange="reversed", automargin=True, ticksuffix="  ")
+    figure.update_yaxes(autorange="reversed", automargin=True, ticklabelstandoff=STANDOFF)
     figure.update_layout(
         margin={"l": 20, "r": 20, "t": 34, "b": 45}, hovermode="closest", bargap=0.25, showlegend=False
     )

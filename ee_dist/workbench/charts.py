@@ -13,7 +13,7 @@ import numpy as np
 from ee_dist.discrepancy.words import plain
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
-from ee_dist.viewing.labels import cut_marks, left_edge, wrapped
+from ee_dist.viewing.labels import STANDOFF, cut_marks, left_edge, wrapped
 from ee_dist.workbench.bench import Step
 from ee_dist.workbench.sight import Cloud
 
@@ -191,7 +191,7 @@ def bars(names: Sequence[str], values: Sequence[float], floor: float) -> Chart:
         trace,
         70 + 22 * len(names),
         {"title": {"text": "error"}, "rangemode": "tozero"},
-        {"ticksuffix": "  "},
+        {"ticklabelstandoff": STANDOFF},
         margin={"l": 10, "r": 14, "t": 24, "b": 36},
         shapes=[_floor_line(floor, "x")],
         annotations=[{"x": floor, "y": 1, "yref": "paper", "yanchor": "bottom", "showarrow": False, "text": "noise floor",
@@ -274,7 +274,7 @@ def ranking(
         trace,
         104 + 36 * len(names),
         {"title": {"text": "gain above the noise, held out (%)"}, "range": [left_edge(intervals), 106]},
-        {"ticksuffix": "  "},
+        {"ticklabelstandoff": STANDOFF},
         showlegend=False,
         annotations=cut_marks(names, gains, intervals),
         margin={"l": 10, "r": 20, "t": 8, "b": 56},
