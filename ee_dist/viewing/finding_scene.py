@@ -133,7 +133,7 @@ def _write(stage: _Stage, path: str | Path, verb: str, text: Sequence[str], righ
             channels.send_sensors(stream, shots, stage.models, switches)
             channels.send_residuals(stream, shots, stage.models)
             channels.send_commands(stream, shots)
-            channels.send_trial_lane(stream, shots, [plain(s.name) for s in shots])
+            channels.send_trial_lane(stream, shots, [s.name for s in shots])
 
 
 def _layout(stage: _Stage, right: rrb.Container) -> rrb.Blueprint:
@@ -180,7 +180,7 @@ def _worst_plots(stage: _Stage, models: Sequence[Model], around: bool) -> list[r
     for c in stage.worst():
         start, end = stage.window(c)
         axis = blueprint.fixed_axis(start, end) if around else blueprint.whole_axis(stage.end_s)
-        where = f", {plain(c.worst_case)}" if around and c.worst_case else ""
+        where = f", {c.worst_case}" if around and c.worst_case else ""
         views.append(
             blueprint.plot(
                 f"/sensors/{c.name}",

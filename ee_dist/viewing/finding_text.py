@@ -22,6 +22,7 @@ def bar(value: float, largest: float, width: int = BAR) -> str:
 
 
 def plain(name: str) -> str:
+    """A channel's name in words. Trials keep theirs, by which they are held out."""
     return name.replace("_", " ")
 
 
@@ -60,7 +61,7 @@ def channel_table(found: Finding) -> list[str]:
     lines = [f"| error{_unit(found)} | | RMS | channel | worst |", "|---|---|---|---|---|"]
     for c in ranked:
         unit = "" if c.unit in ("", "1") else f" {c.unit}"
-        where = f"{plain(c.worst_case)}, {c.worst_from_s:.1f} s" if c.worst_case else ""
+        where = f"{c.worst_case}, {c.worst_from_s:.1f} s" if c.worst_case else ""
         lines.append(f"| {c.error:.3g} | {bar(c.error, largest)} | {c.rmse:.3g}{unit} | {plain(c.name)} | {where} |")
     return [*lines, "", f"RMS: of {found.rms_of}."] if found.rms_of else lines
 

@@ -62,6 +62,14 @@ def test_compare_has_its_channels_worst_first_and_plays_where_the_error_is_large
     assert 1.0 <= selected[1] - selected[0] <= 2.01
 
 
+def test_a_trial_has_the_name_of_its_log_in_the_scene(tmp_path: Path) -> None:
+    f = found("servo_pendulum")
+    cases = tuple(replace(c, name=f"slow_sines_{k}") for k, c in enumerate(f.cases))
+    channels = tuple(replace(c, worst_case="slow_sines_0") for c in f.channels)
+    write_compare_rrd(replace(f, cases=cases, channels=channels, better=None), tmp_path / "scene.rrd")
+    assert "| slow_sines_0, " in text_of(tmp_path / "scene.rrd")
+
+
 def selection(path: Path) -> list[tuple[float, float]]:
     """Stretches of time that play is to repeat, s."""
     found = []
