@@ -117,7 +117,8 @@ def held_out_notes(problem: Problem) -> list[str]:
 def beside_floor(error: float, floor: float, left: bool) -> list[str]:
     """An error that is less than noise would leave needs a word, and one that is more although nothing is ``left``."""
     if error < 0.97 * floor:
-        return ["The error is below the floor: the noise was estimated too high, and the floor is an upper bound."]
+        # Declared or estimated: either may be too much.
+        return ["The error is below the floor: there is less noise than that, and the floor is an upper bound."]
     if error < floor:
         return ["The error is at the floor, within chance."]
     if error <= 1.03 * floor or left:
