@@ -23,6 +23,9 @@ DOTS = 1500
 """Points of a cloud that are drawn."""
 NUMBERED = 150
 """Cells of a map up to which each has its number in it."""
+NAME, LINE = 24, 18
+"""Letters that fit beside the upper curves before they run into what is told of the lower ones, and pixels of another line."""
+MARGIN = {"l": 56, "r": 14, "t": 28, "b": 40}
 DIGITS = 6
 TIME_DIGITS = 6
 """Of a second, so that every row of a fast log has its own place."""
@@ -46,7 +49,7 @@ def _chart(data: list[Chart], height: int, **layout: Any) -> Chart:
         "layout": {
             "font": _FONT,
             "height": height,
-            "margin": {"l": 56, "r": 14, "t": 28, "b": 40},
+            "margin": MARGIN,
             "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
             "paper_bgcolor": "rgba(0,0,0,0)",
             "plot_bgcolor": "#ffffff",
@@ -98,22 +101,26 @@ def overlay(
                      "name": "chosen", "yaxis": "y2",
                      "marker": {"color": MARKED, "size": 5, "symbol": "circle-open"}})  # fmt: skip
     unit = "" if curve.unit == "1" else f" ({curve.unit})"
+    name = wrapped(f"{curve.channel}{unit}", NAME)
+    lines = name.count("<br>")
     return _chart(
         data,
         height,
         uirevision=key,
+        margin=MARGIN | {"l": MARGIN["l"] + lines * LINE},
         hovermode="x unified",
         dragmode="zoom",
         xaxis={"title": {"text": "s", "standoff": 4}, "anchor": "y2", "gridcolor": "#e8edf2"},
         yaxis={
             "domain": [0.38, 1.0],
-            "title": {"text": f"{curve.channel}{unit}"},
+            # Where it is left to plotly, further lines go towards the numbers.
+            "title": {"text": name, **({"standoff": 4 + lines * LINE} if lines else {})},
             "gridcolor": "#e8edf2",
             "fixedrange": True,
         },
         yaxis2={
             "domain": [0.0, 0.3],
-            "title": {"text": "residual"},
+            "title": {"text": f"residual{unit}"},
             "gridcolor": "#e8edf2",
             "zerolinecolor": "#8899aa",
             "fixedrange": True,
@@ -151,22 +158,25 @@ def cloud(part: Cloud, channel_unit: str, span_s: tuple[float, float] | None = N
     )  # fmt: skip
 
 
-def heat(table: Array, channels: Sequence[str], trials: Sequence[str], chosen: tuple[int, int] | None) -> Chart:
-    """(trials, channels) errors, to click on; channels without a value are left out by the caller's names being empty."""
+def heat(
+    table: Array, channels: Sequence[str], trials: Sequence[str], chosen: tuple[int, int] | None, least_top: float
+) -> Chart:
+    """(trials, channels) errors, to click on; channels without a value are left out by the caller's names being empty.
+    ``least_top``: where the colours end at the least, so that noise alone does not glow."""
     shown = [k for k in range(table.shape[1]) if table[:, k].any()]
     z = table[:, shown].T
-    top = max(3.0, float(np.nanquantile(z, 0.98))) if z.size else 3.0
+    top = max(least_top, float(np.nanquantile(z, 0.98))) if z.size else least_top
     names = [plain(channels[k]) for k in shown]
     labels = [wrapped(t, 14) for t in trials]
     trace: Chart = {
         "type": "heatmap", "z": [_short(row) for row in z], "x": list(range(len(trials))), "y": list(range(len(shown))),
         "customdata": [[[t, k] for t in range(len(trials))] for k in shown], "zmin": 0.0, "zmax": top, "colorscale": "Cividis",
-        "text": [[f"{names[r]}<br>{trials[t]}<br>{z[r, t]:.2f}" for t in range(len(trials))] for r in range(len(shown))],
+        "text": [[f"{names[r]}<br>{trials[t]}<br>{z[r, t]:.3g}" for t in range(len(trials))] for r in range(len(shown))],
         "hoverinfo": "text", "xgap": 2, "ygap": 2,
         "colorbar": {"thickness": 10, "nticks": 4, "title": {"text": "error", "side": "right"}},
     }  # fmt: skip
     if z.size <= NUMBERED:
-        trace |= {"texttemplate": "%{z:.1f}", "textfont": {"size": 11}}
+        trace |= {"texttemplate": "%{z:.2~r}", "textfont": {"size": 11}}
     shapes = []
     if chosen is not None and chosen[1] in shown:
         row = shown.index(chosen[1])
@@ -182,7 +192,7 @@ def heat(table: Array, channels: Sequence[str], trials: Sequence[str], chosen: t
     )
 
 
-def bars(names: Sequence[str], values: Sequence[float], floor: float) -> Chart:
+def bars(names: Sequence[str], values: Sequence[float], floor: float, axis: str = "error") -> Chart:
     """Errors by regime, largest first, and where noise alone would end them."""
     order = sorted(range(len(names)), key=lambda k: -values[k])
     trace = {"type": "bar", "orientation": "h", "x": _short(np.array([values[k] for k in order])),
@@ -190,7 +200,7 @@ def bars(names: Sequence[str], values: Sequence[float], floor: float) -> Chart:
     return _rows(
         trace,
         70 + 22 * len(names),
-        {"title": {"text": "error"}, "rangemode": "tozero"},
+        {"title": {"text": axis}, "rangemode": "tozero"},
         {"ticklabelstandoff": STANDOFF},
         margin={"l": 10, "r": 14, "t": 24, "b": 36},
         shapes=[_floor_line(floor, "x")],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,3 +58,24 @@ def test_of_a_moved_slider_only_the_numbers_are_other_ones_and_a_mark_is_another
     assert same_but_numbers(first, moved) and first["data"][1]["y"] != moved["data"][1]["y"]
     assert not same_but_numbers(first, charts.overlay(after, "another key"))
     assert not same_but_numbers(first, charts.overlay(after, "key", mark=("a mark", np.zeros(50))))
+
+
+def test_what_is_drawn_says_in_which_unit() -> None:
+    layout = charts.overlay(overlay(50, 0.1), "key")["layout"]
+    assert (
+        layout["yaxis"]["title"]["text"] == "position (rad)" and layout["yaxis2"]["title"]["text"] == "residual (rad)"
+    )
+    regimes = charts.bars(["moving", "at rest"], [15.9, 9.4], 9.36, "relative force error (%)")
+    assert regimes["layout"]["xaxis"]["title"]["text"] == "relative force error (%)"
+    long = replace(overlay(50, 0.1), channel="joint 2 position, held_4_sines")
+    layout = charts.overlay(long, "key")["layout"]
+    assert layout["yaxis"]["title"]["text"] == "joint 2 position,<br>held_4_sines (rad)", "not into what is below it"
+    assert layout["margin"]["l"] > charts.MARGIN["l"]
+
+
+def test_the_colours_of_a_map_end_no_lower_than_is_asked() -> None:
+    """In the unit of its numbers: three standard deviations are another number where errors are told in percent."""
+    noise = np.full((2, 2), 0.9)
+    assert charts.heat(noise, ("a", "b"), ("one", "two"), None, 3.0)["data"][0]["zmax"] == 3.0
+    assert charts.heat(30 * noise, ("a", "b"), ("one", "two"), None, 28.1)["data"][0]["zmax"] == 28.1
+    assert charts.heat(50 * noise, ("a", "b"), ("one", "two"), None, 28.1)["data"][0]["zmax"] == pytest.approx(45.0)

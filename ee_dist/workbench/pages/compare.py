@@ -11,6 +11,7 @@ from nicegui import background_tasks, ui
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import by_trial
 from ee_dist.discrepancy.evidence.left import leftovers
+from ee_dist.tasks.results.labels import axis_of, drawn
 from ee_dist.workbench import charts
 from ee_dist.workbench.pages.curves import Curves
 from ee_dist.workbench.pages.plot import Plot
@@ -20,6 +21,9 @@ from ee_dist.workbench.sight import Cloud
 
 AFTER_S = 0.1
 """By which points come after curves."""
+CLICK = "Click on a cell to look at it. Arrow keys move on from there."
+GLOWS = 3.0
+"""Standard deviations at which the map's colours end at the least: noise alone is dark."""
 
 
 class CompareView(View):
@@ -37,7 +41,7 @@ class CompareView(View):
                 self.curves = Curves(self.page)
             with ui.element("section").classes("card"):
                 heading("Where it fails: channel by trial")
-                quiet("Click on a cell to look at it. Arrow keys move on from there.")
+                self.map_note = quiet(CLICK)
                 self.map = Plot().mark("map")
                 self.map.on("plotly_click", self._clicked)
                 heading("By regime")
@@ -65,14 +69,14 @@ class CompareView(View):
             with self.lines:
                 for line in account.lines:
                     quiet(line)
-            regimes = seen.found.regimes
-            self.regimes.draw(
-                charts.bars([r.name for r in regimes], [r.error for r in regimes], seen.found.noise_floor)
-            )
+            regimes, floor = seen.found.regimes, drawn(problem, seen.found.noise_floor)
+            errors = [drawn(problem, r.error) for r in regimes]
+            self.regimes.draw(charts.bars([r.name for r in regimes], errors, floor, axis_of(problem)))
+            self.map_note.set_text(f"{CLICK} Numbers: {axis_of(problem)}.")
         if topics & {"seen", "place"}:
             names = [f"{k}. {t}" for k, t in zip(problem.numbers, problem.trials, strict=True)]
-            cells = by_trial(problem, np.nan_to_num(seen.residual, posinf=0.0))
-            self.map.draw(charts.heat(cells, problem.channels, names, place))
+            cells = drawn(problem, by_trial(problem, np.nan_to_num(seen.residual, posinf=0.0)))
+            self.map.draw(charts.heat(cells, problem.channels, names, place, drawn(problem, GLOWS)))
         self.curves.draw(await of(session.do(sight.series, seen.terms, place)))
         if topics & {"seen", "place"}:
             self._parts = await of(session.do(sight.clouds, seen.residual, place))

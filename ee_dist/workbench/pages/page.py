@@ -9,6 +9,7 @@ from nicegui import background_tasks, ui
 from nicegui.events import KeyEventArguments
 
 from ee_dist.basics.names import counted
+from ee_dist.discrepancy.accounts.account import error_name
 from ee_dist.discrepancy.words import plain
 from ee_dist.tasks.progress_line import left_of
 from ee_dist.trials.log import Array
@@ -89,7 +90,9 @@ class Page:
                         ui.label("ee_dist workbench").classes("ellipsis").style("font-weight:600; max-width:100%")
                     )
                     self.subtitle = ui.label("").classes("quiet ellipsis").style("max-width:100%")
-                self.number = ui.label("").classes("number").mark("error")
+                with ui.column().classes("gap-0 items-end"):
+                    self.number = ui.label("").classes("number").mark("error")
+                    self.number_of = ui.label("").classes("quiet gt-xs").style("white-space:nowrap")
                 ui.button(icon="undo", on_click=self.undo).props('flat dense aria-label="Undo"').tooltip(
                     "Undo (u)"
                 ).mark("undo")
@@ -157,6 +160,7 @@ class Page:
             self.show_error(None)  # it takes a while to compare what stands there now
         elif seen is None:
             self.number.set_text("" if measured is None or session.notice else UNKNOWN)
+            self.number_of.set_text("")
             self.gauge.set_content("")
         self.notice.set_text(session.notice)
         self.notice.set_visibility(bool(session.notice))
@@ -167,6 +171,7 @@ class Page:
         sight, seen, ladder = self.session.sight, self.session.seen, self.session.bench.ladder
         if sight is None or seen is None:
             return
+        self.number_of.set_text(error_name(sight.problem))
         if error is None:
             self.number.set_text(UNKNOWN)
             self.gauge.set_content("")
