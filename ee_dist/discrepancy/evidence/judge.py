@@ -257,7 +257,8 @@ def ranked(found: Sequence[Judged]) -> list[Judged]:
         sooner = bool(fewer) and not first.proposal.guess
         if sooner:
             first = max(fewer, key=lambda j: j.gain)
-        first = min((j for j in ordered if j.name in first.tied_with and _fuller(j, first)), key=_left, default=first)
+        both = [j for j in ordered if j.name in first.tied_with and _fuller(j, first, ordered)]
+        first = min(both, key=_left, default=first)
         if first is not best and not sooner:
             # What is tied with either may be it.
             others = dict.fromkeys([*first.tied_with, best.name, *best.tied_with])
@@ -282,14 +283,20 @@ def _left(j: Judged) -> float:
     return 1.0 - j.explained
 
 
-def _fuller(j: Judged, first: Judged) -> bool:
+def _fuller(j: Judged, first: Judged, found: Sequence[Judged]) -> bool:
     """Whether it is the same and more, and takes off a part of what that leaves. With a handful of motions nothing is sure: the
     further term may be none, and yet foretells better on the whole. However little it takes off where the other ended at the end
     of its range, and it does not: that range is too small, or the effect is another."""
     if not j.earned or not contains(j, first) or float(first.held.sum()) <= NEAR**2 * first.sure:
         return False
-    share = 1.0 if _at_its_end(first) and not _at_its_end(j) else FULLER
+    share = 1.0 if (_at_its_end(first) and not _at_its_end(j)) or _needs_no_choice(j, first, found) else FULLER
     return _left(j) <= share * _left(first)
+
+
+def _needs_no_choice(j: Judged, first: Judged, found: Sequence[Judged]) -> bool:
+    """Whether all that it is more than ``first`` is by itself tied with that."""
+    more = {c.name for c in j.proposal.parts} - {c.name for c in first.proposal.parts}
+    return any(k.earned and k.name in first.tied_with and {c.name for c in k.proposal.parts} == more for k in found)
 
 
 def _at_its_end(j: Judged) -> bool:
