@@ -178,8 +178,13 @@ def _followed(search: Search, starts: Sequence[Fit]) -> list[Fit]:
 
 
 def _told(fit: Fit, half: Array) -> list[float]:
-    """How far each part is told from neutral, as a multiple of ``half`` (P,) its intervals."""
-    return [float(np.max(np.abs(fit.u[p]) / np.maximum(half[p], 1e-12), initial=0.0)) for p in fit.model.places]
+    """How far each part is told from neutral, as a multiple of ``half`` (P,) its intervals: by the values that tell that it is
+    there. When a sensor sticks may be plain where what sticks is next to none."""
+    times = np.abs(fit.u) / np.maximum(half, 1e-12)
+    return [
+        float(np.max(np.delete(times[p], c.inert), initial=0.0))
+        for c, p in zip(fit.model.parts, fit.model.places, strict=True)
+    ]
 
 
 def _least_told(problem: Problem, fit: Fit, own: int, open_only: bool, units_by: Units) -> list[int]:

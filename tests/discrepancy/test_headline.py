@@ -5,6 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from ee_dist.discrepancy.accounts.of_improve import _listed
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, BOUND, HARDLY, NEUTRAL, NO_LIGHTER, NOT_DETERMINED, WIDER
 from ee_dist.effects.catalogue import term
@@ -19,19 +21,19 @@ TERMS = (
 def of(flags: list[str], doubted: str = "") -> tuple[Any, Any]:
     """A finding of as many effects, called a, b, c; on those of ``doubted`` less depends than is left unexplained."""
     terms = [term("coulomb_friction", f"joint_{k}", torque_nm=0.1) for k in range(len(flags))]
-    parameters = [SimpleNamespace(term=k, flag=flag, doubt="") for k, flag in enumerate(flags)]
+    parameters = [SimpleNamespace(term=k, flag=flag, doubt="", tells=True) for k, flag in enumerate(flags)]
     shares = [SimpleNamespace(terms=(t,), text="abcde"[k], doubted="abcde"[k] in doubted) for k, t in enumerate(terms)]
     return SimpleNamespace(terms=terms, parameters=parameters), shares
 
 
 def headline(flags: list[str], doubt: str = "") -> str:
     parameters = [
-        SimpleNamespace(term=0, flag=flags[0], doubt=doubt),
-        SimpleNamespace(term=1, flag=flags[1], doubt=doubt),
+        SimpleNamespace(term=0, flag=flags[0], doubt=doubt, tells=True),
+        SimpleNamespace(term=1, flag=flags[1], doubt=doubt, tells=True),
     ]
     parameters += [
-        SimpleNamespace(term=1, flag=NEUTRAL, doubt=doubt),
-        SimpleNamespace(term=2, flag=flags[2], doubt=doubt),
+        SimpleNamespace(term=1, flag=NEUTRAL, doubt=doubt, tells=True),
+        SimpleNamespace(term=2, flag=flags[2], doubt=doubt, tells=True),
     ]
     found: Any = SimpleNamespace(terms=TERMS, parameters=parameters)
     shares: Any = [SimpleNamespace(terms=(t,), text=t.effect, doubted=False) for t in TERMS]
@@ -66,3 +68,18 @@ def test_what_may_stand_in_for_something_else_does_not_lead() -> None:
 
 def test_where_all_may_be_nothing_it_is_named() -> None:
     assert headline([HARDLY, NEUTRAL, HARDLY]) == "coulomb_friction; sensor_stuck; backlash"
+
+
+@pytest.mark.parametrize(
+    ("tells", "said"),
+    [(True, "sensor_stuck; coulomb_friction"), (False, "coulomb_friction; and 1 that may be nothing")],
+)
+def test_when_a_sensor_sticks_does_not_tell_that_it_does(tells: bool, said: str) -> None:
+    parameters = [
+        SimpleNamespace(term=0, flag="", doubt="", tells=True),
+        SimpleNamespace(term=1, flag=NEUTRAL, doubt="", tells=True),
+        SimpleNamespace(term=1, flag="", doubt="", tells=tells),
+    ]
+    found: Any = SimpleNamespace(terms=TERMS[:2], parameters=parameters)
+    shares: Any = [SimpleNamespace(terms=(t,), text=t.effect, doubted=False) for t in TERMS[1::-1]]
+    assert _listed(found, shares) == said

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from linear_problem import ROBOT, Linear
@@ -16,7 +19,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
-from ee_dist.discrepancy.told import Told, told_only
+from ee_dist.discrepancy.told import Told, _told, told_only
 from ee_dist.discrepancy.torque_scale import STRENGTH
 from ee_dist.effects.catalogue import Term, term
 from ee_dist.robots.servo_pendulum import servo_pendulum
@@ -155,3 +158,10 @@ def test_masses_go_together_but_for_those_that_nothing_tells_far_from_the_noise(
     left = told_only(search, Current(fit.model.parts, fit.u), 0, travelling(search.problem)[0], 100)
     assert {c.target for c in left.then.parts} == ({parts[0]} if apart else set(parts))
     assert len(left.gone) == (3 if apart else 0)
+
+
+def test_when_a_sensor_sticks_does_not_tell_that_it_does() -> None:
+    """Which moment that is may be plain in noise, of a share that may be none."""
+    stuck = candidate(PENDULUM, "sensor_stuck", PENDULUM.sensors[0].name)
+    fit: Any = SimpleNamespace(model=Model((stuck,)), u=np.array([0.02, 0.7]))
+    assert _told(fit, np.array([0.04, 0.01])) == [0.5]

@@ -184,7 +184,7 @@ def _tried(found: Explanation) -> str:
 
 def _what(found: Explanation, best: Judged, robot: Robot) -> str:
     """The terms of the best explanation; of drives that were only assumed, those of whose values these data tell something."""
-    reports = {t: [p for p in found.parameters if found.after[p.term] == t] for t in best.terms}
+    reports = {t: [p for p in found.parameters if p.tells and found.after[p.term] == t] for t in best.terms}
     vague = [t for t, own in reports.items() if own and all(map(_untold, own))]
     told = tuple(t for t in best.terms if t not in vague)
     if best.proposal.label != LABEL:

@@ -195,8 +195,8 @@ def apart_text(word: LastWord) -> str:
 
 def may_be_nothing(found: Improvement, terms: Sequence[Term]) -> bool:
     """Whether no value of some terms of the model is determined, told from neutral, and farther off than luck may tell one, nor
-    than what is left unexplained may push one that ended at its bound."""
-    mine = [p for p in found.parameters if found.terms[p.term] in terms]
+    than what is left unexplained may push one that ended at its bound; nor any that tells that they are there."""
+    mine = [p for p in found.parameters if p.tells and found.terms[p.term] in terms]
     return bool(mine) and all(
         p.flag in (NEUTRAL, HARDLY)
         or p.flag.endswith(NOT_DETERMINED)

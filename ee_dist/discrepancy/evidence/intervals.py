@@ -52,7 +52,8 @@ ALL_OF_IT = "what is left unexplained could be all of it"
 @dataclass(frozen=True)
 class ParameterReport:
     """A fitted value of term number ``term`` with its 95 % interval, in the parameter's own unit; ``flag`` says what is
-    wrong with it, if anything, ``doubt`` what the rest that the model leaves has to do with it."""
+    wrong with it, if anything, ``doubt`` what the rest that the model leaves has to do with it. ``tells``: whether it tells that
+    the effect is there; the moment from which a sensor sticks does not, if what sticks may be none."""
 
     term: int
     name: str
@@ -61,6 +62,7 @@ class ParameterReport:
     high: float
     flag: str
     doubt: str = ""
+    tells: bool = True
 
     @property
     def note(self) -> str:
@@ -118,7 +120,7 @@ def parameters(
                 # Of what is described no more can be taken off than is there.
                 least = max(known.lower, c.bounds[k][0]) if known.on_top else known.lower
                 low, high = max(low, min(least, value)), min(high, max(known.upper, value))
-            out.append(ParameterReport(index, name, value, low, high, flag, doubt))
+            out.append(ParameterReport(index, name, value, low, high, flag, doubt, k not in c.inert))
         at += c.size
     return out
 
