@@ -12,6 +12,7 @@ from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.effects.catalogue import Hypothesis
 
 HELD_APART = "Held out from all of it"
+TRIALS_APART = "trials that were held out from all of it"
 WORSE = 1.01
 """Times the error before from which a model is called worse."""
 

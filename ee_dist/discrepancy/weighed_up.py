@@ -13,10 +13,9 @@ import numpy as np
 from ee_dist.discrepancy.evidence.left import leftovers, settled
 from ee_dist.discrepancy.finished import BETTER, EXPLAINED, taken_off
 from ee_dist.discrepancy.ladder import Improvement
-from ee_dist.discrepancy.last_word import LastWord
+from ee_dist.discrepancy.last_word import TRIALS_APART, LastWord
 from ee_dist.discrepancy.problem import Problem, error
 
-TRIALS_APART = "trials that were held out from all of it"
 ALL_ROWS = "all rows of the records, of which the search took stretches"
 TELLING = 1.1
 """Times the noise floor that the model as it was must leave, for a share of what is above it to say something."""

@@ -17,7 +17,8 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.search import Progress, quiet
 from ee_dist.robots.describe import BUILT_IN
 from ee_dist.tasks.config import AUTO, Config
-from ee_dist.tasks.measurements import load, with_known_noise
+from ee_dist.tasks.held_apart import told_of
+from ee_dist.tasks.measurements import load, load_held_out, with_known_noise
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import asked, command, planning, setting
@@ -25,7 +26,7 @@ from ee_dist.tasks.results.pages import explain_page
 from ee_dist.tasks.results.scenes import explain_scene
 from ee_dist.tasks.results.story import links
 from ee_dist.tasks.results.summaries import of_explanation, of_read
-from ee_dist.tasks.results.tables import show_account, show_explanation, typed
+from ee_dist.tasks.results.tables import show_account, show_explanation, show_last_word, typed
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.ways import known_way, way_of
@@ -52,6 +53,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     """Write summary.json, report.html and explain.rrd into ``out``; ``told`` hears of the progress. Raises ConfigError,
     LogError, RecordingError."""
     console, watch, measured = terminal(), Stopwatch(), load(config)
+    apart = load_held_out(config)
     way = way_of(measured, options.by)
     check(measured.robot, options.without, options.only)
     for remark in measured.remarks:
@@ -65,9 +67,9 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             progress.note(f"Before anything is believed: {problem.doubts}")
         pool = chosen(problem, options.without, options.only)
         count = len(measured.trials)
-        apart = f" (held out from all of it: {listed(measured.held_out)})" if measured.held_out else ""
+        without = f" (held out from all of it: {listed(measured.held_out)})" if measured.held_out else ""
         console.print(
-            f"{count} trial{'s' if count > 1 else ''} of {measured.robot.name}{apart}, {len(pool)} candidate explanations, "
+            f"{count} trial{'s' if count > 1 else ''} of {measured.robot.name}{without}, {len(pool)} candidate explanations, "
             f"{way.name}: {way.why}.",
             highlight=False,
         )
@@ -84,7 +86,8 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     named = found.best if found.verdict == EFFECT else None
     fell = named is not None and named.error_heldout < found.baseline_error
     farther = "" if named is None else problem.farther_off(found.before, found.after, fell)
-    account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also)
+    word = None if apart is None else told_of(apart, way, config, found.after, problem)
+    account = explain_account(problem, found, ahead, planning(out, problem.robot), share, also, word)
     account = account.warned((*measured.remarks, *([f"{farther}."] if farther else [])))
     # A mistake of the description or the mapping is mended there: no model on top of it is of any use.
     if found.verdict != NOTHING_MISSING and account.advice != MEND:
@@ -94,13 +97,14 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         account = account.followed(command(asked("improve", config, options.by, effect)))
     digest = hashlib.sha256(repr([(c.hypothesis, c.error_heldout) for c in found.candidates]).encode()).hexdigest()
     out.mkdir(parents=True, exist_ok=True)
-    told_all = of_read(measured.read) | of_explanation(problem, found, account, ahead, share)
+    told_all = of_read(measured.read) | of_explanation(problem, found, account, ahead, share, word)
     write_summary(out, "explain", config, options, watch, digest, told_all)
     story = links(out, measured.files, config.model)
-    write_page(explain_page(problem, measured, found, account, story), out / "report.html")
+    write_page(explain_page(problem, measured, found, account, story, word), out / "report.html")
     if options.rerun:
         explain_scene(problem, found, account, out / "explain.rrd")
     show_explanation(console, problem, found)
+    show_last_word(console, word)
     wall, _ = watch.read()
     console.print(f"{wall:.0f} s. Digest {digest[:16]}.", highlight=False)
     show_account(console, account, out)

@@ -17,7 +17,6 @@ from ee_dist.discrepancy.calibrated_away import calibrated_away
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve
 from ee_dist.discrepancy.ladder import Improvement, Rung
-from ee_dist.discrepancy.last_word import LastWord, last_word
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, parse, shared
 from ee_dist.discrepancy.search.search import Progress, quiet
@@ -25,10 +24,10 @@ from ee_dist.discrepancy.ways.open_loop.calibration import unmodelled_by
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.unmodelled import to_entries
 from ee_dist.discrepancy.weighed_up import weighed_up
-from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError
+from ee_dist.tasks.held_apart import told_of
 from ee_dist.tasks.measurements import Measurements, load, load_held_out, of_held_out
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
@@ -42,7 +41,7 @@ from ee_dist.tasks.results.tables import show_account, show_candidates, show_lad
 from ee_dist.tasks.summary import Stopwatch, write_summary
 from ee_dist.tasks.terminal import terminal
 from ee_dist.tasks.unfinished import keep_so_far
-from ee_dist.tasks.ways import Way, known_way, open_loop, undriven, way_of
+from ee_dist.tasks.ways import known_way, open_loop, undriven, way_of
 from ee_dist.viewing.report import write_page
 
 
@@ -135,14 +134,6 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         show_candidates(console, problem, refused, "Tried on top of it, and refused")
     show_account(console, account, out)
     return problem, found, account
-
-
-def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis, fitted: Problem) -> LastWord:
-    """How far the model as it was and the one with ``terms`` are from trials that nothing was fitted to, compared
-    by the same measure, and their commands taken as those of what was ``fitted``."""
-    models = (apart.model, terms)
-    problems = [way.as_read(replace(apart, model=m), config, fitted).as_searched for m in models]
-    return last_word(problems, models, fitted.compared)
 
 
 def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:

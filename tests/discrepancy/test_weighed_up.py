@@ -10,7 +10,8 @@ import pytest
 from ee_dist.discrepancy import weighed_up as module
 from ee_dist.discrepancy.finished import BETTER, EXPLAINED
 from ee_dist.discrepancy.ladder import Improvement, Rung
-from ee_dist.discrepancy.weighed_up import ALL_ROWS, TRIALS_APART, share, weighed_up
+from ee_dist.discrepancy.last_word import TRIALS_APART
+from ee_dist.discrepancy.weighed_up import ALL_ROWS, share, weighed_up
 
 FLOOR = 1.0
 

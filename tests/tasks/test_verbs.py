@@ -183,6 +183,23 @@ def test_what_is_held_out_from_all_of_it_decides_nothing_and_has_the_last_word(c
             assert content["error"] == pytest.approx(word[key], rel=1e-6)
 
 
+@pytest.mark.parametrize("by", WAYS)
+def test_an_explanation_is_held_against_what_was_held_out_from_all_of_it(cli, imported, by):
+    """What takes most off windows of one motion may do nothing for another: who held one out is told."""
+    ask = ("task=explain", SUSPECTS, f"task.by={by}", f"measured={imported}", *QUICK)
+    found, said = run(cli, *ask, "held_out=[run2]")
+    told_alike(found, said)
+    explained = json.loads((found / "summary.json").read_text())
+    word = explained["last_word"]
+    assert [t["name"] for t in word["trials"]] == ["run2"] and word["error_after"] < 0.5 * word["error_before"]
+    page = (found / "report.html").read_text(encoding="utf-8")
+    text = "Held out from all of it (run2): model "
+    assert text in explained["words"][1] and text in page and "Held out from all of it:" in said.out
+    alone, _ = run(cli, *ask, "trials=[run1]")
+    same = json.loads((alone / "summary.json").read_text())
+    assert same["last_word"] is None and same["candidates"] == explained["candidates"]
+
+
 def test_auto_takes_the_first_way_that_the_channels_allow(cli, imported):
     found, said = run(cli, "task=compare", f"measured={imported}", "task.rerun=false", *QUICK)
     assert json.loads((found / "summary.json").read_text())["way"] == "free_run"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from ee_dist.basics.names import counted
 from ee_dist.discrepancy.evidence.holdout import joint_by_joint, travelling
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
+from ee_dist.discrepancy.last_word import TRIALS_APART, LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import placed, plain
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
@@ -27,6 +28,7 @@ SPREAD = (
 NOISE = "sensor_noise"
 THAT_NOISE = "What is left there is this noise itself."
 NOTHING_ELSE = "Nothing else is left above the noise."
+NOTHING_APART = "nothing is left above the noise"
 BEYOND = "Nothing else is left beyond what may be noise."
 CONTENT = (
     "Next: nothing has to be done. The model explains these measurements; other motions may show what these do not."
@@ -183,6 +185,13 @@ def left_text(left: Sequence[Leftover], after: bool, on: str = "") -> str:
     # A trial keeps its name, by which it is held out.
     worst = [str(replace(g, channel=plain(g.channel))) for g in left[:3]]
     return f"{head} {counted(curves_of(left), 'curve')}; worst: {'; '.join(worst)}."
+
+
+def apart_text(word: LastWord) -> str:
+    """What the model leaves of the trials that took no part: its error says how much that is, and not where."""
+    if word.left:
+        return left_text(word.left, word.changed, TRIALS_APART)
+    return f"On {TRIALS_APART} {'no curve stands out, and all together are more than noise' if word.more else NOTHING_APART}."
 
 
 def left_beside_noise(left: Sequence[Leftover], terms: Hypothesis, robot: Robot) -> Sequence[Leftover]:

@@ -18,6 +18,7 @@ from ee_dist.discrepancy.accounts.account import (
     TWINS,
     Account,
     advised,
+    apart_text,
     before_and_after,
     beside_floor,
     curves_of,
@@ -40,6 +41,7 @@ from ee_dist.discrepancy.evidence.judge import Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.evidence.rule import LUCK
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
+from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import known
@@ -77,9 +79,11 @@ def explain_account(
     planner: str = "",
     confidence: float | None = None,
     also: Sequence[str] = (),
+    word: LastWord | None = None,
 ) -> Account:
     """The verdict, what it is, what speaks for it, what stays open, what to do next; ``planner`` is said where something is tied
-    that another trial might tell apart, ``confidence`` is that of confidence.py, ``also`` is said first."""
+    that another trial might tell apart, ``confidence`` is that of confidence.py, ``also`` is said first. ``word``: how far the
+    models are from trials that took no part."""
     robot, best = problem.robot, found.best
     rest: Sequence[Leftover] = found.left
     lines = [f"Noise floor: {found.floor_source}. {_tried(found)}"]
@@ -149,6 +153,10 @@ def explain_account(
     lines += beside_floor(last, found.noise_floor, bool(found.left))
     if rest:
         lines.append(left_text(rest, found.verdict == EFFECT))
+    if word is not None:
+        lines.append(apart_text(word))
+        error = f"{error} {word.text}"
+        also = (*word.lines, *also)
     if ahead is not None and ahead.separation < ENOUGH:
         advice = NO_MOTION_TRIED
     elif ahead is not None:
@@ -161,6 +169,7 @@ def explain_account(
     sure = f"{sure} {_counted_right(confidence, problem.way)}."
     tied = bool(found.verdict == EFFECT and best is not None and best.tied_with)
     good = (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not rest)) and not unsure and not tied
+    good = good and not (word is not None and word.more)
     return Account(
         head,
         error,

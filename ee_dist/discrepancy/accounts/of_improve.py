@@ -15,6 +15,7 @@ from ee_dist.discrepancy.accounts.account import (
     TWINS,
     Account,
     advised,
+    apart_text,
     before_and_after,
     beside_floor,
     error_name,
@@ -43,12 +44,12 @@ from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.finished import EXPLAINED
 from ee_dist.discrepancy.importance import Share, added, shares
 from ee_dist.discrepancy.ladder import Improvement, Rung, Twin
-from ee_dist.discrepancy.last_word import LastWord
+from ee_dist.discrepancy.last_word import TRIALS_APART, LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Proposal
 from ee_dist.discrepancy.torque_scale import torques_compared
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
-from ee_dist.discrepancy.weighed_up import ALL_ROWS, TRIALS_APART
+from ee_dist.discrepancy.weighed_up import ALL_ROWS
 from ee_dist.discrepancy.words import by_effect, much, percent, phrase, placed, plain, without_values
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.effects.groups import members_of
@@ -56,7 +57,6 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
-NOTHING_APART = "nothing is left above the noise"
 EACH = "each of "
 NAMED = 3
 """Effects that a headline names."""
@@ -184,13 +184,6 @@ def improve_account(
     good = settled and not warnings and not unsure and not any(ties.values())
     more = (*(word.lines if word is not None else ()), *also, *lines, *held_out_notes(problem), *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
-
-
-def apart_text(word: LastWord) -> str:
-    """What the model leaves of the trials that took no part: its error says how much that is, and not where."""
-    if word.left:
-        return left_text(word.left, word.changed, TRIALS_APART)
-    return f"On {TRIALS_APART} {'no curve stands out, and all together are more than noise' if word.more else NOTHING_APART}."
 
 
 def may_be_nothing(found: Improvement, terms: Sequence[Term]) -> bool:

@@ -10,9 +10,8 @@ from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.importance import added
 from ee_dist.discrepancy.ladder import Improvement
-from ee_dist.discrepancy.last_word import LastWord
+from ee_dist.discrepancy.last_word import TRIALS_APART, LastWord
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.weighed_up import TRIALS_APART
 from ee_dist.discrepancy.words import phrase, plain
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
@@ -64,13 +63,15 @@ def explain_page(
     found: Explanation,
     account: Account,
     links: Sequence[Link] = (),
+    word: LastWord | None = None,
 ) -> Page:
-    """The page of explain."""
+    """The page of explain; ``word`` is on trials that took no part in it."""
     best = found.best
     page = _page(problem, measured, "Explain", account, links)
     page.tiles = [
         (problem.told(found.baseline_error), f"{problem.natural_name}, {MODEL}"),
         *([(problem.told(best.error_heldout), f"{IMPROVED}, on {best.held_out}")] if best else []),
+        *_word_tile(word),
         (problem.told(found.noise_floor), "noise floor"),
         (str(found.tried), "explanations tried"),
     ]
@@ -79,6 +80,7 @@ def explain_page(
     overlays = parts.curves(problem, found.base, models)
     page.proof = parts.proof_section(problem, overlays, found.base, models, after)
     _add(page, parts.ranking_section(problem, found.candidates))
+    _add(page, None if word is None else parts.last_word_section(word))
     _add(page, parts.values_section(kinds_of(found.after, found.parameters, problem.robot)))
     page.sections.append(parts.browser_section(overlays, models))
     _add(page, parts.signature_section(problem, found.base, after, () if best is None else best.terms))
@@ -101,7 +103,7 @@ def improve_page(
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name}, {MODEL}"),
         *([(problem.told(last.error_heldout), f"{IMPROVED}, on {last.held_out}")] if changed else []),
-        *([(word.problem.told(word.after), f"{IMPROVED}, on {TRIALS_APART}")] if word is not None and changed else []),
+        *_word_tile(word),
         (problem.told(found.noise_floor), "noise floor"),
         (str(len(found.terms)), "effects in the model"),
     ]
@@ -169,3 +171,10 @@ def _page(
 def _add(page: Page, section: Section | None) -> None:
     if section is not None:
         page.sections.append(section)
+
+
+def _word_tile(word: LastWord | None) -> list[tuple[str, str]]:
+    """How far the improved model is from trials that took no part, if there are both."""
+    if word is None or not word.changed:
+        return []
+    return [(word.problem.told(word.after), f"{IMPROVED}, on {TRIALS_APART}")]

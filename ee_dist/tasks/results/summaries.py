@@ -70,7 +70,12 @@ def of_comparison(
 
 
 def of_explanation(
-    problem: Problem, found: Explanation, account: Account, ahead: PlannedTrial | None, confidence: float | None
+    problem: Problem,
+    found: Explanation,
+    account: Account,
+    ahead: PlannedTrial | None,
+    confidence: float | None,
+    word: LastWord | None = None,
 ) -> dict[str, Any]:
     worth = ahead is not None and ahead.separation >= ENOUGH
     return {
@@ -83,6 +88,7 @@ def of_explanation(
         "candidates": [of_judged(problem, c) for c in found.candidates],
         "parameters": of_parameters(found.after, found.parameters),
         "left": of_left(found.left),
+        "last_word": of_last_word(word),
         "next_trial": {**ahead.excitation.as_dict(), "separation": ahead.separation} if ahead and worth else None,
     }
 
