@@ -45,8 +45,7 @@ class CachedEvaluator:
             sizes = {key: size for key, result in found.items() if (size := size_of(result))}
             self._sizes.update(sizes)
             self._held += sum(sizes.values())
-        self.counts.asked = before.asked + len(jobs)
-        self.counts.asked_steps = before.asked_steps + sum(j.rollout.steps for j in jobs)
+        self.counts.asked_since(before, jobs)
         results = [self._known[key] for key in keys]
         self._forget()
         return results

@@ -68,6 +68,19 @@ class Counts:
     def reset(self) -> None:
         self.asked = self.simulated = self.steps = self.asked_steps = 0
 
+    def add(self, jobs: Sequence[Job]) -> None:
+        """Jobs that were asked for, all of which are simulated."""
+        steps = sum(j.rollout.steps for j in jobs)
+        self.asked += len(jobs)
+        self.asked_steps += steps
+        self.simulated += len(jobs)
+        self.steps += steps
+
+    def asked_since(self, before: Counts, jobs: Sequence[Job]) -> None:
+        """That only these were asked for since an earlier copy, whatever had to be simulated for them."""
+        self.asked = before.asked + len(jobs)
+        self.asked_steps = before.asked_steps + sum(j.rollout.steps for j in jobs)
+
     def copy(self) -> Counts:
         return Counts(self.asked, self.simulated, self.steps, self.asked_steps)
 

@@ -130,11 +130,7 @@ class RayEvaluator:
 
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
         """Raises EvaluatorError where Ray is lost, and what a job raised where one did."""
-        steps = sum(j.rollout.steps for j in jobs)
-        self.counts.asked += len(jobs)
-        self.counts.asked_steps += steps
-        self.counts.simulated += len(jobs)
-        self.counts.steps += steps
+        self.counts.add(jobs)
         results: list[Any] = [None] * len(jobs)
         running: dict[Any, _Call] = {}
         idle, share, free = list(range(self.workers)), self.shares.now(), 1.0

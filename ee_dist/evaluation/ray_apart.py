@@ -70,11 +70,7 @@ class RayApart:
         found: list[Any]
         found, took_s = _process.ask("evaluate", self._name, list(jobs))
         _worked_s += took_s
-        steps = sum(j.rollout.steps for j in jobs)
-        self.counts.asked += len(jobs)
-        self.counts.asked_steps += steps
-        self.counts.simulated += len(jobs)
-        self.counts.steps += steps
+        self.counts.add(jobs)
         return found
 
     def close(self) -> None:

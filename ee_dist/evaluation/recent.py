@@ -33,8 +33,7 @@ class RecentEvaluator:
                 fresh.setdefault(key, Job(job.rollout, Whole()))
         before = self.counts.copy()
         simulated = dict(zip(fresh, self.inner.evaluate(list(fresh.values())), strict=True)) if fresh else {}
-        self.counts.asked = before.asked + len(jobs)
-        self.counts.asked_steps = before.asked_steps + sum(j.rollout.steps for j in jobs)
+        self.counts.asked_since(before, jobs)
         found = [
             job.reduction(simulated[key] if key in simulated else self._logs[key])
             for key, job in zip(keys, jobs, strict=True)

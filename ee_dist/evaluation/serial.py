@@ -33,11 +33,7 @@ class SerialEvaluator:
         self.counts = Counts()
 
     def evaluate(self, jobs: Sequence[Job]) -> list[Any]:
-        steps = sum(j.rollout.steps for j in jobs)
-        self.counts.asked += len(jobs)
-        self.counts.asked_steps += steps
-        self.counts.simulated += len(jobs)
-        self.counts.steps += steps
+        self.counts.add(jobs)
         return run_jobs(self.engine, jobs, self.chunk)
 
     def close(self) -> None:

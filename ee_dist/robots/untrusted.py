@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,19 @@ MOST = 500_000
 
 class UntrustedError(ValueError):
     """What is wrong with a file, without its name: for the reader to put in front."""
+
+
+@contextmanager
+def told_as(kind: type[Exception], file: Path, what: str) -> Iterator[None]:
+    """Why the file cannot be read is raised as an error of this kind, in one line that says ``what`` is expected."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise kind(f"{file}: no such file; expected {what}") from None
+    except UntrustedError as error:
+        raise kind(f"{file}: {error}; expected {what}") from None
+    except OSError as error:
+        raise kind(f"{file}: cannot be read ({error.strerror}); expected {what}") from None
 
 
 def text_of(path: Path, largest: int = LARGEST) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from ee_dist.robots.model import RobotError
-from ee_dist.robots.untrusted import UntrustedError, check_file
+from ee_dist.robots.untrusted import check_file, told_as
 
 LARGEST_BYTES = 50_000_000
 DEEPEST = 200
@@ -21,17 +21,11 @@ class XmlError(RobotError):
 def read_xml(path: str | Path, what: str = "a robot") -> tuple[ET.Element, bytes]:
     """The outermost element, and the file's bytes. Raises XmlError: no file, too large, a DTD, too deep, not XML."""
     file = Path(path)
-    try:
+    with told_as(XmlError, file, what):
         if file.stat().st_size > LARGEST_BYTES:
             raise XmlError(f"{file}: {file.stat().st_size / 1e6:.0f} MB; the description of {what} has at most 50")
         check_file(file, LARGEST_BYTES)
         data = file.read_bytes()
-    except FileNotFoundError:
-        raise XmlError(f"{file}: no such file; expected {what}") from None
-    except UntrustedError as error:
-        raise XmlError(f"{file}: {error}; expected {what}") from None
-    except OSError as error:
-        raise XmlError(f"{file}: cannot be read ({error.strerror}); expected {what}") from None
     return element_of(file, data), data
 
 

@@ -59,9 +59,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     for remark in measured.remarks:
         console.print(remark, highlight=False, markup=False)
     with SearchProgress(console, told) as progress:
-        progress("weighing the measurements", 0.0)
-        problem = way.make(measured, config).searched
-        progress("weighing the measurements", 1.0)
+        problem = way.searched(measured, config, progress)
         if problem.doubts:
             # It may decide everything, and a search takes minutes.
             progress.note(f"Before anything is believed: {problem.doubts}")

@@ -84,9 +84,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             )
         raise ConfigError(f"task.calibrate: there is no calibration for task.by={way.name}; use task.by={OpenLoop.way}")
     with SearchProgress(console, told) as progress:
-        progress("weighing the measurements", 0.0)
-        problem = way.make(measured, config).searched
-        progress("weighing the measurements", 1.0)
+        problem = way.searched(measured, config, progress)
         if problem.doubts:
             # It may decide everything, and a search takes minutes.
             progress.note(f"Before anything is believed: {problem.doubts}")

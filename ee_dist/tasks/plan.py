@@ -109,9 +109,7 @@ def run(config: Config, options: Options, out: Path) -> Plan:
     names = [name for name, _ in found.explanations[:MOST_TIED]]
     with SearchProgress(console) as progress:
         way = way_of(measured, found.way)
-        progress("weighing the measurements", 0.0)
-        problem = way.make(measured, found.config).searched
-        progress("weighing the measurements", 1.0)
+        problem = way.searched(measured, found.config, progress)
         tied = [terms for _, terms in found.explanations[:MOST_TIED]]
         if way.name == OpenLoop.way:
             known = contenders(problem, tied, progress)

@@ -10,6 +10,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.discrepancy.as_held import taken_in_steps, times_the_noise
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.search import Progress
 from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED
 from ee_dist.discrepancy.ways.force_balance.motion import motor_torques, torques_known
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
@@ -49,6 +50,13 @@ class Way:
             return self.build(measured, config)
         steps, held = (self.build(_as_held(measured, held), config) for held in (False, True))
         return steps if taken_in_steps(times_the_noise(steps), times_the_noise(held)) else held
+
+    def searched(self, measured: Measurements, config: Config, progress: Progress) -> Problem:
+        """What a search goes by, of the problem; that it takes a while is told in ``progress``."""
+        progress("weighing the measurements", 0.0)
+        problem = self.make(measured, config).searched
+        progress("weighing the measurements", 1.0)
+        return problem
 
     def as_read(self, measured: Measurements, config: Config, like: Problem) -> Problem:
         """The problem of other trials of the same robot, whose commands are taken as those of another problem are: one recording
