@@ -87,8 +87,9 @@ def compare(problem: Problem, residual: Array) -> Comparison:
 
 
 def trial_name(problem: Problem, trial: int) -> str:
-    """With its number: repeats have one name."""
-    return problem.trials[trial] if len(problem.trials) == 1 else f"{problem.numbers[trial]}. {problem.trials[trial]}"
+    """With its number, unless it is the only one of its log: repeats have one name."""
+    name, number = problem.trials[trial], problem.numbers[trial]
+    return name if len(problem.trials) == number == 1 else f"{number}. {name}"
 
 
 def of_all_regimes(regimes: Sequence[RegimeReport]) -> float:

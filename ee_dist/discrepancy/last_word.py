@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ee_dist.basics.names import listed
 from ee_dist.discrepancy.base_model import residual_as_it_is
+from ee_dist.discrepancy.compare import trial_name
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers, settled
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.effects.catalogue import Hypothesis
@@ -40,6 +41,11 @@ class LastWord:
         return not settled(self.left, self.after, self.floor)
 
     @property
+    def names(self) -> list[str]:
+        """The trials, as those that were fitted are called."""
+        return [trial_name(self.problem, k) for k in range(len(self.problem.trials))]
+
+    @property
     def lines(self) -> list[str]:
         """``others``, told as of these trials."""
         return [f"{HELD_APART}: {line[:1].lower()}{line[1:]}" for line in self.others]
@@ -50,8 +56,7 @@ class LastWord:
         told, worse = self.problem.told, self.after > WORSE * self.before
         improved = f"improved model {told(self.after)}, " if self.changed else ""
         text = (
-            f"{HELD_APART} ({listed(self.problem.trials)}): model {told(self.before)}, {improved}noise floor "
-            f"{told(self.floor)}."
+            f"{HELD_APART} ({listed(self.names)}): model {told(self.before)}, {improved}noise floor {told(self.floor)}."
         )
         if worse:
             return f"{text} There the improved model is the worse one: do not use it for such motions."

@@ -124,7 +124,7 @@ def load(config: Config) -> Measurements:
     read = tuple((file, run.metadata.get("seal", "")) for file, run in zip(files, runs, strict=True))
     kept, apart = divided(names, config.trials, config.held_out)
     trials, files = [trials[k] for k in kept], list(dict.fromkeys(of_file[k] for k in kept))
-    held_out = tuple(names[k].name for k in apart)
+    held_out = tuple(f"{names[k].number}. {names[k].name}" for k in apart)
     remarks = [_incomplete(file, run) for file, run in zip(files, runs, strict=True) if not run.complete]
     remarks += [line for run in runs for line in changed_sources(run.metadata)]
     real = [t for t in trials if t.real]

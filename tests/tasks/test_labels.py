@@ -20,9 +20,11 @@ from ee_dist.viewing.curves import Overlay
 
 
 def test_a_trial_is_told_from_its_repeat() -> None:
-    several, one = SimpleNamespace(trials=("sway", "sway"), numbers=(1, 2)), SimpleNamespace(trials=("sway",))
+    several = SimpleNamespace(trials=("sway", "sway"), numbers=(1, 2))
+    one, chosen = (SimpleNamespace(trials=("sway",), numbers=(number,)) for number in (1, 3))
     assert [trial_name(several, k) for k in range(2)] == ["1. sway", "2. sway"]  # type: ignore[arg-type]
     assert trial_name(one, 0) == "sway"  # type: ignore[arg-type]
+    assert trial_name(chosen, 0) == "3. sway", "there are others in its log"  # type: ignore[arg-type]
 
 
 def test_shares_of_next_to_nothing_are_not_told() -> None:
@@ -54,7 +56,7 @@ def test_what_only_makes_a_channel_rougher_is_shown_on_that_channel(monkeypatch:
     times = np.linspace(0, 1, 50)
     overlays = [Overlay(c, "sway", "rad", times, times, times, times, 1.0) for c in ("a", "b")]
     problem = SimpleNamespace(
-        channels=("a", "b"), segments=("sway@0.0s",), trials=("sway",), trial_of_segment=np.zeros(1, int),
+        channels=("a", "b"), segments=("sway@0.0s",), trials=("sway",), numbers=(1,), trial_of_segment=np.zeros(1, int),
         segment_of=np.zeros(4, int), channel_of=np.array([0, 1, 0, 1]), floor=np.ones(4),
         layout=SimpleNamespace(reading=np.array([True, True, False, False])),
     )  # fmt: skip

@@ -72,9 +72,9 @@ def test_no_trial_is_on_both_sides(only, held):
 
 @pytest.mark.parametrize(("after", "worse"), [(0.5, False), (1.0, False), (2.0, True)])
 def test_a_model_that_is_worse_there_is_called_so(after, worse):
-    problem = SimpleNamespace(trials=("jump",), told=lambda e: f"{e:g} mm")
+    problem = SimpleNamespace(trials=("jump",), numbers=(3,), told=lambda e: f"{e:g} mm")
     word = LastWord(problem, 1.0, after, 0.4, ((1.0, after),), (), True)  # type: ignore[arg-type]
     assert word.text.startswith(
-        f"Held out from all of it (jump): model 1 mm, improved model {after:g} mm, noise floor 0.4 mm."
+        f"Held out from all of it (3. jump): model 1 mm, improved model {after:g} mm, noise floor 0.4 mm."
     )
     assert ("is the worse one" in word.text) is worse

@@ -163,7 +163,7 @@ def test_what_is_held_out_from_all_of_it_decides_nothing_and_has_the_last_word(c
     page = (found / "report.html").read_text(encoding="utf-8")
     elsewhere = [line for line in improved["words"] if line.startswith("Held out from all of it: ")]
     assert bool(elsewhere) is (by != "force_balance") and all(line in html.unescape(page) for line in elsewhere)
-    assert "Held out from all of it" in page and "Held out from all of it (run2): model " in improved["words"][1]
+    assert "Held out from all of it" in page and "Held out from all of it (2. run2): model " in improved["words"][1]
 
     # The command to type next shows these trials with the model that was found; without it they are as they were before.
     words = shlex.split(said.out.strip().splitlines()[-1].removeprefix("Next: python -m ee_dist "))

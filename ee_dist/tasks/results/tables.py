@@ -130,7 +130,7 @@ def show_last_word(console: Console, word: LastWord | None) -> None:
 
 def last_word_rows(word: LastWord) -> tuple[list[str], list[list[str]]]:
     """Columns and rows: each trial, and under several of them all together."""
-    told, errors = word.problem.told, list(zip(word.problem.trials, word.by_trial, strict=True))
+    told, errors = word.problem.told, list(zip(word.names, word.by_trial, strict=True))
     if len(errors) > 1:
         errors.append(("all", (word.before, word.after)))
     rows = [[name, told(before), *([told(after)] if word.changed else [])] for name, (before, after) in errors]
