@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
+from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.evidence.worth import Worth
 from ee_dist.discrepancy.examine import Examined
@@ -73,6 +74,13 @@ class Improvement:
     twins: list[Twin] = field(default_factory=list)
     judged_on: str = ""
     all_rows: tuple[float, float] | None = None
+
+    @property
+    def refused(self) -> list[Judged]:
+        """What was tried and earned no place; not what was refused then, and came into the model another way later."""
+        here = {t.name for t in self.terms}
+        tried = [] if self.last is None else self.last.judged
+        return [c for c in tried if not c.earned and not {t.name for t in c.terms} <= here]
 
     @property
     def cuts(self) -> list[str]:

@@ -32,7 +32,7 @@ from ee_dist.tasks.measurements import Measurements, load, load_held_out, of_hel
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
 from ee_dist.tasks.results.commands import asked, command, planning
-from ee_dist.tasks.results.labels import step_phrase
+from ee_dist.tasks.results.labels import refused_heading, step_phrase
 from ee_dist.tasks.results.pages import improve_page
 from ee_dist.tasks.results.scenes import improve_scene
 from ee_dist.tasks.results.story import links
@@ -127,9 +127,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         improve_scene(problem, found, account, measured.model, out / "improve.rrd")
     show_ladder(console, problem, found)
     show_last_word(console, word)
-    if found.last is not None:
-        refused = [c for c in found.last.judged if not c.earned]
-        show_candidates(console, problem, refused, "Tried on top of it, and refused")
+    show_candidates(console, problem, found.refused, refused_heading(problem, found))
     show_account(console, account, out)
     return problem, found, account
 

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from ee_dist.discrepancy.compare import trial_name
-from ee_dist.effects.catalogue import Term
+from ee_dist.discrepancy.ladder import Improvement
+from ee_dist.effects.catalogue import Term, term
 from ee_dist.robots.quadruped import quadruped
 from ee_dist.tasks import trial
 from ee_dist.tasks.config import Config, EngineConfig, RobotConfig
 from ee_dist.tasks.results import sections
-from ee_dist.tasks.results.labels import excess_share
+from ee_dist.tasks.results.labels import excess_share, refused_heading
 from ee_dist.tasks.results.tables import candidate_label
 from ee_dist.viewing.curves import Overlay
 
@@ -25,6 +26,18 @@ def test_a_trial_is_told_from_its_repeat() -> None:
     assert [trial_name(several, k) for k in range(2)] == ["1. sway", "2. sway"]  # type: ignore[arg-type]
     assert trial_name(one, 0) == "sway"  # type: ignore[arg-type]
     assert trial_name(chosen, 0) == "3. sway", "there are others in its log"  # type: ignore[arg-type]
+
+
+def test_what_came_into_the_model_in_the_end_is_not_told_to_be_refused() -> None:
+    dry, load = term("coulomb_friction", "servo", torque_nm=0.2), term("load_friction", "servo", share=0.1)
+    tried = [SimpleNamespace(terms=(t,), earned=False, error_without=1.03) for t in (dry, load)]
+    found = Improvement.__new__(Improvement)
+    found.terms, found.last = (dry,), SimpleNamespace(judged=tried)  # type: ignore[assignment]
+    assert found.refused == tried[1:]
+    problem = SimpleNamespace(told=lambda e: f"{e:.3g}")
+    for error, said in ((1.03, "Tried on top of it, and refused"), (1.01, "Tried on the way to it, and refused")):
+        found.ladder = [SimpleNamespace(error_heldout=error)]  # type: ignore[list-item]
+        assert refused_heading(problem, found) == said  # type: ignore[arg-type]
 
 
 def test_shares_of_next_to_nothing_are_not_told() -> None:

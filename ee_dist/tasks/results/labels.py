@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from ee_dist.discrepancy.accounts.of_compare import CLOSE
 from ee_dist.discrepancy.compare import Comparison, RegimeReport
-from ee_dist.discrepancy.ladder import UNFITTED, Rung
+from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import percent, phrase, placed
 from ee_dist.trials.log import Array
@@ -39,6 +39,13 @@ def axis_of(problem: Problem) -> str:
 def step_name(r: Rung) -> str:
     """A step of the ladder: what was added, or, of the first, the model itself."""
     return placed(r.name) if r.added or r.held_out != UNFITTED else f"the {MODEL}"
+
+
+def refused_heading(problem: Problem, found: Improvement) -> str:
+    """What was refused was tried on the model of then, which other steps may have followed."""
+    last = problem.told(found.ladder[-1].error_heldout)
+    on_top = all(problem.told(c.error_without) == last for c in found.refused[:1])
+    return f"Tried {'on top of' if on_top else 'on the way to'} it, and refused"
 
 
 def step_phrase(r: Rung, problem: Problem) -> str:

@@ -16,7 +16,7 @@ from ee_dist.discrepancy.words import phrase, plain
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
 from ee_dist.tasks.results.glossary import TERMS
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, step_name
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, refused_heading, step_name
 from ee_dist.tasks.results.story import Link
 from ee_dist.tasks.results.values import kinds_of
 from ee_dist.trials.log import Array
@@ -131,9 +131,7 @@ def improve_page(
     _add(page, parts.signature_section(problem, found.base, after, tuple(added(found))))
     page.sections.append(parts.heat_section(problem, found.base, after))
     page.sections.append(_channels(problem, found.base, after))
-    if found.last is not None:
-        refused = [c for c in found.last.judged if not c.earned]
-        _add(page, parts.ranking_section(problem, refused, "Tried on top of it, and refused"))
+    _add(page, parts.ranking_section(problem, found.refused, refused_heading(problem, found)))
     return page
 
 

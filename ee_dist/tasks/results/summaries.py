@@ -206,7 +206,7 @@ def of_improvement(
             for t, entry in zip(found.twins, hypothesis_list(tuple(t.term for t in found.twins)), strict=True)
         ],
         "stopped": found.stopped,
-        "not_earned": [of_judged(problem, c) for c in (found.last.judged if found.last else []) if not c.earned],
+        "not_earned": [of_judged(problem, c) for c in found.refused],
         "left": of_left(found.left),
         "calibrated_away": [
             {
