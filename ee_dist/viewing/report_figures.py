@@ -23,6 +23,9 @@ BAR_ROOM = 56
 """Pixels above a map for the bar of its colours."""
 LOW = 0.15
 """Share of an axis below which there is no room for words."""
+NAME, SHORT, LETTERS = 18, 10, 150
+"""Letters of a line at a step of the ladder, at the most and at the least, and of all steps side by side: names that have no room
+are turned, and lie over each other."""
 FEWEST = 5
 """Points that a mean is drawn of."""
 _FONT = {"family": "Inter, Segoe UI, Helvetica Neue, Arial, sans-serif", "size": 12, "color": "#1d2733"}
@@ -197,6 +200,8 @@ def ladder(
     """Error of each model from the first to the last, and the noise floor. ``held_out``: what was held out of each; a line
     joins neighbours of which that was the same, and the model that was taken as it is."""
     figure, top = go.Figure(), 1.25 * max(max(heldout), floor)
+    width = min(NAME, max(SHORT, LETTERS // len(names)))
+    places = [wrapped(n, width) for n in names]
     # The model as it is was fitted to nothing, so that it goes with whatever comes next.
     same = [held_out[min(1, len(held_out) - 1)], *held_out[1:]]
     first = 0
@@ -204,7 +209,7 @@ def ladder(
         part = slice(first, first + len(list(steps)))
         first = part.stop
         figure.add_scatter(
-            x=[wrapped(n, 18) for n in names[part]],
+            x=places[part],
             y=list(heldout[part]),
             name="held out",
             legendgroup="held out",
@@ -218,7 +223,7 @@ def ladder(
         )
     # Above the other, and thinner: often both are the same.
     figure.add_scatter(
-        x=[wrapped(n, 18) for n in names], y=list(fit), name="fitted", mode="lines+markers", legendrank=1,
+        x=places, y=list(fit), name="fitted", mode="lines+markers", legendrank=1,
         line={"color": PREDICTED, "dash": "dot"}, marker={"size": 5},
     )  # fmt: skip
     # Below a line that is near the axis its words would lie on the numbers there.

@@ -11,6 +11,7 @@ from rich.console import Console
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung
 from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.tasks.results.labels import step_name, step_tick
 from ee_dist.tasks.results.tables import show_ladder
 from ee_dist.viewing.report_figures import ladder
 
@@ -58,3 +59,13 @@ def test_the_words_of_a_low_floor_do_not_lie_on_the_axis_and_no_curve_hides_the_
     assert words.text.startswith("noise floor") and (words.yanchor == "top") == below
     over = figure.data[-1]
     assert over.name == "fitted" and over.marker.size < figure.data[0].marker.size
+
+
+def test_many_effects_at_once_and_many_steps_have_short_names_at_the_axis() -> None:
+    many = Rung(" + ".join(f"zero_offset@joint_{k}" for k in range(10)), (), (), 1.0, 1.1, np.zeros(1), WINDOWS)
+    assert step_tick(many) == "zero offset at joint 0 and 9 more"
+    two = Rung("zero_offset@a + motor_weak@b", (), (), 1.0, 1.1, np.zeros(1), WINDOWS)
+    assert step_tick(two) == step_name(two) == "zero offset at a and motor weak at b"
+    names = [f"{k}. viscous friction at joint {k}" for k in range(10)]
+    (held, _) = ladder(names, [1.0] * 10, [1.1] * 10, [WINDOWS] * 10, 0.9).data
+    assert max(len(line) for name in held.x for line in name.split("<br>")) <= 15

@@ -41,6 +41,12 @@ def step_name(r: Rung) -> str:
     return placed(r.name) if r.added or r.held_out != UNFITTED else f"the {MODEL}"
 
 
+def step_tick(r: Rung) -> str:
+    """The same at an axis, where a dozen effects at once would lie over the names beside them."""
+    first, *more = r.name.split(" + ")
+    return step_name(r) if len(more) < 2 else f"{placed(first)} and {len(more)} more"
+
+
 def refused_heading(problem: Problem, found: Improvement) -> str:
     """What was refused was tried on the model of then, which other steps may have followed."""
     last = problem.told(found.ladder[-1].error_heldout)

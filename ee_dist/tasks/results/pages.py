@@ -16,7 +16,7 @@ from ee_dist.discrepancy.words import phrase, plain
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.results import sections as parts
 from ee_dist.tasks.results.glossary import TERMS
-from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, refused_heading, step_name
+from ee_dist.tasks.results.labels import IMPROVED, MODEL, axis_of, drawn, refused_heading, step_tick
 from ee_dist.tasks.results.story import Link
 from ee_dist.tasks.results.values import kinds_of
 from ee_dist.trials.log import Array
@@ -112,7 +112,7 @@ def improve_page(
     overlays = parts.curves(problem, found.base, models)
     page.proof = parts.proof_section(problem, overlays, found.base, models, after)
     if changed:
-        steps = [f"{k}. {step_name(r)}" if k else step_name(r) for k, r in enumerate(found.ladder)]
+        steps = [f"{k}. {step_tick(r)}" if k else step_tick(r) for k, r in enumerate(found.ladder)]
         figure = figures.ladder(
             steps,
             [drawn(problem, r.error_fit) for r in found.ladder],
