@@ -36,7 +36,7 @@ def compared(error: float, left: list[Leftover]) -> Account:
 def test_an_error_below_its_floor_gets_a_word() -> None:
     assert not [line for line in compared(1.05, []).lines if "below" in line or "within chance" in line]
     assert "The error is at the floor, within chance." in compared(0.98, []).lines
-    assert any(line.startswith("The error is below the floor: the noise was") for line in compared(0.9, []).lines)
+    assert any(line.startswith("The error is below the floor: there is less noise") for line in compared(0.9, []).lines)
 
 
 def test_a_small_error_is_no_agreement_where_a_channel_stands_out() -> None:
