@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import fftconvolve
 
 from ee_dist.trials.log import Array
 
@@ -45,6 +46,9 @@ class Lead:
 
 TOGETHER = 0.99
 """Correlation from which a lag that is shorter than a step can be told."""
+TOLD, ROUNDING = 4.0, 1e-9
+"""Times as much as at the best shift that the correlation must lack at those tried last for a lag to be told: what is left is
+twice as large there. And what rounding leaves of the first."""
 SMOOTHER = 0.05
 """What was planned has less than this share of the noise of what was measured, in fourth differences of which a fifth may be
 larger: a plan has corners."""
@@ -148,16 +152,45 @@ def lead(a: Array, b: Array, step_s: float) -> Lead:
 
 
 def lag(asked: Array, seen: Array, step_s: float) -> float | None:
-    """Seconds by which what was ``seen`` (T, J) is later than what was ``asked``, finer than a step: the share of the rate of the
-    one that the other lacks, in the middle of the joints; None where they do not go together that closely, or nothing moves."""
-    found = []
-    for k in lively(asked, seen):
-        x, y = asked[:, k] - asked[:, k].mean(), seen[:, k] - seen[:, k].mean()
-        rate = np.gradient(x, step_s)
-        if not np.isfinite(rate).all() or x @ y < TOGETHER * np.sqrt((x @ x) * (y @ y)):
-            continue
-        found.append(float((x - y) @ rate / (rate @ rate)))
-    return float(np.median(found)) if found else None
+    """Seconds by which what was ``seen`` (T, J) is later than what was ``asked`` (T, J), finer than a step: where the two go
+    together best, over shifts of half a second either way, in the middle of the joints. It is the same of goals that stay for
+    many rows as of smooth ones. None where no shift is the best, or nothing moves."""
+    most = min(round(LONGEST_LAG_S / step_s), len(asked) // 4)
+    columns = lively(asked, seen)
+    if most < 1 or not columns:
+        return None
+    fits = _correlations(asked[:, columns], seen[:, columns], most)
+    found = [p for p in (_peak(f) for f in fits.T) if p is not None]
+    return float(np.median(found) - most) * step_s if found else None
+
+
+def _correlations(x: Array, y: Array, most: int) -> Array:
+    """(2 * most + 1, J): correlation of the columns of ``x`` (T, J), read that much later from -most to most rows on, with the
+    middle rows of ``y`` (T, J), which are the same for all shifts: another piece of a motion has another correlation."""
+    x, y = x - x.mean(axis=0), y[most : len(y) - most]
+    y = y - y.mean(axis=0)
+    rows = len(y)
+    both = fftconvolve(x, y[::-1], mode="valid", axes=0)
+    sums, squares = (np.cumsum(np.concatenate([np.zeros((1, x.shape[1])), v]), axis=0) for v in (x, x * x))
+    spread = squares[rows:] - squares[:-rows] - (sums[rows:] - sums[:-rows]) ** 2 / rows
+    least = 1e-12 * (x * x).sum(axis=0)  # what rounding leaves of a piece that stands
+    size = np.sqrt(np.maximum(spread, least) * (y * y).sum(axis=0))
+    return np.asarray((both / np.where(size > 0, size, np.inf))[::-1])
+
+
+def _peak(fits: Array) -> float | None:
+    """Where a series of correlations is highest, finer than its places by a parabola; of those that fit alike the one nearest to
+    the middle. None where it is at an end, where it fits badly, or where the ends fit nearly as well: a ramp goes with itself
+    whenever it is read."""
+    peaks = [p for p in _peaks(fits) if 0 < p < len(fits) - 1]
+    if fits.max() < TOGETHER or not peaks:
+        return None
+    best = min(peaks, key=lambda p: abs(p - len(fits) // 2))
+    before, here, after = fits[best - 1 : best + 2]
+    if 1.0 - max(fits[0], fits[-1]) < TOLD * (1.0 - here) + ROUNDING or here < max(before, after):
+        return None
+    bend = 2.0 * here - before - after
+    return best + (0.5 * float((after - before) / bend) if bend > 0 else 0.0)
 
 
 def _lead(x: Array, y: Array, step_s: float, most: int) -> Lead:

@@ -74,6 +74,17 @@ def test_points_between_which_a_controller_goes_on_are_not_held(tmp_path: Path, 
     assert report.between == ("lines" if lines else "")
 
 
+def test_goals_that_stay_for_many_rows_are_held(tmp_path: Path) -> None:
+    """Stairs have a rate nowhere but at their edges: joints that come to each a fifth of a second late are not ahead of them."""
+    t, rng = np.arange(0, 10, 0.05), np.random.default_rng(0)
+    asked = np.repeat(np.linspace(0, [0.5, -0.4], 20), 10, axis=0)
+    seen = np.stack([np.interp(t - 0.25, t, c) for c in asked.T], axis=1) + rng.normal(scale=2e-4, size=asked.shape)
+    file = logs.written(tmp_path, logs.frame_of(t, seen, asked))
+    _, report = logs.imported(tmp_path, file)
+    assert not any("by straight lines from" in d or "points between which" in d for d in report.done)
+    assert any("commands held" in d for d in report.done)
+
+
 def test_what_one_trial_shows_goes_for_all(tmp_path: Path) -> None:
     """A trial so slow, or short, that it does not tell is led by the same controller."""
     files = [led(tmp_path, 0.001, "quick"), led(tmp_path, 0.001, "slow")]

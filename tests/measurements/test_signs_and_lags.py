@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import measurement_files as samples
@@ -10,7 +11,7 @@ import pytest
 import small_logs as logs
 
 from ee_dist.measurements.proposal.model import LIKELY, SURE
-from ee_dist.measurements.signals import derivative, lead
+from ee_dist.measurements.signals import derivative, lag, lead
 
 T = np.arange(1500) / 100
 
@@ -53,6 +54,38 @@ def test_who_is_led_over_a_network_is_a_second_late(late_s: float, found_s: floa
         return
     assert found.lead_s == pytest.approx(found_s, abs=step)
     assert found.correlation > 0.98 and found.slope == pytest.approx(1.0, abs=0.05)
+
+
+def goals_that_stay(s: np.ndarray) -> np.ndarray:
+    """Two joints led from goal to goal, each of which stays for 0.6 s."""
+    goals = np.cumsum(np.random.default_rng(1).standard_normal((40, 2)), axis=0)
+    return goals[np.clip(np.floor(s / 0.6).astype(int) + 5, 0, 39)]
+
+
+def smooth_course(s: np.ndarray) -> np.ndarray:
+    return np.stack([0.5 * np.sin(1.7 * s) + 0.2 * np.sin(4.1 * s), 0.4 * np.cos(2.3 * s)], axis=1)
+
+
+@pytest.mark.parametrize("course", [goals_that_stay, smooth_course])
+@pytest.mark.parametrize("late_s", [0.0, 0.03, 0.16, 0.3])
+def test_how_late_joints_are_is_the_same_of_goals_that_stay_as_of_a_smooth_course(
+    course: Callable[[np.ndarray], np.ndarray], late_s: float
+) -> None:
+    seen = course(T - late_s) + np.random.default_rng(0).normal(scale=1e-3, size=(len(T), 2))
+    assert lag(course(T), seen, 0.01) == pytest.approx(late_s, abs=0.001)
+
+
+def test_a_lag_of_a_smooth_course_is_told_finer_than_a_step() -> None:
+    assert lag(smooth_course(T), smooth_course(T - 0.003), 0.01) == pytest.approx(0.003, abs=2e-4)
+
+
+def test_no_lag_is_told_where_another_fits_nearly_as_well() -> None:
+    ramp = T[:, None]
+    stairs = np.floor(T / 0.9)[:, None]
+    assert lag(ramp, ramp - 0.2, 0.01) is None, "a ramp goes with itself whenever it is read"
+    assert lag(stairs, ramp / 0.9, 0.01) is None, "of a joint that creeps along stairs nothing tells"
+    assert lag(smooth_course(T), smooth_course(T - 0.9), 0.01) is None, "later than was tried"
+    assert lag(stairs[:3], ramp[:3], 0.01) is None and lag(0 * ramp, ramp, 0.01) is None
 
 
 def test_commands_of_a_single_sine_are_likely_and_as_they_stand(tmp_path: Path) -> None:
