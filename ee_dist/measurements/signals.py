@@ -47,8 +47,8 @@ class Lead:
 TOGETHER = 0.99
 """Correlation from which a lag that is shorter than a step can be told."""
 TOLD, ROUNDING = 4.0, 1e-9
-"""Times as much as at the best shift that the correlation must lack at those tried last for a lag to be told: what is left is
-twice as large there. And what rounding leaves of the first."""
+"""Times as much as the best correlation that another must lack to be told from it: what is left there is twice as large. And what
+rounding leaves of the first."""
 SMOOTHER = 0.05
 """What was planned has less than this share of the noise of what was measured, in fourth differences of which a fifth may be
 larger: a plan has corners."""
@@ -134,18 +134,19 @@ def speed_and_change(position: Array, speed: Array, step_s: float) -> tuple[Arra
     return pair if len(speed) < 4 * width else (pair[0][width:-width], pair[1][width:-width])
 
 
-def lead(a: Array, b: Array, step_s: float) -> Lead:
+def lead(a: Array, b: Array, step_s: float, asked: bool = False) -> Lead:
     """By how much ``a`` (T, J) runs ahead of ``b`` (T, J), over shifts of half a second either way, or two where the best is at
     the end of these and another is better. Of shifts that fit alike the one that turns the fewest signs is taken, then the
-    shortest. Joints that hardly move do not count."""
+    shortest. Joints that hardly move do not count. ``asked``: the first is called what was asked for, which leads where that fits
+    as well: goals that come evenly along a slope go with a joint an interval earlier as with one that is late."""
     columns = lively(a, b)
     near, far = (min(round(longest / step_s), len(a) // 3) for longest in (LONGEST_LAG_S, LONGER_LAG_S))
     if not columns or near < 1:
         return Lead(0.0, 0.0, 0.0)
-    found = _lead(a[:, columns], b[:, columns], step_s, near)
+    found = _lead(a[:, columns], b[:, columns], step_s, near, asked)
     if abs(found.lead_s) < AT_THE_END * near * step_s or far == near:
         return found
-    other = _lead(a[:, columns], b[:, columns], step_s, far)
+    other = _lead(a[:, columns], b[:, columns], step_s, far, asked)
     at_end = abs(other.lead_s) >= AT_THE_END * far * step_s
     better = 1.0 - abs(other.correlation) <= BETTER * (1.0 - abs(found.correlation))
     return other if better and not at_end else found
@@ -179,27 +180,43 @@ def _correlations(x: Array, y: Array, most: int) -> Array:
 
 
 def _peak(fits: Array) -> float | None:
-    """Where a series of correlations is highest, finer than its places by a parabola; of those that fit alike the one nearest to
-    the middle. None where it is at an end, where it fits badly, or where the ends fit nearly as well: a ramp goes with itself
-    whenever it is read."""
-    peaks = [p for p in _peaks(fits) if 0 < p < len(fits) - 1]
-    if fits.max() < TOGETHER or not peaks:
+    """Where a series of correlations is highest, finer than its places by a parabola. Of those that fit alike, as with goals that
+    come evenly, the first from the middle on: nothing is ahead of what it is told. None where it fits badly, or other shifts on
+    both sides of it do not fit worse: a ramp goes with itself whenever it is read."""
+    if fits.max() < TOGETHER:
         return None
-    best = min(peaks, key=lambda p: abs(p - len(fits) // 2))
+    middle = len(fits) // 2
+    best = min(_tops(fits), key=lambda p: (p < middle - 1, abs(p - middle)), default=0)
+    if not 0 < best < len(fits) - 1 or any(_alike(side.min(), fits[best]) for side in (fits[:best], fits[best + 1 :])):
+        return None
     before, here, after = fits[best - 1 : best + 2]
-    if 1.0 - max(fits[0], fits[-1]) < TOLD * (1.0 - here) + ROUNDING or here < max(before, after):
-        return None
     bend = 2.0 * here - before - after
     return best + (0.5 * float((after - before) / bend) if bend > 0 else 0.0)
 
 
-def _lead(x: Array, y: Array, step_s: float, most: int) -> Lead:
+def _tops(fits: Array) -> list[int]:
+    """Places that are no lower than their neighbours and fit as the highest does; an end is none."""
+    inner = fits[1:-1]
+    top = (inner >= fits[:-2]) & (inner >= fits[2:])
+    return [int(p) for p in np.flatnonzero(top) + 1 if _alike(fits[p], fits.max())]
+
+
+def _alike(fit: float, best: float) -> bool:
+    """Whether what a correlation lacks is not much more than what the best one lacks."""
+    return bool(1.0 - fit < TOLD * (1.0 - best) + ROUNDING)
+
+
+def _lead(x: Array, y: Array, step_s: float, most: int, asked: bool) -> Lead:
     """The same of joints that move (T, J), over so many rows either way."""
     stride = max(1, most // 100)
     shifts = sorted({*range(-most, most + 1, stride), 0})
     fits = np.stack([_shifted(x, y, k) for k in shifts])
-    peaks = _peaks(np.abs(fits).mean(axis=1))
+    scores = np.abs(fits).mean(axis=1)
+    peaks = _peaks(scores)
     best = min(peaks, key=lambda i: (int((fits[i] < AGAINST).sum()), abs(shifts[i])))
+    if asked and shifts[best] < 0:
+        ahead = [p for p in _tops(scores) if shifts[p] >= 0 and scores[p] >= scores.max() - AS_GOOD]
+        best = max(ahead, key=lambda p: scores[p], default=best)
     k = shifts[best]
     p, q = (x[: len(x) - k], y[k:]) if k >= 0 else (x[-k:], y[:k])
     # A joint mounted the other way round must not take away from what the others say.

@@ -20,6 +20,8 @@ WITHIN = 1.15
 """while its command stays within its reach, times this, as no number in another unit would,"""
 ASKED = 0.01
 """and goes through more than this share of it."""
+ROUNDING = 1e-9
+"""Share of the largest reading below which two that differ are one."""
 
 
 def stands_still(asked: Array, seen: Array, reach: float) -> bool:
@@ -28,6 +30,15 @@ def stands_still(asked: Array, seen: Array, reach: float) -> bool:
     return bool(
         moved < PART * way and moved < REST * reach and way > ASKED * reach and np.abs(asked).max() <= WITHIN * reach
     )
+
+
+def step_of(readings: Array) -> float:
+    """The step in which readings (T,) come, as those of an encoder do: the least by which one differs from the one before it. 0
+    of what never changes; NaN are no readings."""
+    read = readings[np.isfinite(readings)]
+    changes = np.abs(np.diff(read))
+    changes = changes[changes > ROUNDING * np.abs(read).max(initial=0.0)]
+    return float(changes.min(initial=math.inf)) if len(changes) else 0.0
 
 
 def reach_of(joint: Joint) -> float:

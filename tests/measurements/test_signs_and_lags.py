@@ -88,6 +88,37 @@ def test_no_lag_is_told_where_another_fits_nearly_as_well() -> None:
     assert lag(stairs[:3], ramp[:3], 0.01) is None and lag(0 * ramp, ramp, 0.01) is None
 
 
+def follower(asked: np.ndarray, step_s: float, slow_s: float, dead_rows: int) -> np.ndarray:
+    """What a joint does that comes to what it is told (T,) with a time constant, so many rows later."""
+    seen = np.zeros_like(asked)
+    for i in range(1, len(asked)):
+        seen[i] = seen[i - 1] + (asked[max(0, i - 1 - dead_rows)] - seen[i - 1]) * (1 - np.exp(-step_s / slow_s))
+    return seen
+
+
+@pytest.mark.parametrize("slow_s", [0.05, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("dead_rows", [0, 2, 4])
+def test_goals_that_come_evenly_go_with_a_joint_an_interval_earlier_too(slow_s: float, dead_rows: int) -> None:
+    step = 0.05
+    stairs = np.floor(np.arange(0, 4.5, step) / 0.5 + 1e-9) + 1
+    seen = follower(stairs, step, slow_s, dead_rows)
+    late = lag(stairs[:, None], seen[:, None], step)
+    assert late is None or late > 0.03
+    assert lead(stairs[:, None], seen[:, None], step, asked=True).lead_s > 0
+
+
+def test_of_goals_that_come_evenly_what_is_asked_for_leads() -> None:
+    t = np.arange(0, 4.5, 0.05) + 1e-9
+    stairs, seen = (np.floor((t + early) / 0.5)[:, None] for early in (0.0, 0.2))
+    assert lead(stairs, seen, 0.05).lead_s == pytest.approx(-0.2)
+    assert lead(stairs, seen, 0.05, asked=True).lead_s == pytest.approx(0.3), "0.2 s before the next is 0.3 s behind this"
+
+
+def test_what_is_asked_for_and_comes_late_is_not_turned_to_lead() -> None:
+    asked = smooth_course(T - 0.2)
+    assert lead(asked, smooth_course(T), 0.01, asked=True).lead_s == pytest.approx(-0.2, abs=0.011)
+
+
 def test_commands_of_a_single_sine_are_likely_and_as_they_stand(tmp_path: Path) -> None:
     sine = lambda t: np.sin(8.8 * t)[:, None] * [0.4, 0.3]  # noqa: E731
     file = logs.written(tmp_path, logs.frame_of(T, sine(T - 0.035), sine(T)))

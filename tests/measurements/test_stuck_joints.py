@@ -17,7 +17,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.measurements.proposal.torque_scale import _in_thousandths
-from ee_dist.measurements.standing import told_to_rest
+from ee_dist.measurements.standing import step_of, told_to_rest
 from ee_dist.robots.describe import load_robot
 
 JOINTS = ("shoulder", "elbow", "wrist")
@@ -93,3 +93,25 @@ def test_what_nobody_moved_is_one_line_and_nothing_to_suspect(tmp_path: Path) ->
     still = {"elbow": np.full(9, 0.1), "wrist": np.full(9, 0.2)}
     robot, _ = load_robot(samples.robot_file(tmp_path, JOINTS))
     assert not told_to_rest(robot, np.zeros((9, 3)), still)
+
+
+@pytest.mark.parametrize("names", ["{joint}_{what}_deg", "{joint}_{what}"])
+def test_what_rounding_left_of_a_goal_that_stays_tells_nothing_of_units(tmp_path: Path, names: str) -> None:
+    """An encoder reads the sway of a held joint in its steps, and its goal follows that by a hundred thousandth of a degree."""
+    asked = np.degrees(frame().filter(like="goal").to_numpy())
+    sway = np.round(np.sin(1.7 * T) / 0.09) * 0.09 * 0.15
+    step = 360 / 4096
+    seen = np.round(np.stack([*(np.interp(T - 0.05, T, c) for c in asked[:, :2].T), sway], axis=1) / step) * step
+    asked[:, 2] = 1e-4 * sway
+    table = logs.frame_of(T, seen, asked, names, JOINTS)
+    _, proposal = logs.proposed(tmp_path, logs.written(tmp_path, table), JOINTS)
+    assert not proposal.questions
+    told = {c.name: c.entry for c in proposal.choices if c.group == "commands"}
+    assert {(e or {}).get("unit") for e in told.values()} == {"deg"} and not any(
+        "sign" in (e or {}) for e in told.values()
+    )
+
+
+def test_the_step_of_an_encoder_is_the_least_change_of_what_it_reads() -> None:
+    assert step_of(np.array([0.0, 0.5, 0.25, np.nan, 0.25, 1.0])) == 0.25
+    assert step_of(np.array([1.0, 1.0 + 1e-12, 1.0])) == 0.0 and step_of(np.full(4, np.nan)) == 0.0

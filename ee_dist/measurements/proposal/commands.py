@@ -12,12 +12,12 @@ from ee_dist.measurements import signals
 from ee_dist.measurements.proposal.blocks import Block
 from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice
 from ee_dist.measurements.proposal.speeds import speed_units
+from ee_dist.measurements.proposal.still_commands import allowed_units, held, standing_still, stated_unit
 from ee_dist.measurements.proposal.torque_scale import torque_units
 from ee_dist.measurements.proposal.units import LOOSE, UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE, VOLTAGES, read_name, tokens
 from ee_dist.measurements.robot_channels import command_kinds
-from ee_dist.measurements.standing import reach_of, stands_still
 from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
 
@@ -226,20 +226,21 @@ def _position_command_units(v: View, b: Block) -> UnitChoice:
     against: list[str] = []
     unshown: list[int] = []
     short: dict[str, float] = {}
-    still = [] if values is None else _standing_still(v, values)
+    still = [] if values is None else standing_still(v, values)
+    told_to_stay = held(v, b)
     shift = round(ahead.lead_s / v.step(v.position.block))
     for k, base in enumerate(v.units.entries):
         entry = dict(base)
-        stated = b.units[k] if b.units and b.units[k] in ("rad", "deg", "mrad", "turn", "m", "mm", "cm") else None
+        stated = stated_unit(b, k)
         x, y = values[:, [k]] if values is not None else None, v.position.block.values[:, [k]]
-        if x is not None and k not in still and signals.moves(x) and signals.moves(y):
+        if x is not None and k not in still and k not in told_to_stay and signals.moves(x) and signals.moves(y):
             r = (
                 signals.relation(x[: len(x) - shift], y[shift:])
                 if shift >= 0
                 else signals.relation(x[-shift:], y[:shift])
             )
             if abs(r.correlation) > 0.8:
-                allowed = ("rad", "deg", "turn") if v.joints[k].kind == "hinge" else ("m", "mm", "cm")
+                allowed = allowed_units(v, k)
                 unit = str(base["unit"])
                 seen = by_ratio(r.slope, allowed, unit) if "scale" not in base else unit
                 if seen is None and by_ratio(r.slope, allowed[:2], unit, LOOSE) == unit:
@@ -306,20 +307,6 @@ def _as_the_others(v: View, entries: list[dict[str, Any]], still: list[int]) -> 
         units = {e["unit"] for i, e in enumerate(entries) if i not in still and v.joints[i].kind == v.joints[k].kind}
         if len(units) == 1 and "scale" not in entries[k]:
             entries[k]["unit"] = units.pop()
-
-
-def _standing_still(v: View, values: Array) -> list[int]:
-    """Joints that do next to nothing of what they are asked for, in the unit of the positions or in that of the others."""
-    seen, found = v.metric(), []
-    relations = signals.each(values, v.position.block.values)
-    followed = signals.lively(values, v.position.block.values)
-    for k, e in enumerate(v.units.entries):
-        like = [abs(relations[i].slope) for i in followed if i != k and v.joints[i].kind == v.joints[k].kind]
-        asked = values[:, k] / (float(np.median(like)) if like and min(like) > 0 else 1.0)
-        asked = (e.get("scale", 1.0) * asked + e.get("offset", 0.0)) * UNITS[str(e["unit"])][1]
-        if stands_still(asked, seen[:, k], reach_of(v.joints[k])):
-            found.append(k)
-    return found
 
 
 def _as_speed_command(v: View, b: Block) -> Scored | None:

@@ -161,7 +161,7 @@ class View:
         values = self.on(measured, command)
         if values is None:
             return signals.Lead(0.0, 0.0, 0.0)
-        return signals.lead(values, measured.values, self.step(measured))
+        return signals.lead(values, measured.values, self.step(measured), bool(command.reading.command))
 
     def planned_beside(self, plan: Block, measured: Block) -> bool:
         """Whether one block is smooth where the other, beside it in one table, carries noise."""
