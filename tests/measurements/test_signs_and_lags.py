@@ -111,7 +111,9 @@ def test_of_goals_that_come_evenly_what_is_asked_for_leads() -> None:
     t = np.arange(0, 4.5, 0.05) + 1e-9
     stairs, seen = (np.floor((t + early) / 0.5)[:, None] for early in (0.0, 0.2))
     assert lead(stairs, seen, 0.05).lead_s == pytest.approx(-0.2)
-    assert lead(stairs, seen, 0.05, asked=True).lead_s == pytest.approx(0.3), "0.2 s before the next is 0.3 s behind this"
+    assert lead(stairs, seen, 0.05, asked=True).lead_s == pytest.approx(0.3), (
+        "0.2 s before the next is 0.3 s behind this"
+    )
 
 
 def test_what_is_asked_for_and_comes_late_is_not_turned_to_lead() -> None:

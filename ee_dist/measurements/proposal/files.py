@@ -15,7 +15,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.not_recorded import recorded_in
 from ee_dist.measurements.proposal.by_sensor import tilt_of
 from ee_dist.measurements.proposal.layouts import put_together
-from ee_dist.measurements.proposal.model import Hints, Proposal
+from ee_dist.measurements.proposal.model import FEWEST_ROWS, Hints, Proposal
 from ee_dist.measurements.proposal.of_all_trials import tell_of_all_trials
 from ee_dist.measurements.proposal.one_by_one import behind_one_another, one_by_one
 from ee_dist.measurements.proposal.stated import add_stated
@@ -40,7 +40,8 @@ def gathered(
     """One trial to look at, and into ``proposal_head`` what the mapping must say to get all: ``tables`` or ``side_by_side`` for
     trials of several files, ``one_joint_each`` for trials of one joint, ``split`` for several trials of one file; into ``notes``
     what is left out, into ``places`` where columns stood that not all trials have. Raises MeasurementError."""
-    first = read(files[0])[0]
+    several = read(files[0])
+    first = several[0]
     if len(first.tables) == 1 and (single := one_by_one(files, joints, hints)) is not None:
         proposal_head[single.key] = dict(single.shapes)
         _tell_left(single.others, notes)
@@ -71,8 +72,26 @@ def gathered(
         if together is not None:
             raise together
     if len(first.tables) == 1:
-        return _first_of_split(first, proposal_head)
+        return _first_of_split(_long_enough(files, several, notes), proposal_head)
     return first
+
+
+def _long_enough(files: Sequence[Path], several: Sequence[Recorded], notes: list[str]) -> Recorded:
+    """The first trial of one table with enough rows to tell what its columns are, of those with the same columns as the first of
+    ``several``, the trials of the first file; that one where none has. Into ``notes`` what was passed over."""
+    columns = several[0].tables[0].columns.keys()
+    short: list[tuple[str, int]] = []
+    for k, file in enumerate(files):
+        trials = read(file) if k else several
+        alike = [t for t in trials if len(t.tables) == 1 and t.tables[0].columns.keys() == columns]
+        if found := next((t for t in alike if len(t.tables[0]) >= FEWEST_ROWS), None):
+            if short:
+                rows = "; ".join(f"{name}: {count} rows" for name, count in short[:MOST_SHOWN])
+                more = f" and {len(short) - MOST_SHOWN} more" if len(short) > MOST_SHOWN else ""
+                notes.append(f"looked at {file.name}, since too few rows tell nothing of columns ({rows}{more})")
+            return found
+        short += [(f"{file.name} {t.name}" if len(trials) > 1 else file.name, len(t.tables[0])) for t in alike]
+    return several[0]
 
 
 def _tell_left(others: Sequence[Path], notes: list[str]) -> None:
@@ -199,7 +218,7 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
     places: dict[str, float] = {}
     recorded = gathered(files, head, hints, robot.motor_names, notes, places)
     if len(recorded.tables) > 1 and "tables" not in head:  # what is named as a file is to be named at each channel
-        shown = [t for t in recorded.tables if len(t) > 20]
+        shown = [t for t in recorded.tables if len(t) >= FEWEST_ROWS]
         recorded = replace(recorded, tables=tuple(shown) or recorded.tables)
     proposal = propose(recorded, robot, hints)
     proposal.head = head | proposal.head

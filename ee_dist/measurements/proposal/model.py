@@ -10,6 +10,8 @@ SURE, LIKELY, UNKNOWN = "sure", "likely", "unknown"
 SHARE = "percent"
 FIT = "fit"
 """Instead of gains: to be estimated from what the motion needs by the model."""
+FEWEST_ROWS = 21
+"""Rows that are needed to tell what columns are."""
 UNITS_TO_ASK = ("rad", "deg", "m", "mm", SHARE)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.measurements.proposal.blocks import BY_NAME, BY_SENSOR, Block, in_full, series_of
 from ee_dist.measurements.proposal.by_sensor import said_of_base
-from ee_dist.measurements.proposal.model import UNKNOWN, Choice
+from ee_dist.measurements.proposal.model import FEWEST_ROWS, UNKNOWN, Choice
 from ee_dist.measurements.proposal.other_names import other_names
 from ee_dist.measurements.proposal.units import counts
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
@@ -83,7 +83,13 @@ def ask_for_positions(v: View) -> None:
     ranked = ranked_positions(v)
     n = len(v.joints)
     names = ", ".join(v.robot.motor_names)
-    if len(ranked) > 1 and ranked[0].score >= 2:
+    if all(len(t) < FEWEST_ROWS for t in v.timed.tables):
+        rows = max(len(t) for t in v.timed.tables)
+        v.out.ask(
+            f"{rows} rows are too few to tell what columns are (at least {FEWEST_ROWS}): name a longer record of the same "
+            "columns with it, or write the mapping by hand"
+        )
+    elif len(ranked) > 1 and ranked[0].score >= 2:
         v.out.ask(f"positions: {ranked[0].block.name} or {ranked[1].block.name}? write the right one into the mapping")
     elif v.hints.joints is None and (some := _recorded(v)):
         rest = [m for m in v.robot.motor_names if m not in some]

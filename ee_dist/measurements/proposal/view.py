@@ -22,7 +22,7 @@ from ee_dist.measurements.proposal.blocks import (
     joint_in,
     joint_words,
 )
-from ee_dist.measurements.proposal.model import LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
+from ee_dist.measurements.proposal.model import FEWEST_ROWS, LIKELY, SURE, UNKNOWN, Choice, Hints, Proposal
 from ee_dist.measurements.proposal.time import TimeChoice
 from ee_dist.measurements.proposal.units import UnitChoice
 from ee_dist.measurements.proposal.words import POSITION, SPEED
@@ -79,7 +79,7 @@ class View:
         known = {n: t.column for n, t in self.times.items() if t.column is not None}
         known |= {t.name: t.clock for t in self.recorded.tables if t.clock is not None}
         found = blocks_of(self.timed, self.robot.motor_names, self.hints.joints, known, self.robot.sensors)
-        return [self.even(_going_on(b)) for b in found if len(b.values) > 20]
+        return [self.even(_going_on(b)) for b in found if len(b.values) >= FEWEST_ROWS]
 
     def driven(self) -> View:
         """The same without passive joints, which take no commands; its blocks are those not used yet."""
