@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import fnmatch
+from collections.abc import Container, Sequence
 from collections.abc import Mapping as AnyMapping
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.errors import MeasurementError, nearest
 from ee_dist.measurements.led import Led
-from ee_dist.measurements.looking import Looked, repeats
+from ee_dist.measurements.looking import Looked, repeats, units_shown
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.not_recorded import Stood, with_those_that_stood
 from ee_dist.measurements.on_grid import OnGrid
@@ -51,12 +51,16 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
     paces: dict[str, float] = {}
     for each in begun:
         paces |= {k: v for k, v in each.on.paces().items() if k not in paces}
-    found = [each.run(paces) for each in begun]
+    several = len(begun) > 1
+    shown = {unit for each in begun for unit in each.sensors(paces)}
+    found = [each.run(shown, several) for each in begun]
     if any(each.led.goes_on for each in begun):
         # One controller leads all trials: of a slow one only others tell how it goes from point to point.
         for i, each in enumerate(begun):
             if not each.led.goes_on:
-                found[i] = _Import(each.recorded, mapping, robot, i, each.stood, goes_on=True).run(paces)
+                again = _Import(each.recorded, mapping, robot, i, each.stood, goes_on=True)
+                again.sensors(paces)
+                found[i] = again.run(shown, several)
     names = [report.trial for _, report in found]
     for i, setting in enumerate(mapping.settings):
         for wanted in setting.trials:
@@ -83,12 +87,19 @@ class _Import:
         self.on = OnGrid(recorded, mapping, robot, self.report)
         self.led = Led(self.on, mapping, robot, goes_on)
 
-    def run(self, paces: AnyMapping[str, float]) -> tuple[TrialRecord, Report]:
-        """``paces``: seconds between readings by table, of the trials in which that shows. Raises MeasurementError."""
+    def sensors(self, paces: AnyMapping[str, float]) -> set[str]:
+        """Reads the sensors, and returns the units of positions that they show. ``paces``: seconds between readings by table, of
+        the trials in which that shows. Raises MeasurementError."""
         self.on.at_paces(paces)
         self.report.done += told_of(self.on.clocks, self.on.read_at)
         self.report.suspicious += holes_told(self.on.empty, self.on.clocks)
-        positions = self._sensors()
+        self.positions = self._sensors()
+        return units_shown(self.robot, self.mapping, self.channels)
+
+    def run(self, shown: Container[str], several: bool) -> tuple[TrialRecord, Report]:
+        """The rest, once the sensors are read. ``shown``: the units of positions that some trial shows; ``several``: whether
+        there are others, so that a refusal names this one. Raises MeasurementError."""
+        positions = self.positions
         self.report.suspicious += repeats(self.robot, self.mapping, self.on.clocks, self.on.paces())
         torques = self.led.torques()
         commands = self.led.commands(torques, positions)
@@ -105,7 +116,7 @@ class _Import:
             joints = np.stack([positions[m] for m in self.robot.motor_names], axis=1)
         looked = Looked(
             self.robot, self.mapping, self.channels, commands, torques, joints, self.on.step_s, self.report.rate_read_hz,
-            max(self.on.paces().values(), default=0.0),
+            max(self.on.paces().values(), default=0.0), shown, self.report.trial if several else "",
         )  # fmt: skip
         self.report.suspicious += looked.found()
         log = SensorLog(

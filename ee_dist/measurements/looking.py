@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.clocks import Clocked
 from ee_dist.measurements.commanded import (
     beside_their_commands,
@@ -69,6 +70,10 @@ class Looked:
     rate_read_hz: float
     every_s: float = 0.0
     """From one reading of the sensors to the next, where rows between them were filled in; 0: every row is one."""
+    shown: Container[str] = ()
+    """Units of positions that some trial shows (see ``units_shown``): where a joint stands still they are not doubted."""
+    trial: str = ""
+    """Its name, for a refusal; "" of one alone."""
 
     def found(self) -> Iterator[str]:
         """A line for everything that looks wrong."""
@@ -102,24 +107,13 @@ class Looked:
             self.channels[sensor.name],
             self.mapping.sensors[sensor.name],
         )
-        unit = self._declared(sensor)
-        if any(
-            self._declared(s) == unit and not self._hardly_moves(s) for s in self.robot.sensors if s.kind == "position"
-        ):
-            # Columns of one log have one unit, and another shows it.
+        unit = _declared(self.mapping, sensor)
+        if unit in self.shown or unit in units_shown(self.robot, self.mapping, self.channels):
+            # Columns of one log have one unit, as trials of one mapping have, and another shows it.
             unit = sensor.unit
         yield from self._judged(unit_suspicion(sensor.name, at, *joint.ends, sensor.unit, unit), column)
         for words in told(joint, float(at.min()), float(at.max()), sensor.noise):
             yield f"{sensor.name}: {words}: is the description's zero another one, or its stop elsewhere?"
-
-    def _declared(self, sensor: Sensor) -> str:
-        """The unit that the mapping says a position is in."""
-        column = self.mapping.sensors[sensor.name]
-        return column.unit if isinstance(column, Column) and column.scale == 1 else sensor.unit
-
-    def _hardly_moves(self, sensor: Sensor) -> bool:
-        ends = self.robot.joint(sensor.target).ends
-        return not all(map(math.isfinite, ends)) or hardly_moves(self.channels[sensor.name], *ends, sensor.unit)
 
     def _tilt(self, sensor: Sensor) -> Iterator[str]:
         at = self.channels[sensor.name]
@@ -189,10 +183,29 @@ class Looked:
             return
         note, certain = flaw
         if certain and not (isinstance(column, Column) and column.sure):
+            where = f"trial {quoted(self.trial)}: " if self.trial else ""
             raise MeasurementError(
-                f"{self.mapping.source}: {note}; if it is right as it stands, add 'sure: true' to it"
+                f"{self.mapping.source}: {where}{note}; if it is right as it stands, add 'sure: true' to it"
             )
         yield note
+
+
+def units_shown(robot: Robot, mapping: Mapping, channels: AnyMapping[str, Array]) -> set[str]:
+    """The units that positions are said to be in of which one at least moves as a joint does: what is small in one unit may be a
+    motion in another. ``channels`` (T,) by sensor are in the robot's units."""
+    found = set()
+    for s in robot.sensors:
+        if s.kind == "position":
+            ends = robot.joint(s.target).ends
+            if all(map(math.isfinite, ends)) and not hardly_moves(channels[s.name], *ends, s.unit):
+                found.add(_declared(mapping, s))
+    return found
+
+
+def _declared(mapping: Mapping, sensor: Sensor) -> str:
+    """The unit that the mapping says a position is in."""
+    column = mapping.sensors[sensor.name]
+    return column.unit if isinstance(column, Column) and column.scale == 1 else sensor.unit
 
 
 def movers(robot: Robot, positions: AnyMapping[str, Array], least: float = SHAKES) -> set[str]:

@@ -51,6 +51,8 @@ LEAST_ROUND = 0.005
 """rad (m) that the round of an encoder has at least: of a motor's behind a gear of a thousand."""
 ROLLS, MOST_ROLLS = 0.85, 0.1
 """Share of where a position is by which it jumps as it begins anew, and at what share of all rows at most."""
+BRIEFEST_S = 0.1
+"""What a record of a motion lasts at least."""
 CLOCKS, MOST_APART = 1.03, 15.0
 """Times as long as another that a clock lasts from which one of the two is wrong, and up to which they tell of the same thing."""
 
@@ -104,8 +106,8 @@ def spike_suspicion(name: str, commands: Array) -> str | None:
 
 
 def time_suspicion(median_s: float, length_s: float, declared: str) -> str | None:
-    """Whether the time column looks as if its unit were another one."""
-    if median_s >= 0.5:
+    """Whether the time column looks as if its unit were another one, in which it is a record that somebody would keep."""
+    if median_s >= 0.5 and length_s >= 1e3 * BRIEFEST_S:
         return (
             f"time: a row every {median_s:g} s and {length_s:g} s in all: is the column in ms rather than {declared!r}?"
         )

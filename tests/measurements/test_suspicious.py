@@ -93,6 +93,7 @@ def test_goals_that_rest_where_they_go_are_not_clipped(tmp_path: Path, way_s: fl
 
 def test_units_and_signs() -> None:
     assert "ms" in str(time_suspicion(5.0, 30000, "s"))
+    assert time_suspicion(0.55, 5.0, "s") is None, "nobody keeps 5 ms of a motion"
     assert "deg" in str(unit_suspicion("x", 57 * WAVE, -1.5, 1.5, "rad"))
     assert "swapped sign" in str(speed_suspicion("w", -2 * np.cos(2 * T), WAVE, 0.01))
     assert "another unit" in str(speed_suspicion("w", 114 * np.cos(2 * T), WAVE, 0.01))
