@@ -72,12 +72,12 @@ def lively(*blocks: Array) -> list[int]:
     found = set(range(blocks[0].shape[1]))
     for values in blocks:
         spans = np.array([float(np.ptp(c)) if moves(c) else 0.0 for c in values.T])
-        usual = _usual(spans)
-        found &= {k for k, span in enumerate(spans) if span > 0 and span >= HARDLY * usual}
+        least = HARDLY * usual(spans)
+        found &= {k for k, span in enumerate(spans) if span > 0 and span >= least}
     return sorted(found)
 
 
-def _usual(spans: Array) -> float:
+def usual(spans: Array) -> float:
     """How far joints move: the median of those that do; of seven of which two are driven, beside which the median hardly moves,
     how far those go from which half of all motion comes."""
     if not (spans > 0).any():

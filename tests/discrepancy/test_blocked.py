@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from way_samples import samples
+from way_samples import samples, two_joint_arm
 
 from ee_dist.discrepancy.blocked import blocked
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import SensorLog
+from ee_dist.trials.noise import with_noise
 
 STEP_S = 0.02
 ROBOT: Robot = samples()["pendulum"].robot
@@ -80,6 +81,50 @@ def test_a_joint_that_never_stood_beyond_where_it_comes_to_rest_is_not_told() ->
     told = np.interp(t, [0, 1, 2, 4, 5, 6, 7, 8], [0.4, 0.4, -0.15, -0.15, 0.4, -0.5, 0.4, 0.4])
     read = np.interp(t, [0, 1.2, 2.2, 4.2, 5.2, 6.2, 7.2, 8], [0.4, 0.4, 0.02, 0.02, 0.4, -0.45, 0.4, 0.4])
     assert blocked([trial(f"again {k}", told, read) for k in range(2)], ROBOT) == []
+
+
+def rests(at: tuple[float, ...], size: float, noise: float = 0.0) -> np.ndarray:
+    """What a joint reads that comes to rest at these places (shares of ``size``), for a second each, in 20 ms rows."""
+    t = np.arange(0.0, len(at), STEP_S)
+    read = np.interp(t, [x for k in range(len(at)) for x in (k, k + 0.9)], np.repeat(at, 2)) * size
+    return np.asarray(read + noise * np.random.default_rng(0).standard_normal(len(t)))
+
+
+SHORT = (0.5, 1.0, 0.5, 0.98, 0.5, 1.0)
+"""A joint that is told 1.0 all the time comes to rest in the middle three times, and there at others."""
+
+
+def test_a_joint_that_is_led_nowhere_is_held_by_nothing() -> None:
+    """Friction and a soft controller leave it short of where it is told to stay."""
+    read = rests(SHORT, 0.3, 3e-4)
+    told = np.full(len(read), 0.3)
+    assert blocked([trial("stays", told, read)], ROBOT) == []
+    told[:10] = -0.1
+    assert blocked([trial("led", told, read)], ROBOT), "led there from farther than it is behind"
+
+
+def test_a_joint_that_only_sways_with_others_is_held_by_nothing() -> None:
+    """By a step or two of its encoder, while another moves a hundred times as far."""
+    robot = with_noise(two_joint_arm(), 2e-4)
+    step = 2 * np.pi / 4096  # of an encoder
+    sway = np.round(rests(SHORT, 4 * step) / step) * step
+    told = np.full(len(sway), 4 * step)
+    told[:10] = -step
+    found = []
+    for size in (1.0, 0.0):
+        wide = size * np.interp(np.arange(len(sway)), [0, len(sway)], [-0.6, 0.6])
+        read = {"shoulder": wide, "elbow": sway}
+        commands = np.stack([wide, told], axis=1)
+        log = SensorLog(
+            times_s=STEP_S * np.arange(len(sway)),
+            sensors=np.stack([read[s.target] if s.kind == "position" else 0 * sway for s in robot.sensors], axis=1),
+            commands=commands,
+            sensor_names=robot.sensor_names,
+            sensor_units=tuple(s.unit for s in robot.sensors),
+            motor_names=robot.motor_names,
+        )
+        found.append(blocked([MeasuredTrial("arm", log, commands_held=True)], robot))
+    assert found[0] == [] and len(found[1]) == 1, "the same of a joint that does all that is done"
 
 
 def test_where_a_slow_joint_turns_back_nothing_held_it() -> None:
