@@ -29,7 +29,7 @@ from ee_dist.measurements.standing import told_to_rest
 from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.measurements.trials import trials_of
 from ee_dist.recording.records import HARDWARE, TrialRecord
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import Array, SensorLog
 
 
@@ -159,6 +159,7 @@ class _Import:
                 self.channels[name] = self.on.column(column, sensors[name].unit, name, touch, reading=not touch)
                 if sensors[name].kind == "position":
                     positions[sensors[name].target] = self.channels[name]
+        alike: dict[LowPass, list[tuple[str, str]]] = {}
         for name, column in self.mapping.sensors.items():
             if isinstance(column, Estimated):
                 if column.speed_of not in self.channels:
@@ -170,10 +171,11 @@ class _Import:
                 self.channels[name] = low_pass.speed(self.channels[column.speed_of], self.on.step_s)
                 values = self.channels[name]
                 self.report.ranges[name] = (float(values.min()), float(values.max()), sensors[name].unit)
-                self.report.done.append(
-                    f"{name}: estimated from {column.speed_of}, to be seen and not compared: central "
-                    f"differences behind a {low_pass}"
-                )
+                alike.setdefault(low_pass, []).append((name, column.speed_of))
+        self.report.done += [
+            f"{_estimated(of, sensors)}, to be seen and not compared: central differences behind a {low_pass}"
+            for low_pass, of in alike.items()
+        ]
         return positions
 
     def _tell_of_rest(self, commands: Array, positions: AnyMapping[str, Array]) -> None:
@@ -210,3 +212,10 @@ class _Import:
                 "expected a number"
             )
         return float(entry) * value.scale
+
+
+def _estimated(of: Sequence[tuple[str, str]], sensors: AnyMapping[str, Sensor]) -> str:
+    """Which speeds were estimated from which positions (the names of both channels), those of one filter in one line."""
+    if len(of) == 1:
+        return "{}: estimated from {}".format(*of[0])
+    return f"speeds of {len(of)} joints ({listed(sensors[speed].target for speed, _ in of)}): estimated from their positions"

@@ -17,6 +17,7 @@ from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.measurements.proposal.torque_scale import _in_thousandths
+from ee_dist.measurements.report import Report
 from ee_dist.measurements.standing import step_of, told_to_rest
 from ee_dist.robots.describe import load_robot
 
@@ -43,14 +44,26 @@ def test_it_is_a_remark_and_the_unit_is_that_of_the_others(tmp_path: Path, unit:
 
 
 def mapped(tmp_path: Path, table: pd.DataFrame, joints: tuple[str, ...], **commands: str) -> list[str]:
+    return reported(tmp_path, table, joints, **commands).suspicious
+
+
+def reported(
+    tmp_path: Path,
+    table: pd.DataFrame,
+    joints: tuple[str, ...],
+    cutoffs: tuple[float, ...] = (20, 20, 20),
+    **commands: str,
+) -> Report:
     logs.written(tmp_path, table)
     robot, _ = load_robot(samples.robot_file(tmp_path, joints))
     sensors: dict[str, Any] = {f"position_{j}": {"column": f"{j}_pos", "unit": "rad"} for j in joints}
-    sensors |= {f"velocity_{j}": {"speed_of": f"position_{j}", "cutoff_hz": 20} for j in joints}
+    sensors |= {
+        f"velocity_{j}": {"speed_of": f"position_{j}", "cutoff_hz": hz} for j, hz in zip(joints, cutoffs, strict=False)
+    }
     told = {j: {"column": f"{j}_goal", "unit": commands.get(j, "rad")} for j in joints}
     raw = {"time": {"column": "time", "unit": "s"}, "sensors": sensors, "commands": told}
     ((_, report),) = import_files([tmp_path / "log.csv"], mapping_of(raw, tmp_path / "map.yaml"), robot)
-    return report.suspicious
+    return report
 
 
 @pytest.mark.parametrize("share", [1 / 700, 1 / 57.3])
@@ -110,6 +123,28 @@ def test_what_rounding_left_of_a_goal_that_stays_tells_nothing_of_units(tmp_path
     assert {(e or {}).get("unit") for e in told.values()} == {"deg"} and not any(
         "sign" in (e or {}) for e in told.values()
     )
+
+
+@pytest.mark.parametrize(
+    ("cutoffs", "said"),
+    [
+        ((20, 20, 20), ["speeds of 3 joints (shoulder, elbow, wrist): estimated from their positions"]),
+        (
+            (20, 10, 20),
+            [
+                "speeds of 2 joints (shoulder, wrist): estimated from their positions",
+                "velocity_elbow: estimated from position_elbow",
+            ],
+        ),
+    ],
+)
+def test_speeds_that_are_estimated_alike_are_one_line(
+    tmp_path: Path, cutoffs: tuple[float, ...], said: list[str]
+) -> None:
+    report = reported(tmp_path, frame(wrist=1.0), JOINTS, cutoffs)
+    lines = [d for d in report.done if "estimated from" in d]
+    assert [d.partition(", to be seen and not compared: central differences behind")[0] for d in lines] == said
+    assert all(f"order 4, {hz} Hz" in d for d, hz in zip(lines, cutoffs, strict=False))
 
 
 def test_the_step_of_an_encoder_is_the_least_change_of_what_it_reads() -> None:
