@@ -32,6 +32,9 @@ from ee_dist.effects import stamps  # noqa: F401
 # isort: split
 from ee_dist.effects import integral  # noqa: F401
 
+# isort: split
+from ee_dist.effects import duration  # noqa: F401
+
 __all__ = [
     "CATALOGUE",
     "Effect",

@@ -1,7 +1,7 @@
 """The drive path: from command to joint torque, for a whole batch at once and the same for every engine.
 
-    command -> delay -> gain -> velocity limit -> controller (of position, with deadband and zero offset, of speed, or none; the
-            speed that it knows may be a law's)
+    command -> delay -> gain -> profile of the goal -> controller (of position, with deadband and zero offset, of speed, or
+            none; the speed that it knows may be a law's)
             -> motor (torque limit, back-EMF, strength, supply)
             -> transmission (backlash, compliance) -> joint (spring, offset, a user's own laws, friction, brake, stops)
 

@@ -57,7 +57,7 @@ def run(rollouts: Sequence[Rollout], bodies: Bodies) -> list[SensorLog]:
     drive = DrivePath(robots, dt, bodies.gives)
     goals = _goals(rollouts)
     if goals is not None:
-        drive.goals.at, drive.goals.pace = goals[:, 0].copy(), np.nan_to_num(goals[:, 1])
+        drive.goals.go_on(goals)
     sensing = SensingPath(robots, dt, steps, [r.seed for r in rollouts])
     scales = per_robot(robots, scaling)
     control = Controllers(robots, [r.driver for r in rollouts], per_robot(robots, command_scaling), steps)
@@ -176,13 +176,13 @@ def by_shape(
 
 
 def _goals(rollouts: Sequence[Rollout]) -> Array | None:
-    """(B, 2, M) how far controllers with limits of their own have led their goals, and how fast these go; not a number where they
-    begin at their joints."""
+    """(B, 4, M) what controllers with limits of their own know of the past (``State.goals``); not a number where they begin at
+    their joints."""
     known = [None if r.start is None else r.start.goals for r in rollouts]
     if all(g is None for g in known):
         return None
     return np.stack(
-        [np.full((2, len(r.model.drives)), np.nan) if g is None else g for r, g in zip(rollouts, known, strict=True)]
+        [np.full((4, len(r.model.drives)), np.nan) if g is None else g for r, g in zip(rollouts, known, strict=True)]
     )
 
 

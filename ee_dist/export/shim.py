@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-STOP_SHARE, GOVERNED = 0.5, 0.9
+STOP_SHARE, GOVERNED, SAME = 0.5, 0.9, 1e-9
 LOAD_LIMIT, GEAR_LIMIT, LIGHTEST_ROTOR = 2.0, 3.0, 0.05
 TOUCHING, LIFTED = 1.0, -1.0
 
@@ -69,6 +69,7 @@ class Shim:
         self.motor_at: Any = None
         self.goal: Any = None
         self.pace: Any = 0.0
+        self.left, self.told = zero.copy(), np.full(len(self.joints), np.nan)
         self.before: Any = None
         self.side, self.carried, self.motor_speed = zero.copy(), zero.copy(), zero.copy()
         self.delay = Delay(d["delay_s"], self.dt) if d["delay_s"].any() else None
@@ -106,6 +107,7 @@ class Shim:
         """What the limits of the controllers let through: goals set out from where the joints stand."""
         top, by_position = self.d["command_speed"], self.kinds == "position"
         goal = self.goal if self.goal is not None and enabled > 0 else q
+        wanted = self._in_time(wanted, goal, by_position, enabled)
         step = top * self.dt
         there = np.where(by_position, np.clip(wanted, goal - step, goal + step), np.clip(wanted, -top, top))
         eased = np.isfinite(self.d["command_acceleration"]) & by_position
@@ -117,6 +119,16 @@ class Shim:
         self.goal = np.where(eased, goal + self.pace * self.dt, there)
         limited = eased | (np.isfinite(top) & (by_position | (self.kinds == "speed")))
         return np.where(limited, self.goal, wanted)
+
+    def _in_time(self, wanted: Array, goal: Array, by_position: Array, enabled: float) -> Array:
+        """Where goals go that take a set time to each that is new: evenly, and anew whenever it changes."""
+        lasts = self.d["command_duration"]
+        timed = (lasts > 0) & by_position
+        anew = ~(np.abs(wanted - self.told) <= SAME) | (enabled <= 0)
+        left, self.told = np.where(anew, lasts, self.left), np.where(anew, wanted, self.told)
+        share = np.where(left > self.dt, self.dt / np.maximum(left, self.dt), 1.0)
+        self.left = np.maximum(left - self.dt, 0.0)
+        return np.where(timed & (left > self.dt), goal + (wanted - goal) * share, wanted)
 
     def _motor(
         self, wanted: Array, at: Array, turning: Array, ahead: Array, supply_v: float | None, enabled: float

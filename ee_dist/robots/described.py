@@ -244,7 +244,7 @@ def _drive(name: str, entry: Mapping[str, Any], found: Mapping[str, float | str]
     command = str(entry.get("command", found.get("command", "position")))
     if command in ("position", "speed") and "kp" not in numbers:
         raise RobotError(f"{here}: expected at least 'kp' (torque per {command} error), or 'command: torque'")
-    for only in ("command_acceleration", "feed_forward"):
+    for only in ("command_acceleration", "command_duration", "feed_forward"):
         if command != "position" and only in numbers:
             raise RobotError(f"{here}: {only} is of controllers of positions, and this one's command is {command}")
     if "torque_limit" not in numbers:

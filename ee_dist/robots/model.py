@@ -143,6 +143,9 @@ class Drive:
     command_acceleration: float = float("inf")
     """Acceleration limit of a controller of positions, rad/s^2: how fast the goal to which it leads its joint gathers speed, and
     loses it again before it arrives (a trapezoidal profile)."""
+    command_duration: float = 0.0
+    """Time that a controller of positions takes to each new goal, s: it leads its joint there evenly, from where it has led it so
+    far, and begins anew whenever the goal changes (a time-based profile). 0: at once."""
     # -- what may be wrong or missing (neutral values); for a slide read m for rad and N for N.m --
     strength: float = 1.0
     current_gain: float = 1.0  # torque of the motor over what is read off its current

@@ -20,6 +20,7 @@ DRIVE: dict[str, Bounds] = dict.fromkeys(DRIVE_NUMBERS, AT_LEAST_0) | {
     "speed_limit": (1e-12, math.inf),
     "command_speed": (1e-12, math.inf),
     "command_acceleration": (1e-12, math.inf),
+    "command_duration": (0.0, 60.0),
     "current_gain": (1e-3, 1e3),
     "strength": (0.0, 100.0),
     "command_gain": (-100.0, 100.0),

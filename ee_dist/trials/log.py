@@ -148,8 +148,8 @@ class SensorLog:
 @dataclass(frozen=True, eq=False)
 class State:
     """Where a rollout starts. joints, speeds: (M,) in the order of the robot's drives; base: pose (7,), twist (6,); goals
-    (2, M): how far controllers with limits of their own have led their goals, and how fast these go; where they stand if
-    None."""
+    (4, M): how far controllers with limits of their own have led their goals, how fast these go, in how many seconds they arrive
+    where that takes a set time, and where; they begin where the joints stand if None."""
 
     joints: Array
     speeds: Array

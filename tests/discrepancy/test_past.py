@@ -32,7 +32,8 @@ def test_a_goal_under_a_limit_goes_on_from_window_to_window(monkeypatch: pytest.
     assert right < 1.5 * windows().noise_floor()[0]
     assert error(windows().residuals([()])[0]) > 10 * right
     model = apply(ROBOT, [SLOW])
-    monkeypatch.setattr(Past, "goals", lambda self, _: np.stack([self.joints[self.begin], 0.0 * self.joints[0]]))
+    none = np.full((3, len(ROBOT.drives)), np.nan)
+    monkeypatch.setattr(Past, "goals", lambda self, _: np.concatenate([self.joints[[self.begin]], none]))
     windows().evaluator.close()
     forgetful = FreeRun(windows().measured, model, evaluator_for(ROBOT), windows_s=0.5)
     assert error(forgetful.residuals([()])[0]) > 5 * right

@@ -28,6 +28,7 @@ CONTROLLERS = {
     "deadband",
     "command_speed",
     "command_acceleration",
+    "command_duration",
 }
 
 

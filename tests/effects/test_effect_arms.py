@@ -216,6 +216,7 @@ def test_effects_act_where_the_kind_of_command_has_them() -> None:
         ("deadband", ()),
         ("command_speed", ("elbow",)),
         ("command_acceleration", ()),
+        ("command_duration", ()),
         ("speed_gain", ()),
         ("motor_weak", ("elbow",)),
         ("command_gain", ("elbow",)),

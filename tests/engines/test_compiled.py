@@ -72,13 +72,16 @@ def test_friction(robots: int, motors: int, loaded: bool, begun: bool, seed: int
 def test_goals_under_limits(robots: int, motors: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape = (robots, motors)
-    by_position, led, eased = (rng.random((3, *shape)) < 0.7)[:]
+    by_position, led, eased, timed = (rng.random((4, *shape)) < 0.7)[:]
     top, most = (np.where(rng.random(shape) < 0.7, rng.uniform(0.1, 9, shape), np.inf) for _ in range(2))
     wanted, q, pace = rng.normal(size=(3, *shape))
     at = np.where(rng.random(shape) < 0.8, rng.normal(size=shape), np.nan)
     closed = rng.integers(0, 2, shape).astype(float)
-    arrays = [wanted, q, closed, at, pace, np.empty(shape)]
-    assert_same_bits(goals._lead, [by_position, led, eased & by_position & np.isfinite(most), top, most, 0.01, *arrays])
+    left, lasts = rng.uniform(0, 0.05, (2, *shape))
+    told = np.where(rng.random(shape) < 0.5, wanted, rng.normal(size=shape))
+    kinds = [by_position, led, eased & by_position & np.isfinite(most), timed & by_position]
+    arrays = [wanted, q, closed, at, pace, left, told, np.empty(shape)]
+    assert_same_bits(goals._lead, [*kinds, top, most, lasts, 0.01, *arrays])
 
 
 @settings(max_examples=30, deadline=None)

@@ -293,7 +293,9 @@ def test_the_page_says_what_becomes_of_each_effect() -> None:
     assert all(f"| {name} |" in tool["table"]() for name in CATALOGUE)
 
 
-@pytest.mark.parametrize("limit", [{"command_speed": 0.2}, {"command_acceleration": 0.2}], ids=str)
+@pytest.mark.parametrize(
+    "limit", [{"command_speed": 0.2}, {"command_acceleration": 0.2}, {"command_duration": 0.5}], ids=str
+)
 def test_the_limits_of_controllers_are_in_the_shim(limit: dict[str, float]) -> None:
     slow = replace(BENCH, drives=tuple(replace(d, **limit) for d in BENCH.drives))
     assert needs_shim(slow, "mjcf") and not needs_shim(BENCH, "mjcf")

@@ -425,7 +425,7 @@ def test_controllers_may_keep_to_the_velocity_limits_of_the_file() -> None:
     bare = replace(body, joints=tuple(replace(j, top_speed=math.inf) for j in body.joints))
     with pytest.raises(RobotError, match="velocity_limits: obeyed: the file states none"):
         robot_of_body(bare, {"drives": drives, "velocity_limits": "obeyed"}, "arm.yaml")
-    for only in ("command_acceleration", "feed_forward"):
+    for only in ("command_acceleration", "command_duration", "feed_forward"):
         by_torque = drives | {"shoulder": {"command": "torque", "torque_limit": 3.0, only: 2.0}}
         with pytest.raises(RobotError, match=f"{only} is of controllers of positions"):
             robot_of_body(body, {"drives": by_torque}, "arm.yaml")
