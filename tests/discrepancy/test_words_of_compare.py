@@ -10,10 +10,11 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
 
-def compared(error: float, left: list[Leftover]) -> Account:
+def compared(error: float, left: list[Leftover], there: float | None = None) -> Account:
+    """``there``: the error of the worst channel, where it is another than that of the model."""
     found = SimpleNamespace(
         error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={},
-        channels=[SimpleNamespace(name="a_b", normalised=error), SimpleNamespace(name="command_b", normalised=0.0)],
+        channels=[SimpleNamespace(name="a_b", normalised=there or error), SimpleNamespace(name="command_b", normalised=0.0)],
 
         unsure=[],
     )  # fmt: skip
@@ -54,3 +55,11 @@ def test_what_is_next_is_said_once_and_among_the_words() -> None:
 
 def test_times_the_floor_are_those_of_the_errors_that_are_told() -> None:
     assert "9 times what noise alone would leave" in compared(3.0, []).headline, "the way tells squares"
+
+
+def test_the_worst_channel_is_told_with_its_own_error() -> None:
+    """The error of the model is over all channels."""
+    assert compared(12.9, [], 25.0).headline.startswith(
+        "The model is off, most of all at a b (25.0 there): error 12.9 in all, "
+    )
+    assert compared(12.9, []).headline.startswith("The model is off, most of all at a b: error 12.9, ")

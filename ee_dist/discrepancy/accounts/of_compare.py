@@ -43,12 +43,16 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     else:
         # The largest error, or, where the errors are all small, the place that noise explains least.
         place = left[0].channel if left and ratio < CLOSE else found.channels[0].name if found.channels else ""
-        where = f", most of all at {plain(place)}" if place else ""
+        own = next((problem.told(c.normalised) for c in found.channels if c.name == place), off)
+        # The place has an error of its own: that of the model is over all channels.
+        alone = own == off
+        where = f", most of all at {plain(place)}{'' if alone else f' ({own} there)'}" if place else ""
         how = "The model is nearly right, and more than noise is left" if ratio < CLOSE else "The model is off"
         least = problem.natural(found.noise_floor)
         times = _times(problem.natural(found.error) / least) if least else "far more than"
         in_noise = problem.natural_unit == TIMES_NOISE
-        head = f"{how}{where}: {problem.natural_name} {off}{'' if in_noise else f', {times} what noise alone would leave'}."
+        head = f"{how}{where}: {problem.natural_name} {off}{'' if alone else ' in all'}"
+        head += "." if in_noise else f", {times} what noise alone would leave."
     floor = problem.told(found.noise_floor)
     error = f"{error_name(problem)}: model {off}, noise floor {floor}."
     # A channel that agrees to the last digit is a command that no sensor comes into: there is nothing to compare.
