@@ -62,6 +62,31 @@ def test_what_does_better_and_does_not_go_first_is_told() -> None:
     assert "1 does better, by more numbers where nothing was guessed (a)" in _rivals(9, (), "", ["a"], True)
 
 
+def test_what_is_the_best_and_more_is_told_where_the_table_has_it_above() -> None:
+    """It is no other explanation, and yet nobody may read that none does as well above a row that does better."""
+    problem = rotors()
+    found = explain(problem, candidates(problem.robot, only=["rotor_factor", "rotor_inertia"]))
+    best = found.best
+    assert best is not None
+    more = replace(best.proposal, parts=(*best.proposal.parts, candidate(problem.robot, "rotor_inertia", "shoulder")))
+    fuller = replace(best, proposal=more, error_heldout=0.9 * best.error_heldout, rank=2, tied_with=[])
+    found = replace(found, examined=replace(found.examined, judged=[best, fuller]))
+    best.tied_with = []
+    named = "rotor factor at all joints and rotor inertia at shoulder"
+    said = explain_account(problem, found, None).sure
+    assert f"explanations no other does as well but itself with more beside it ({named});" in said
+    best.tied_with = ["a@b"]
+    assert (
+        f"1 other does as well, and so does itself with more beside it ({named});"
+        in explain_account(problem, found, None).sure
+    )
+    best.tied_with = []
+    for other in (replace(fuller, error_heldout=0.99999 * best.error_heldout), replace(fuller, why_not="luck")):
+        found.examined.judged[1] = other
+        said = explain_account(problem, found, None).sure
+        assert "no other does as well;" in said, "the table shows no lesser error, or that it was refused"
+
+
 def test_a_factor_on_rotors_is_proposed_only_where_unequal_ones_were_guessed() -> None:
     names = {c.effect.name for c in candidates(rotors(marked=False).robot)}
     assert "rotor_inertia" in names and "rotor_factor" not in names

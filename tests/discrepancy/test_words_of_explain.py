@@ -33,6 +33,8 @@ def test_what_looks_the_same_is_named(tied: list[str], said: str) -> None:
 def test_a_rest_above_the_noise_is_no_contradiction_where_nothing_is_left() -> None:
     assert "; what it leaves of that stands out nowhere. Of 9" in account([], 0.66).sure
     assert "leaves" not in account([], 0.99).sure
+    assert account([], 0.66).headline.endswith("Nothing else stands out.")
+    assert account([], 0.99).headline.endswith("Nothing else is left above the noise.")
 
 
 def test_that_no_motion_tried_helps_is_not_that_none_does() -> None:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 from account_samples import made_up
 
-from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.accounts.of_improve import ON_ITS_OWN, improve_account
 from ee_dist.discrepancy.evidence.intervals import NEUTRAL, ParameterReport
 from ee_dist.discrepancy.finished import BETTER, EXPLAINED
 from ee_dist.discrepancy.ladder import Twin
@@ -22,6 +22,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
     problem = made_up()
     for verdict, share, said in (
         (EXPLAINED, 1.0, "Nothing else is left above the noise."),
+        (EXPLAINED, 0.59, "Nothing else stands out."),
         (BETTER, 0.9979, "More than noise is left on motions that were not fitted: 99.7 % of"),
     ):
         found = SimpleNamespace(
@@ -33,6 +34,7 @@ def test_a_headline_says_no_more_than_the_verdict() -> None:
         assert account.headline.endswith(said) or said in account.headline
         assert not account.planner, "nothing is tied"
         assert account.good is (verdict == EXPLAINED) and ("Nothing" in account.headline) is account.good
+    assert ON_ITS_OWN in account.lines, "compare is what it leads on to"
     rung.alternatives = [(SimpleNamespace(name="speed_limit@each of 3 joints"), ())]
     found.ladder = [start, rung]
     assert improve_account(problem, found, "plan it").first[-1].endswith(" plan it")  # type: ignore[arg-type]

@@ -28,6 +28,7 @@ SPREAD = (
 NOISE = "sensor_noise"
 THAT_NOISE = "What is left there is this noise itself."
 NOTHING_ELSE = "Nothing else is left above the noise."
+NOTHING_STANDS_OUT = "Nothing else stands out."
 NOTHING_APART = "nothing is left above the noise"
 BEYOND = "Nothing else is left beyond what may be noise."
 CONTENT = (
@@ -161,6 +162,12 @@ def before_and_after(problem: Problem, before: float, after: float, floor: float
     what = f"{error_name(problem)}{f' on {on}' if on else ''}"
     told = problem.told
     return f"{what}: model {told(before)}, improved model {told(after)}, noise floor {told(floor)}."
+
+
+def nothing_else(explained: float, near: bool = True) -> str:
+    """That nothing is left, in a headline, where no curve stands out. Only where so much of what is above the noise is
+    ``explained`` that nobody asks for the rest, and the error is ``near`` the floor, is nothing left above the noise."""
+    return NOTHING_ELSE if near and not unexplained_rest(explained, True) else NOTHING_STANDS_OUT
 
 
 def unexplained_rest(explained: float, settled: bool) -> str:

@@ -12,7 +12,6 @@ from ee_dist.discrepancy.accounts.account import (
     CONTENT,
     MEND,
     NO_MOTION_TRIED,
-    NOTHING_ELSE,
     SEVERAL,
     THAT_NOISE,
     TWINS,
@@ -27,6 +26,7 @@ from ee_dist.discrepancy.accounts.account import (
     left_beside_noise,
     left_text,
     listed_few,
+    nothing_else,
     slower,
     tie_text,
     unexplained_rest,
@@ -54,7 +54,6 @@ NAMED = 3
 """Terms whose intervals are told in a sentence, and values of a model that moved."""
 MOVED = 0.02
 """Share of its range by which one must have moved for that."""
-NOTHING_STANDS_OUT = "Nothing else stands out."
 
 
 def moved(found: Explanation, robot: Robot) -> str:
@@ -118,8 +117,7 @@ def explain_account(
         begins = "Not what was assumed" if guessed else "Too much" if less else "Missing"
         head = f"{begins}{', among other things' if rest else ''}: "
         head += f"{_what(found, best, robot)}{_twins(best, more, bool(rest))}."
-        nothing = NOTHING_ELSE if last <= SETTLED * found.noise_floor else NOTHING_STANDS_OUT
-        nothing = BEYOND if unsure else nothing
+        nothing = BEYOND if unsure else nothing_else(best.explained, last <= SETTLED * found.noise_floor)
         head += " More than noise is left with it." if rest else f" {THAT_NOISE if found.left else nothing}"
         error = before_and_after(problem, found.baseline_error, best.error_heldout, found.noise_floor)
         sure = f"How sure: it explains {taken_off(best)}{unexplained_rest(best.explained, not found.left)}. "
@@ -128,7 +126,8 @@ def explain_account(
         others = [c for c in looked_at if c.earned and c.name not in best.tied_with]
         better = [c for c in others if float(c.held.sum()) < float(best.held.sum())]
         by_more = all(c.proposal.size > best.proposal.size for c in better)
-        rivals = _rivals(found.tried, best.tied_with, more, [c.name for c in better], by_more)
+        beside = [c.name for c in found.candidates if _told_better(problem, c, best)]
+        rivals = _rivals(found.tried, best.tied_with, more, [c.name for c in better], by_more, beside)
         sure += f"{rivals}{unsure_of(unsure)}{values}."
         advice = slower(unsure) if unsure else MEND if entry.mistake else ""
         lines.append(f"{guessed_text(best.terms)}{_still(problem)}" if guessed else entry.physics)
@@ -234,17 +233,31 @@ def _told_to_move(commands: Array) -> bool:
     return len(known) > 0 and float(np.ptp(known)) > 0
 
 
-def _rivals(tried: int, tied: Sequence[str], more: str, better: Sequence[str], by_more: bool) -> str:
-    """``better``: what leaves less of what was held out, and does not go first for all that it says; ``by_more`` numbers."""
+def _told_better(problem: Problem, c: Judged, best: Judged) -> bool:
+    """Whether a candidate is the best and more, and the table of candidates has it with a lesser error."""
+    less = c.error_heldout < best.error_heldout and problem.told(c.error_heldout) != problem.told(best.error_heldout)
+    return less and c.earned and contains(c, best)
+
+
+def _rivals(
+    tried: int, tied: Sequence[str], more: str, better: Sequence[str], by_more: bool, beside: Sequence[str] = ()
+) -> str:
+    """``better``: what leaves less of what was held out, and does not go first for all that it says; ``by_more`` numbers.
+    ``beside``: what is the best and more, and leaves less: no other explanation, and yet above it by its error."""
     of = f"Of {counted(tried, 'explanation')}"
     told_of = f" ({listed_few(tied)})" if len(tied) > TWINS else ""  # fewer are in the headline
     as_well = f"{more}{len(tied)} other{'s do' if len(tied) > 1 else ' does'} as well{told_of}"
+    itself = f"itself with more beside it ({listed_few(beside)})"
     if better:
         do = "do" if len(better) > 1 else "does"
         how = "by more numbers where nothing was guessed" if by_more else "where nothing was guessed"
         said = f"{of} {len(better)} {do} better, {how} ({listed_few(better)})"
-        return f"{said}, and {as_well}" if tied else said
-    return f"{of} {as_well}" if tied else f"{of} no other does as well"
+        said += f", and {as_well}" if tied else ""
+    elif tied:
+        said = f"{of} {as_well}"
+    else:
+        return f"{of} no other does as well{f' but {itself}' if beside else ''}"
+    return f"{said}, and so does {itself}" if beside else said
 
 
 def _counted_right(confidence: float | None, way: str) -> str:

@@ -10,7 +10,6 @@ from ee_dist.discrepancy.accounts.account import (
     BEYOND,
     CONTENT,
     MEND,
-    NOTHING_ELSE,
     STUCK,
     TWINS,
     Account,
@@ -22,6 +21,7 @@ from ee_dist.discrepancy.accounts.account import (
     held_out_notes,
     left_text,
     listed_few,
+    nothing_else,
     slower,
     tie_text,
     unexplained_rest,
@@ -57,6 +57,10 @@ from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
 NOTHING_BEYOND = "nothing is left that counts beyond what may be noise"
+ON_ITS_OWN = (
+    "Compare may tell another error and floor of this model on the same trials: it holds nothing out, and weighs by the model "
+    "that it is given."
+)
 EACH = "each of "
 NAMED = 3
 """Effects that a headline names."""
@@ -132,6 +136,7 @@ def improve_account(
         lines.append(f"Left out in the end, since these data do not tell them from neutral: {_by_kind(vague)}.")
     lines.append("The model: " + (phrase(found.terms, robot) or "the robot as described") + ".")
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
+    lines += [ON_ITS_OWN] if len(found.ladder) > 1 else []
     lines += flag_texts(found.terms, found.parameters)
     lines += beyond_a_guess(robot, found.terms, found.parameters)
     lines += load_text(robot, found.terms) + weight_text(robot, found.terms)
@@ -162,7 +167,8 @@ def improve_account(
         what = _listed(found, parts) if parts else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
         where = "" if found.left or settled else f" on {TRIALS_APART if more_there else found.judged_on}"
-        head += f" {BEYOND if unsure else NOTHING_ELSE}" if settled else f" More than noise is left{where}: {share}."
+        nothing = BEYOND if unsure else nothing_else(found.explained)
+        head += f" {nothing}" if settled else f" More than noise is left{where}: {share}."
         sure = f"How sure: {share}, judged on {found.judged_on}{unexplained_rest(found.explained, settled)}"
         one_each = [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1]
         sure += f"{ranges(found.terms, found.parameters, one_each, robot, len(added(found)) > 1)}{_told_from(ties)}"
