@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from ee_dist.effects.catalogue import CATALOGUE, Hypothesis, Term
+from ee_dist.effects.catalogue import CATALOGUE, EVERY, Hypothesis, Term
 from ee_dist.effects.described import takes_more_than_described
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
@@ -61,7 +61,7 @@ def much(term: Term, robot: Robot | None = None) -> str:
 
 
 def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
-    if value < 0 and CATALOGUE[term.effect].parameter(key).on_top:
+    if value < 0 and EVERY[term.effect].parameter(key).on_top:
         return f"{-value:.3g}{_unit(term, key, robot)} less{_than(term, key, value, robot)}"
     if is_share(term.effect, key):
         return f"{100 * value + 0.0:{SIGNED if key in CHANGES else ''}.3g} %"
@@ -70,14 +70,14 @@ def _value(term: Term, key: str, value: float, robot: Robot | None) -> str:
 
 def is_share(effect: str, key: str) -> bool:
     """Whether a value is a share of something, and told in percent: a number without a unit that does nothing at zero."""
-    parameter = CATALOGUE[effect].parameter(key)
+    parameter = EVERY[effect].parameter(key)
     return parameter.unit == "1" and parameter.neutral == 0.0
 
 
 def _than(term: Term, key: str, value: float, robot: Robot | None) -> str:
     if robot is None or term.target not in robot.motor_names:
         return " than described"
-    parameter = CATALOGUE[term.effect].parameter(key)
+    parameter = EVERY[term.effect].parameter(key)
     beyond = takes_more_than_described(robot, term.target, parameter, value)
     return SHARED if beyond else " than described"
 
@@ -93,7 +93,7 @@ def span(term: Term, key: str, low: float, high: float, robot: Robot | None, *, 
     there is is told as it is: no joint shares anything with itself."""
     share = is_share(term.effect, key)
     unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
-    below = bool(CATALOGUE[term.effect].parameter(key).on_top) and low < 0
+    below = bool(EVERY[term.effect].parameter(key).on_top) and low < 0
     if below and not (interval and _than(term, key, low, robot) == SHARED):
         than = _than(term, key, low, robot)
         if high <= 0:
@@ -112,7 +112,7 @@ def quantity(term: Term, key: str, robot: Robot | None = None) -> str:
     """A parameter's name without its unit, which is told behind the value; nothing where it is called by its unit alone."""
     if key.startswith("per_"):
         return ""
-    entry = CATALOGUE[term.effect]
+    entry = EVERY[term.effect]
     own = entry.parameter(key).unit  # that of a hinge, which names carry on slides too
     other = entry.unit(key, robot, term.target) if robot is not None else own
     name = plain(without_unit(without_unit(key, other), own))
@@ -120,7 +120,7 @@ def quantity(term: Term, key: str, robot: Robot | None = None) -> str:
 
 
 def _unit(term: Term, key: str, robot: Robot | None) -> str:
-    entry = CATALOGUE[term.effect]
+    entry = EVERY[term.effect]
     unit = entry.unit(key, robot, term.target) if robot is not None else entry.parameter(key).unit
     return f" {unit}" if unit not in ("", "1", "channel") else ""
 

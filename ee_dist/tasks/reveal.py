@@ -10,6 +10,7 @@ from typing import Any
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import one_line
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING
+from ee_dist.discrepancy.words import told
 from ee_dist.effects.catalogue import CATALOGUE, Hypothesis
 from ee_dist.effects.groups import members_of
 from ee_dist.recording.reader import read_run
@@ -60,7 +61,8 @@ def run(config: Config, options: Options, out: Path) -> None:
         found = score(summary, hidden, record.robot if record else None)
         if digest:
             same_truth(summary, digest, f"{KEY}={options.explained}", f"log={config.log}")
-    console.print("The truth: " + ("; ".join(map(str, hidden)) or "nothing was changed"), highlight=False)
+    robot = record.robot if record else None
+    console.print("The truth: " + ("; ".join(told(t, robot) for t in hidden) or "nothing was changed"), highlight=False)
     if found is not None:
         verdict = "Right." if found.right else "Not right."
         named = ", and ".join(" or ".join(names) for names in found.named)

@@ -6,7 +6,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from ee_dist.effects.catalogue import Hypothesis, Term, from_dict
+from ee_dist.discrepancy import words
+from ee_dist.effects.catalogue import EVERY, Hypothesis, Term, from_dict
 from ee_dist.effects.effect import EffectError
 from ee_dist.recording.records import (
     EVOLVED,
@@ -87,7 +88,9 @@ def told(hypothesis: Hypothesis | None) -> str:
     """A hypothesis in words."""
     if hypothesis is None:
         return "not known"
-    return "; ".join(str(t).replace("_", " ") for t in hypothesis) or "nothing changed"
+    # An effect of a user's own file that is not loaded here: nothing is known of its units.
+    said = (words.told(t) if t.effect in EVERY else str(t).replace("_", " ") for t in hypothesis)
+    return "; ".join(said) or "nothing changed"
 
 
 def hardware_trials(run: RunRecord) -> list[TrialRecord]:

@@ -243,7 +243,7 @@ def test_a_sealed_trial_is_explained_improved_and_revealed(cli, by):
     explained, _ = run(cli, "task=explain", log, way, only, "task.rerun=false", *QUICK)
     shown, told = run(cli, "task=reveal", f"log={tried}", f"task.explained={explained}")
     assert json.loads((shown / "summary.json").read_text())["right"] is True
-    assert "The truth: load_friction at servo" in told.out and "Right." in told.out
+    assert "The truth: load friction at servo (share 30 %)" in told.out and "Right." in told.out
     if by != "open_loop":
         return  # A model is scored by what its summary says, which has the same keys by every way.
     improved, _ = run(cli, "task=improve", "effect=auto", log, way, only, "task.rerun=false", *QUICK)

@@ -11,7 +11,9 @@ import pytest
 from rerun.chunk import RrdReader
 from viewing_samples import LOST_FOOT, LOST_LEG, NAMES, STEPS, contents_of, rows_of, sample_run
 
+from ee_dist.discrepancy import words
 from ee_dist.effects import apply
+from ee_dist.effects.catalogue import Term, term
 from ee_dist.engines.loop import gravity_vector
 from ee_dist.recording.clock import RunClock
 from ee_dist.recording.reader import read_run
@@ -342,6 +344,12 @@ def test_an_effect_that_is_not_loaded_here_is_still_told(run: RunRecord, tmp_pat
     write_rrd(replace(run, metadata={"truth": foreign}), tmp_path / "foreign.rrd")
     text = rows_of(tmp_path / "foreign.rrd", "texts/result", "TextDocument:text")[1][0][0]
     assert "sticky oil at knee rear left (amount 0.5)" in text
+
+
+def test_amounts_are_told_as_titles_and_other_verbs_tell_them() -> None:
+    jam, slower = term("joint_jam", "knee_rear_left", loss=0.5), Term("decay_altered", "G3", (("change", -0.25),))
+    assert story.told((jam,)) == words.told(jam) == "joint jam at knee rear left (loss 50 %)"
+    assert story.told((jam, slower)).endswith("; decay altered at G3 (change -25 %)"), "those of other systems too"
 
 
 def test_the_sample_loses_what_it_should(run: RunRecord) -> None:
