@@ -62,13 +62,14 @@ def plot(
     legend: bool = True,
 ) -> rrb.TimeSeriesView:
     """A plot of all scalars below ``origin`` or of ``contents``; ``span`` fixes its vertical axis."""
+    # The legend is at the left: errors grow with time, and what a curve comes to is at its right end.
     return rrb.TimeSeriesView(
         origin=origin,
         contents="$origin/**" if contents is None else list(contents),
         name=name,
         axis_x=axis,
         axis_y=None if span is None else rrb.ScalarAxis(range=span),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
     )
 
 
