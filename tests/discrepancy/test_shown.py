@@ -149,6 +149,10 @@ def test_regimes_and_root_mean_squares_say_what_they_are_of() -> None:
     ]
     assert of_all_regimes(found.regimes) == pytest.approx(np.sqrt(5.6 / 0.8))
     assert "joints' readings, 2.65 in all" in regimes_section(problem, found).caption
+    assert "also counts" not in regimes_section(problem, found).caption, "these are all that is compared"
+    problem.layout = replace(problem.layout, reading=np.arange(len(problem.data)) > 0)
+    why = f"The error of the model, {problem.told(found.error)}, also counts how much readings scatter and how often they repeat."
+    assert regimes_section(problem, found).caption.endswith(why)
     assert "rmse: root mean square of means over 0.02 s" in channels_section(problem, found).caption
     rmse = channels_section(problem, found).table.rows[0][1]
     assert rmse.startswith(f"{found.channels[0].rmse:.3g}"), "as many digits as in the terminal"

@@ -53,6 +53,18 @@ def test_values_stand_beside_those_of_their_kind():
     ]  # fmt: skip
 
 
+def test_all_values_are_in_sight_and_each_has_a_quantity():
+    """Of a number that is called by its unit alone too."""
+    kinds = kinds_of(
+        (term("quadratic_friction", "servo", per_nm=0.1),),
+        [ParameterReport(0, "per_nm", 0.1, 0.0, 0.2, "")],
+        servo_pendulum(),
+    )
+    table = values_section(kinds).table
+    assert table.whole and [row[1] for row in table.rows] == ["coefficient"]
+    assert kinds[0].name == "quadratic friction (1/(N.m))"
+
+
 def test_an_interval_that_a_bound_cuts_is_drawn_from_end_to_end():
     """Not as far below the value as above it; what is said of a joint beside its name has a line of its own."""
     robot = quadruped()

@@ -37,6 +37,8 @@ RANKED = {"best": "best", "tied": TIED_STANDING, "earned": "earned its place too
 MARK = "mark of what was found"
 MARKS = 2
 """Effects whose mark is told in words."""
+COEFFICIENT = "coefficient"
+"""What a quantity is that has no name but its unit."""
 PAD_S = 0.6
 """Shown before and after the stretch that proves most, at least."""
 Models = Sequence[tuple[str, Hypothesis]]
@@ -121,11 +123,19 @@ def values_section(kinds: Sequence[Kind]) -> Section | None:
     if not kinds:
         return None
     rows = [
-        [kind.effect, kind.quantity, place, f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}", kind.unit, p.note]
+        [
+            kind.effect,
+            kind.quantity or COEFFICIENT,
+            place,
+            f"{p.value:.4g}",
+            f"{p.low:.4g} to {p.high:.4g}",
+            kind.unit,
+            p.note,
+        ]
         for kind in kinds
         for place, p in kind.at
     ]
-    table = Table(["effect", "quantity", "where", "value", "95 % interval", "unit", "note"], rows, (3, 4))
+    table = Table(["effect", "quantity", "where", "value", "95 % interval", "unit", "note"], rows, (3, 4), whole=True)
     drawn_ = [
         figures.values(k.name, [(place, p.value, p.low, p.high) for place, p in k.at], k.neutral)
         for k in kinds
@@ -269,8 +279,18 @@ def regimes_section(problem: Problem, found: Comparison) -> Section:
     errors = [drawn(problem, r.error) for r in regimes]
     figure = figures.bars([r.name for r in regimes], errors, axis_of(problem), drawn(problem, found.noise_floor))
     table = Table(["regime", "error", "share of the excess", "share of the data"], rows, (1, 2, 3))
-    caption = f"Sorted by what a joint was doing at the time: {regimes_of(problem, found)}."
+    caption = f"Sorted by what a joint was doing at the time: {regimes_of(problem, found)}.{_more_than_regimes(problem, found)}"
     return Section("By regime", caption, figure, table, legend=[(MODEL, figures.PREDICTED)])
+
+
+def _more_than_regimes(problem: Problem, found: Comparison) -> str:
+    """Why the error of a model is another than that of its regimes, where it is."""
+    layout = problem.layout
+    counts = ["other channels"] if None in layout.joint_of_channel else []
+    counts += [] if layout.reading.all() else ["how much readings scatter and how often they repeat"]
+    return (
+        f" The error of the {MODEL}, {problem.told(found.error)}, also counts {' and '.join(counts)}." if counts else ""
+    )
 
 
 def channels_section(problem: Problem, found: Comparison, after: Comparison | None = None, most: int = 14) -> Section:
