@@ -89,7 +89,11 @@ class Doubt:
                 "Doubt: the last hypothesis leaves nothing of how trials begin unexplained, and one of them goes another way "
                 f"than it says from {self.later_s:.2g} s on. Something shows later that it does not say."
             )
-        share = f", {self.left / self.unchanged:.0%} of what 'nothing changed' leaves" if self.unchanged > EXACT else ""
+        share = (
+            f", {100 * self.left / self.unchanged:.0f} % of what 'nothing changed' leaves"
+            if self.unchanged > EXACT
+            else ""
+        )
         return (
             f"Doubt: the nearest hypothesis leaves an error of {self.left:.2g}{share}; {most}. Something is wrong that it "
             "does not say: no hypothesis can say it, or the search missed the one that can."

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ee_dist.discrepancy.words import percent
 from ee_dist.effects.catalogue import apply
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import weight_count
@@ -63,7 +64,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         "regained_of_lost": regained,
         "best_by_trials": {"before": before[0], "after": after[0]},
     })  # fmt: skip
-    back = f" ({regained:.0%} of what was lost)" if lost > 0 else "; the change cost nothing"
+    back = f" ({percent(regained)} of what was lost)" if lost > 0 else "; the change cost nothing"
     head = (
         f"On the body alone: intact {intact:.2f} m, after the change {at_change:.2f} m, after {trials:,} further trials on the "
         f"body {end:.2f} m{back}."

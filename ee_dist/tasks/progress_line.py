@@ -9,6 +9,7 @@ from rich.status import Status
 from rich.text import Text
 
 from ee_dist.discrepancy.search.search import Progress, quiet
+from ee_dist.discrepancy.words import percent
 
 EVERY_S, STEPS_S = 15.0, 10.0
 """Where there is no terminal, a stage says so often how far it is, and, where it has several steps, at which of them."""
@@ -59,7 +60,7 @@ class SearchProgress:
         self.stage, self.share, self.heard = what, share, now
         left = (now - self.stage_began) * (1 - share) / share if share > 0 else 0.0
         so_far = "" if error is None else f", error {error:.3g}"
-        ahead = f"{what} {share:.0%}{so_far}, {left_of(what, left)}"
+        ahead = f"{what} {percent(share)}{so_far}, {left_of(what, left)}"
         if self.status:
             self.status.update(Text(f"{ahead}, {now - self.began:.0f} s so far"))
             return

@@ -17,6 +17,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from ee_dist.discrepancy.words import percent
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.evaluation.jobs import Counts
 from ee_dist.evaluation.physical import PhysicalRobot
@@ -202,7 +203,7 @@ def run(config: Config, options: Options, out: Path) -> None:
         console.print(QUICK, highlight=False)
     saved = 1 - counts.simulated / max(counts.asked, 1)
     console.print(
-        f"\n{counts.asked:,} evaluations asked, {counts.simulated:,} simulated ({saved:.0%} saved), "
+        f"\n{counts.asked:,} evaluations asked, {counts.simulated:,} simulated ({percent(saved)} saved), "
         f"{counts.steps / 1e6:.1f} million {subject.noun}-steps, {wall:.0f} s. Digest {digest.hex[:16]}.",
         highlight=False,
     )

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ee_dist.basics.files import write_whole
+from ee_dist.discrepancy.words import percent
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.outcome import RESTORED
 from ee_dist.tasks.results.findings import findings
@@ -122,7 +123,7 @@ def markdown(rows: Rows, lines: Rows, totals: Mapping[str, Any]) -> str:
         parts += ["| " + " | ".join(cells(x)) + " |" for x in lines if x["metric"] == metric]
         n, scored = counts["runs"], counts["scored"]
         parts.append(
-            f"\nRestored ({RESTORED:.0%} of intact or more in one of the compensating trials): {counts['restored']} of {n}. "
+            f"\nRestored ({percent(RESTORED)} of intact or more in one of the compensating trials): {counts['restored']} of {n}. "
             f"Diagnosis right (every true effect at its place and no other): {counts['right']} of {scored}; "
             f"all true effects named: {counts['true_among_believed']} of {scored}. {TEST}\n"
         )

@@ -122,7 +122,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     engine.close()
     console.print(table)
     if body is None:
-        told = f"Noise: {100 * noise:.3g}% of each channel's range. Seal {digest[:16]}."
+        told = f"Noise: {100 * noise:.3g} % of each channel's range. Seal {digest[:16]}."
         console.print(told, highlight=False)
     write_summary(out, "trial", config, options, watch, sums.hexdigest(), {
         "trials": [e.as_dict() for e in plan * options.repeats], "noise": noise,

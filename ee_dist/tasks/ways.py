@@ -17,6 +17,7 @@ from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.free_run.windows import RESTART_S, led
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
+from ee_dist.discrepancy.words import percent
 from ee_dist.effects.targets import gains_are_known
 from ee_dist.engines.one_joint import fits
 from ee_dist.measurements.errors import MeasurementError
@@ -217,8 +218,8 @@ def _weak(measured: Measurements) -> str:
     if problem.left_to_give >= CANCELLED or problem.doubts:
         return ""
     return (
-        f"gravity and inertia cancel in these motions but for {problem.left_to_give:.0%}, so that torques tell little: the model "
-        "runs freely from the measured state"
+        f"gravity and inertia cancel in these motions but for {percent(problem.left_to_give)}, so that torques tell little: "
+        "the model runs freely from the measured state"
     )
 
 

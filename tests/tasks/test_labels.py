@@ -47,7 +47,7 @@ def test_shares_of_next_to_nothing_are_not_told() -> None:
         assert [excess_share(found, r) for r in regimes] == said  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("noise", "said"), [(0.0004, "0.04%"), (0.02, "2%")])
+@pytest.mark.parametrize(("noise", "said"), [(0.0004, "0.04 %"), (0.02, "2 %")])
 def test_little_noise_is_not_none(noise: float, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = Config(robot=RobotConfig(name="servo_pendulum"), engine=EngineConfig("mujoco"))
     trial.run(config, trial.Options(excitations=["multisine:seconds=0.5"], repeats=1, noise=noise), tmp_path)

@@ -85,9 +85,9 @@ def test_a_long_stage_says_from_its_first_word_how_long_it_will_take(monkeypatch
             progress(what, share)
     assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [
         "1 s weighing",
-        "6 s screening 5%, about 95 s left of this stage",
-        "56 s screening 50%, about 55 s left of this stage",
+        "6 s screening 5 %, about 95 s left of this stage",
+        "56 s screening 50 %, about 55 s left of this stage",
         "107 s scanning",
-        "127 s fitting 20%, up to 80 s left of this stage",
-        "217 s fitting 10%, up to 90 s left of this stage",
+        "127 s fitting 20 %, up to 80 s left of this stage",
+        "217 s fitting 10 %, up to 90 s left of this stage",
     ]

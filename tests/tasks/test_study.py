@@ -206,7 +206,7 @@ def test_the_first_lines_of_a_study_tell_what_how_sure_and_what_next(tmp_path, m
     assert (
         page.headline == "Function restored in 15 of 16 runs; the diagnosis right in 16 of 16." and page.tone == "open"
     )
-    assert page.first[-1] == "Not restored: 1; the worst is case 2, seed 1 at 42% of intact."
+    assert page.first[-1] == "Not restored: 1; the worst is case 2, seed 1 at 42 % of intact."
     assert "task=view" in page.following and "logs/a sweep/5" in page.following
     assert "no test" in page_of(study_of([1, 2], [0])).first[1]
     assert page_of(study_of([1, 2], [0])).first[-1].startswith("Next: more seeds")

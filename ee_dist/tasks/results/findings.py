@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.discrepancy.words import percents
 from ee_dist.tasks.results.paired import SURE, Paired, corrected, paired, share_interval
 from ee_dist.tasks.results.study_table import DISTANCE, ROLLING, Rows
 
@@ -210,7 +211,7 @@ def _more_than_half(count: int, of: int) -> str:
 
 def _share(count: int, of: int) -> str:
     low, high = share_interval(count, of)
-    return f"{count} of {of} runs (95 % interval of the share: {low:.0%} to {high:.0%})"
+    return f"{count} of {of} runs (95 % interval of the share: {percents(low, high)})"
 
 
 def _told(test: Paired, unit: str = " m") -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.discrepancy.words import percent
 from ee_dist.effects.catalogue import Hypothesis, apply, term
 from ee_dist.effects.targets import motors
 from ee_dist.engines.contract import Rollout
@@ -123,9 +124,9 @@ def parting(robot: Robot, controller: Network, steps: int, evaluator: Evaluator)
     names = [h[0].target.replace("_", " ") for h in hypotheses]
     return Parting(
         (
-            f"{names[0]} {WEAKER[0]:.0%} weaker",
-            f"{names[1]} {WEAKER[1]:.0%} weaker",
-            f"{names[2]} failing by {FAILING:.0%}",
+            f"{names[0]} {percent(WEAKER[0])} weaker",
+            f"{names[1]} {percent(WEAKER[1])} weaker",
+            f"{names[2]} failing by {percent(FAILING)}",
         ),
         robot.sensors[angles[0]].name,
         np.stack([log[:, 0] for log in (first, second, other)]),

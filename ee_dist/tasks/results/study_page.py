@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ee_dist.basics.names import counted
+from ee_dist.discrepancy.words import percent
 from ee_dist.tasks.outcome import RESTORED
 from ee_dist.tasks.results import study_sections as parts
 from ee_dist.tasks.results.commands import command, setting
@@ -26,7 +27,7 @@ TERMS = (
     ("Intact", "How far the robot goes forward before anything happens to it, with a controller evolved for it."),
     ("After the change", "The same controller on the changed robot: how much of its function is lost."),
     ("Compensating trial", "A trial with a controller that was evolved on what the robot believes of itself by then."),
-    ("Restored", f"One of the compensating trials goes {RESTORED:.0%} of the intact distance or farther, walking."),
+    ("Restored", f"One of the compensating trials goes {percent(RESTORED)} of the intact distance or farther, walking."),
     ("Right", "The last diagnosis names every true effect at its place, and no other."),
     ("Named", "It names every true effect at its place, whatever else it names."),
     ("Doubt", "The last diagnosis leaves more of the sensors' courses unexplained than noise and the rounding of magnitudes "
@@ -170,7 +171,7 @@ def _open(rows: Rows, named: int, scored: int) -> list[str]:
     said = []
     missed, worst = [r for r in rows if not r["restored"]], _worst(rows)
     if missed and worst is not None:
-        share = f" at {_share(rows[worst]):.0%} of intact" if _share(rows[worst]) >= 0 else ""
+        share = f" at {percent(_share(rows[worst]))} of intact" if _share(rows[worst]) >= 0 else ""
         said.append(
             f"Not restored: {len(missed)}; the worst is case {rows[worst]['scenario']}, seed {rows[worst]['seed']}{share}."
         )

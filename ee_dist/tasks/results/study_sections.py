@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ee_dist.discrepancy.words import percent
 from ee_dist.tasks.results.findings import Finding
 from ee_dist.tasks.results.paired import LEVEL, Paired
 from ee_dist.tasks.results.study_table import DISTANCE, ROLLING, Rows
@@ -22,8 +23,9 @@ TEST = (
 )
 CAPTION = f"Bars are means over runs, whiskers standard deviations, dots the runs. {TEST}"
 EFFECT = (
-    f"Gain: Hodges-Lehmann difference with the narrowest interval that covers {LEVEL:.0%}; with fewer than six runs the widest "
-    "there is, and what it covers. Rank corr.: matched pairs, rank biserial. Least p: what so few runs can give, corrected."
+    f"Gain: Hodges-Lehmann difference with the narrowest interval that covers {percent(LEVEL)}; with fewer than six runs the "
+    "widest there is, and what it covers. Rank corr.: matched pairs, rank biserial. Least p: what so few runs can give, "
+    "corrected."
 )
 EACH = ("case", "metric", "seed", "engine", "budget", "intact (m)", "after (m)", "best trial (m)", "last trial (m)",
         "restored", "diagnosis right", "doubt", "digest", "the same again")  # fmt: skip
@@ -81,7 +83,7 @@ def gain(test: Paired) -> str:
     """A difference with its interval, and what that covers where it is not LEVEL."""
     if test.n < 2:
         return _number(test.shift, "+.2f")
-    covers = "" if test.level >= LEVEL else f" ({test.level:.0%})"
+    covers = "" if test.level >= LEVEL else f" ({percent(test.level)})"
     return f"{test.shift:+.2f}, {test.low:+.2f} to {test.high:+.2f}{covers}"
 
 
@@ -202,7 +204,7 @@ def shown_sections(shown: Sequence[tuple[Mapping[str, Any], Told]]) -> list[Sect
         table = Table(("diagnosis", "made", "error left", "what the robot believed"), told, (0, 2))
         figures = [fitness(run, high), trials(run, far)] + ([paths(run, along, across)] if run.paths else [])
         how = METRICS.get(summary["metric"], summary["metric"])
-        share = f", {run.reached[-1] / run.reached[0]:.0%} of intact" if run.reached[0] > 0 else ""
+        share = f", {percent(run.reached[-1] / run.reached[0])} of intact" if run.reached[0] > 0 else ""
         heading = f"One run, case {summary['scenario']}, seed {summary['seed']}, {how}: {run.reached[-1]:.2f} m in the end{share}"
         caption = "Each repair pass began after the diagnosis of its number; the table says what was believed then."
         sections.append(Section(heading, caption, None, table, figures))
@@ -217,7 +219,8 @@ def parting_sections(found: Sequence[Parting]) -> list[Section]:
     heading = f"Logs of nearly equal damages part after {near:.0f} steps, of different ones after {far:.0f}"
     caption = (
         f"{found[0].names[0]}, {found[0].names[1]}, and {found[0].names[2]}, under the intact robot's controller. Apart: any "
-        f"angle sensor differs by more than {NEARLY:.0%} of its range. Curves: the first controller; medians: all {len(found)}."
+        f"angle sensor differs by more than {percent(NEARLY)} of its range. Curves: the first controller; medians: all "
+        f"{len(found)}."
     )
     table = Table(
         ("controller", "nearly equal apart after (steps)", "different apart after (steps)"), summed(found), (1, 2)

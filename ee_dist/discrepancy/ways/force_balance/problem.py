@@ -277,8 +277,9 @@ class ForceBalance(Problem):
             )
         if self.left_to_give < CANCELLED:
             lines.append(
-                f"Gravity and inertia cancel in these motions but for {self.left_to_give:.0%}: a tenth off in one of them looks "
-                f"like {0.05 / self.left_to_give:.0%} of the force. Where commands were recorded, task.by=free_run tells more."
+                f"Gravity and inertia cancel in these motions but for {100 * self.left_to_give:.0f} %: a tenth off in one of "
+                f"them looks like {5 / self.left_to_give:.0f} % of the force. Where commands were recorded, task.by=free_run "
+                "tells more."
             )
         if self.processing.keep_every > self.asked.keep_every:
             step_s = float(np.median(np.diff(self.measured[0].log.times_s)))
