@@ -120,15 +120,17 @@ def test_the_same_law_with_a_further_term_goes_first_where_it_takes_a_fifth(
     assert order[0].tied_with == ([order[1].name] if first == 2 else []), "the same and more is no other explanation"
 
 
-@pytest.mark.parametrize(("alone", "first"), [((9.0, 10.5), 2), ((13.0, 13.0), 1)])
+@pytest.mark.parametrize(
+    ("alone", "both", "first"), [((9.0, 10.5), 8.4, 2), ((9.0, 10.5), 9.0, 1), ((13.0, 13.0), 8.4, 1)]
+)
 def test_of_two_laws_that_data_do_not_tell_apart_both_go_first_where_they_take_off_more(
-    alone: tuple[float, float], first: int
+    alone: tuple[float, float], both: float, first: int
 ) -> None:
-    """Which of them it is would be drawn by lot; where one is surely the better, it goes first."""
+    """By the tenth that any effect must: which of them it is would be drawn by lot. One that is surely the better goes first."""
     problem = Linear((), motions=4)
     unit = np.sign(problem.data)
     one, other = (candidate(ROBOT, "coulomb_friction", j) for j in ("knee_front_left", "hip_rear_left"))
-    uneven = np.where(problem.trial_of == 0, 12.0, 9.0) * unit
+    uneven = np.where(problem.trial_of == 0, 12.0, both) * unit
     found = [
         judge(problem, 20.0 * unit, held_out(problem, r, True, p.parts), p, Model(p.parts), 10)
         for p, r in (

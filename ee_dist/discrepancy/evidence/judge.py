@@ -285,11 +285,16 @@ def _left(j: Judged) -> float:
 
 def _fuller(j: Judged, first: Judged, found: Sequence[Judged]) -> bool:
     """Whether it is the same and more, and takes off a part of what that leaves. With a handful of motions nothing is sure: the
-    further term may be none, and yet foretells better on the whole. However little it takes off where the other ended at the end
+    further term may be none, and yet foretells better on the whole. Of two that are tied what has both needs no lot drawn between
+    them, where it takes off the tenth that any effect must. However little it takes off where the other ended at the end
     of its range, and it does not: that range is too small, or the effect is another."""
     if not j.earned or not contains(j, first) or float(first.held.sum()) <= NEAR**2 * first.sure:
         return False
-    share = 1.0 if (_at_its_end(first) and not _at_its_end(j)) or _needs_no_choice(j, first, found) else FULLER
+    share = FULLER
+    if _at_its_end(first) and not _at_its_end(j):
+        share = 1.0
+    elif _needs_no_choice(j, first, found):
+        share = 1.0 - WORTH
     return _left(j) <= share * _left(first)
 
 
