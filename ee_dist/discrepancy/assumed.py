@@ -18,6 +18,8 @@ from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.evidence.intervals import BOUND, at_bound
 from ee_dist.discrepancy.evidence.judge import at_work
 from ee_dist.discrepancy.evidence.rule import NEAR
+from ee_dist.discrepancy.lags import told_anew_s
+from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, values_of
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import as_slow
@@ -56,6 +58,9 @@ AHEAD, SOONER = "speed_feed_forward", 0.5
 """A controller that knows how fast its goal goes follows sooner than its damping would let it; a guess that does not know it
 comes to gains many times too stiff. Where joints were seen to follow within this share of the lag that was guessed at, it is
 looked for so, too, and found so, also where it takes off less, where a guess ended at its bound otherwise and does not so,"""
+TIMED, TAKES = "command_duration", (0.5, 1.0)
+"""A controller that takes a set time to each goal looks soft and heavy, too. Where goals stand longer than joints lag, they are
+looked for so as well, from these shares of the time from one goal to the next;"""
 LESS = 0.9
 """and found so where that leaves less than this share of what is above the noise otherwise."""
 LEAST, MOST = -0.7, 1.0
@@ -65,7 +70,7 @@ AGAIN = 2
 """How often more room is made for a guess that ended as far as it might go."""
 LABEL = "assumed drives"
 GUESSED = (
-    "The description only guessed at what these drives do: their gains, limit, rotor and friction{late} were found together. "
+    "The description only guessed at what these drives do: their gains, limit, rotor and friction{more} were found together. "
     "Write them into it, or keep this model."
 )
 """What is said of them in the place of an effect's physics."""
@@ -83,7 +88,9 @@ def assumed_text(robot: Robot) -> list[str]:
 
 def guessed_text(terms: Hypothesis) -> str:
     """``GUESSED`` of what was found."""
-    return GUESSED.format(late=", and how late commands come," if any(t.effect == LATE for t in terms) else "")
+    said = {LATE: "how late commands come", TIMED: "how long they take to a goal"}
+    also = [text for name, text in said.items() if any(t.effect == name for t in terms)]
+    return GUESSED.format(more=f", and {' and '.join(also)}," if also else "")
 
 
 class Fitted(NamedTuple):
@@ -120,8 +127,10 @@ def assumed_drives(
     parts, best = near.parts, _farther(search, near)
     ahead = offered(AHEAD) if _sooner(robot, joints) else ()
     late = offered(LATE) if _lag(robot, joints) else ()
-    for more, within_bounds in ((ahead, True), (late, False)):
-        if not more:
+    timed = offered(TIMED) if 0 < _lag(robot, joints) < _stand(search.problem, joints) else ()
+    for more, within_bounds in ((ahead, True), (late, False), (timed, False)):
+        # Where next to nothing but noise is left, no time is missing.
+        if not more or (more is timed and best.energy <= NEAR**2 * noise):
             continue
         other = _farther(search, _fitted(search, joints, (*parts, *more)))
         # An end that a guess no longer comes to is a reason of its own.
@@ -190,7 +199,7 @@ def _with_room(robot: Robot, c: Candidate, values: Sequence[tuple[str, float]]) 
 def _fitted(search: Search, joints: Sequence[str], parts: tuple[Candidate, ...]) -> Fitted:
     """The parts, fitted from the best of a grid of starts."""
     model = Model(parts)
-    starts = _starts(search.problem.robot, joints, model)
+    starts = _starts(search.problem, joints, model)
     energies = [
         float(r @ r) if np.isfinite(r).all() else np.inf
         for r in search.residuals([model.hypothesis(u) for u in starts])
@@ -212,7 +221,7 @@ def puts_right(robot: Robot, c: Candidate) -> bool:
     """Whether it is one of these effects, at joints whose gains were assumed; or one value for all of whatever was assumed."""
     at = {*(c.members(robot) or (c.target,))}
     assumed = {*robot.assumed_joints("kp")}
-    if c.effect.name in (LATE, AHEAD):
+    if c.effect.name in (LATE, AHEAD, TIMED):
         return at == assumed
     return c.effect.guesses_at(robot, c.target) or (c.effect.name in TOGETHER and at <= assumed)
 
@@ -259,25 +268,35 @@ def _lag(robot: Robot, joints: Sequence[str]) -> float:
     return float(np.median([robot.joint(j).lag_s for j in joints]))
 
 
+def _stand(problem: Problem, joints: Sequence[str]) -> float:
+    """s from one goal of these joints to the next, of most; 0 where that is not known."""
+    return told_anew_s(problem.measured, [problem.robot.motor_names.index(j) for j in joints])
+
+
 def _sooner(robot: Robot, joints: Sequence[str]) -> bool:
     """Whether most of the joints were seen to follow much sooner than the damping that was guessed at lets them."""
     guessed = float(np.median([d.kd / d.kp if d.kp > 0 else 0.0 for d in (drive_of(robot, j) for j in joints)]))
     return _lag(robot, joints) < SOONER * guessed
 
 
-def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
+def _starts(problem: Problem, joints: Sequence[str], model: Model) -> list[Array]:
     """A grid: damping falls with the gain, so that a joint follows as fast, or is what makes it as late as it was seen to be,
     and friction holds as large an error. Rotors are as assumed, or fall with the gain too: who took a motor for ten times as
     strong as it is took its rotor for as heavy."""
+    robot, names = problem.robot, {c.effect.name for c in model.parts}
     drives, lag = [drive_of(robot, j) for j in joints], _lag(robot, joints)
     stiffness, damping, rotor = (
         float(np.median([getattr(d, n) for d in drives])) for n in ("kp", "kd", "rotor_inertia")
     )
-    scaled = (False, True) if any(c.effect.name in ROTORS for c in model.parts) else (False,)
-    delays = tuple(share * lag for share in LATER) if any(c.effect.name == LATE for c in model.parts) else (0.0,)
+    scaled = (False, True) if names & {*ROTORS} else (False,)
+    delays = tuple(share * lag for share in LATER) if LATE in names else (0.0,)
+    times = tuple(share * _stand(problem, joints) for share in TAKES) if TIMED in names else (0.0,)
     found = []
-    for gain, apart, limit, lighter, delay, filters in product(GAINS, LAGS_RAD, LIMITS, scaled, delays, (False, True)):
-        damped = (lag - delay) * stiffness / damping if filters and damping > 0 else 1.0
+    for gain, apart, limit, lighter, (delay, takes), filters in product(
+        GAINS, LAGS_RAD, LIMITS, scaled, tuple(product(delays, times)), (False, True)
+    ):
+        # Evenly on its way, a goal is half of its time late.
+        damped = (lag - delay - takes / 2) * stiffness / damping if filters and damping > 0 else 1.0
         if (lighter and gain == 1.0) or (filters and damped < MUCH_DAMPED):
             continue
         values = {
@@ -288,6 +307,7 @@ def _starts(robot: Robot, joints: Sequence[str], model: Model) -> list[Array]:
             "torque_limit": limit,
             "coulomb_friction": apart * gain * stiffness,
             LATE: delay,
+            TIMED: takes,
             CARRIED: MUCH,
             AHEAD: 1.0,
         }

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.engines.goals import SAME
 from ee_dist.measurements.signals import MOST_ROWS, lead
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array, SensorLog
@@ -31,6 +32,15 @@ def with_lags(robot: Robot, trials: Sequence[MeasuredTrial]) -> Robot:
     if not any(lags.values()):
         return robot
     return replace(robot, joints=tuple(replace(j, lag_s=lags.get(j.name, 0.0)) for j in robot.joints))
+
+
+def told_anew_s(trials: Sequence[MeasuredTrial], motors: Sequence[int]) -> float:
+    """s from one change of what any of these motors is told to the next, the median of all trials; 0 where none has two."""
+    lasted: list[float] = []
+    for log in (t.log for t in trials):
+        anew = np.any(np.abs(np.diff(log.commands[:, list(motors)], axis=0)) > SAME, axis=1)
+        lasted += np.diff(log.times_s[1:][anew]).tolist()
+    return float(np.median(lasted)) if lasted else 0.0
 
 
 def _obeying(log: SensorLog, robot: Robot, motor: int) -> Array | None:

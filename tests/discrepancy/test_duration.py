@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from way_samples import Sample, evaluator_for, measure, problem_by, samples
 
+from ee_dist.discrepancy.assumed import assumed_drives, puts_right
 from ee_dist.discrepancy.examine import Effort
 from ee_dist.discrepancy.explain import Explanation, explain
+from ee_dist.discrepancy.lags import with_lags
 from ee_dist.discrepancy.past import Past
 from ee_dist.discrepancy.problem import error
+from ee_dist.discrepancy.search.candidates import candidates
+from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import pool_of
+from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.effects.catalogue import Hypothesis, apply, term
 from ee_dist.trials.log import Array
 
 QUICK = Effort(first=10, second=4, final=3, starts=1)
 TAKEN_S, SLOW_S_RAD = 0.5, 0.45
+LOOKED_FOR = ("position_gain", "speed_gain", "command_duration")
 TIMED: Hypothesis = (term("command_duration", "all_joints", duration_s=TAKEN_S),)
 SLOW: Hypothesis = (term("command_speed", "all_joints", slowness_s_rad=SLOW_S_RAD),)
 
@@ -78,3 +85,23 @@ def test_the_past_knows_where_a_goal_is_and_how_long_it_takes() -> None:
     assert Past(commands, None, joints, 0.01, 40).goals(model)[:, 0] == pytest.approx([0.4, 0.0, 0.2, 0.8])
     assert Past(commands, None, joints, 0.01, 70).goals(model)[:, 0] == pytest.approx([0.8, 0.0, 0.0, 0.8])
     assert Past(commands, released, joints, 0.01, 51).goals(model)[0, 0] == pytest.approx(12 * 0.8 / 40)
+
+
+@pytest.mark.parametrize("takes", [True, False])
+def test_guessed_drives_that_take_a_set_time_are_no_soft_ones(takes: bool) -> None:
+    """Of gains that were guessed at soft ones come as late; those that are soft are told no time."""
+    arm = samples()["arm"].robot
+    hidden = TIMED if takes else (term("position_gain", "all_joints", factor=0.4),)
+    trials = measure(Sample(arm, (goals(arm.time_step_s, 4.0, 1),), hidden, ()), hidden)
+    guess = tuple(replace(d, kp=d.kp / 2, kd=d.kd / 2) for d in arm.drives)
+    described = replace(arm, drives=guess, assumed=tuple((d.joint, f) for d in guess for f in ("kp", "kd")))
+    problem = problem_by("open_loop", trials, with_lags(described, trials))
+    proposal, u = assumed_drives(Search(problem), candidates(problem.robot, only=LOOKED_FOR)) or pytest.fail(
+        "nothing was proposed"
+    )
+    found = {t.effect: dict(t.values) for t in Model(proposal.parts).hypothesis(u)}
+    assert ("command_duration" in found) == takes
+    assert found["position_gain"]["factor"] == pytest.approx(2.0 if takes else 0.8, rel=0.15)
+    if takes:
+        assert found["command_duration"]["duration_s"] == pytest.approx(TAKEN_S, rel=0.03)
+        assert all(puts_right(problem.robot, c) for c in proposal.parts)

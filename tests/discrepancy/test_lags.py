@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ee_dist.discrepancy.lags import with_lags
+from ee_dist.discrepancy.lags import told_anew_s, with_lags
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.scales import longest_delay
@@ -98,3 +98,13 @@ def test_a_speed_and_a_torque_come_late_too():
     for torques in (seen.log.commands, None):
         twice = replace(seen, log=replace(seen.log, sensors=np.zeros_like(sensors), torques=torques))
         assert with_lags(by_torque, [twice]) is by_torque
+
+
+def test_how_often_goals_change_is_seen_in_commands():
+    streamed = trial("slow", 0.3, 1)
+    assert told_anew_s([streamed], [0]) == pytest.approx(STEP_S)
+    rows = np.repeat(np.arange(15.0), 100)
+    standing = replace(streamed, log=replace(streamed.log, commands=rows[:, None]))
+    assert told_anew_s([standing], [0]) == pytest.approx(1.0)
+    still = replace(streamed, log=replace(streamed.log, commands=0.0 * rows[:, None]))
+    assert told_anew_s([still], [0]) == 0.0
