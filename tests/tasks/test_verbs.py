@@ -193,7 +193,7 @@ def test_an_explanation_is_held_against_what_was_held_out_from_all_of_it(cli, im
     word = explained["last_word"]
     assert [t["name"] for t in word["trials"]] == ["run2"] and word["error_after"] < 0.5 * word["error_before"]
     page = (found / "report.html").read_text(encoding="utf-8")
-    text = "Held out from all of it (run2): model "
+    text = "Held out from all of it (2. run2): model "
     assert text in explained["words"][1] and text in page and "Held out from all of it:" in said.out
     alone, _ = run(cli, *ask, "trials=[run1]")
     same = json.loads((alone / "summary.json").read_text())
