@@ -290,7 +290,8 @@ def _starts(problem: Problem, joints: Sequence[str], model: Model) -> list[Array
     )
     scaled = (False, True) if names & {*ROTORS} else (False,)
     delays = tuple(share * lag for share in LATER) if LATE in names else (0.0,)
-    times = tuple(share * _stand(problem, joints) for share in TAKES) if TIMED in names else (0.0,)
+    stand = _stand(problem, joints) if TIMED in names else 0.0
+    times = tuple(share * stand for share in TAKES) if TIMED in names else (0.0,)
     found = []
     for gain, apart, limit, lighter, (delay, takes), filters in product(
         GAINS, LAGS_RAD, LIMITS, scaled, tuple(product(delays, times)), (False, True)
