@@ -38,9 +38,9 @@ def other_scale(
 ) -> Iterator[tuple[Model, Array]]:
     """The model with the strength of all motors in the place of each mass, of those beyond its first ``own`` parts, that is
     far off, or of all masses, and where this leads if all follow by one factor. Nothing where torques were measured, which say
-    how large they are themselves, nor where ``pool`` is of less than half of the kinds of effects that there are: who asks for
-    some wants these."""
-    if torques_compared(problem):
+    how large they are themselves, nor where all gains were guessed at, which say it too once they are fitted, nor where
+    ``pool`` is of less than half of the kinds of effects that there are: who asks for some wants these."""
+    if torques_compared(problem) or {*problem.robot.motor_names} <= {*problem.robot.assumed_joints("kp")}:
         return
     terms, parts = current.hypothesis, current.parts
     least = [ALL_OFF if c.members(problem.robot) else SELDOM_OFF for c in parts]

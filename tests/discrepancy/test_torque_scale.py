@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from assumed_samples import guessed
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from way_samples import problem
+from way_samples import evaluator_for, measured, problem
 
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.torque_scale import STRENGTH, other_scale, torques_compared, without_masses
+from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.effects.catalogue import apply, find
 from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands
@@ -54,6 +56,16 @@ def test_torques_that_were_measured_say_how_large_they_are() -> None:
     u = np.where(model.lower < 0, -1.0, 0.5)
     assert not list(other_scale(by_forces, Current(model.parts, u), 0, pool_of(by_forces)))
     assert torques_compared(by_forces) and not torques_compared(problem("arm", "open_loop"))
+
+
+def test_gains_that_were_guessed_at_say_it_themselves() -> None:
+    """Half the gain at twice the strength is the same controller, and no mass is known any better."""
+    known = problem("arm", "open_loop").robot
+    model, trials = model_of_arm(), measured("arm")
+    u = np.where(model.lower < 0, -1.0, 0.5)
+    for robot, some in ((known, True), (guessed(known), False)):
+        of_arm = OpenLoop(trials, robot, evaluator_for(robot))
+        assert bool(list(other_scale(of_arm, Current(model.parts, u), 0, pool_of(of_arm)))) == some
 
 
 @settings(max_examples=10, deadline=None)
