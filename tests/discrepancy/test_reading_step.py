@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from way_samples import evaluator_for, samples
 
+from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.slow_noise import slow_noise
+from ee_dist.discrepancy.ways.free_run.problem import FreeRun
+from ee_dist.engines.contract import Rollout
+from ee_dist.engines.drivers import Commands
 from ee_dist.trials.grid import reading_step
 
 T = np.arange(1500) * 0.02
@@ -61,3 +68,19 @@ def test_coarse_steps_are_seen_on_few_levels_only_if_that_is_asked_for() -> None
     few = values[np.abs(values) < 0.15]
     assert reading_step(few) == 0.0
     assert reading_step(few, 3) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("windows_s", [None, 0.5])
+def test_the_steps_of_a_sensor_are_known_where_its_joint_hardly_moves(windows_s: float | None) -> None:
+    sample = samples()["pendulum"]
+    robot, step = replace(sample.robot, sensors=sample.robot.sensors[:1]), 0.012
+    evaluator = evaluator_for(robot)
+    slow = 0.3 * np.sin(0.9 * np.arange(0.0, 6.0, robot.time_step_s))[:, None]
+    trials = []
+    for name, commands in (("slow", slow), ("still", np.zeros_like(slow))):
+        (log,) = evaluator.engine.rollout([Rollout(robot, Commands(commands), len(commands), pose=True)])  # type: ignore[attr-defined]
+        read = step * np.round(log.sensors / step)
+        trials.append(MeasuredTrial(name, replace(log, sensors=read, joints=read), Commands(commands)))
+    problem = FreeRun(trials, robot, evaluator, windows_s=windows_s)
+    (noise,) = problem.noise
+    assert 0.9 < noise / (step / 4) < 2, "between two steps all is alike, so that a quarter of one is left on average"

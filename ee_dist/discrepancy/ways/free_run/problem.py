@@ -80,7 +80,8 @@ class FreeRun(Problem):
         # What is predicted is the motion: noise of its sensors would count against every model.
         self.bare = noiseless(robot)
         self.pieces = [p for k, t in enumerate(trials) for p in pieces(k, t, robot, windows_s, every, steps)]
-        by_unit = noise_by_unit(self.pieces, robot, [[columns[c] for c in own] for own in self.own])
+        recorded = [[columns[c] for c in own] for own in self.own]
+        by_unit = noise_by_unit(self.pieces, [t.log for t in self.measured], robot, recorded)
         if one_in > 1:
             self.pieces = thinned(self.pieces, one_in)
         if steps > 1:
