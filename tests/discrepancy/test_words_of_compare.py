@@ -10,10 +10,12 @@ from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
 
-def compared(error: float, left: list[Leftover], there: float | None = None) -> Account:
+def compared(
+    error: float, left: list[Leftover], there: float | None = None, parted: dict[str, float | None] | None = None
+) -> Account:
     """``there``: the error of the worst channel, where it is another than that of the model."""
     found = SimpleNamespace(
-        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s={},
+        error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s=parted or {},
         channels=[SimpleNamespace(name="a_b", normalised=there or error), SimpleNamespace(name="command_b", normalised=0.0)],
 
         unsure=[],
@@ -28,8 +30,8 @@ def compared(error: float, left: list[Leftover], there: float | None = None) -> 
         doubts="",
         channels=("a_b", "command_b"),
         curves=((0, "a_b"), (0, "command_b")),
-        trials=("sway",),
-        numbers=(1,),
+        trials=tuple(parted or ("sway",)),
+        numbers=tuple(range(1, 1 + len(parted or ("sway",)))),
     )
     return compare_account(problem, found, left)  # type: ignore[arg-type]
 
@@ -63,3 +65,14 @@ def test_the_worst_channel_is_told_with_its_own_error() -> None:
         "The model is off, most of all at a b (25.0 there): error 12.9 in all, "
     )
     assert compared(12.9, []).headline.startswith("The model is off, most of all at a b: error 12.9, ")
+
+
+def test_of_many_trials_those_that_part_soonest_are_told() -> None:
+    def said(count: int) -> str:
+        (line,) = (
+            n for n in compared(5.0, [], parted={f"t{k}": 9.0 - k for k in range(count)}).lines if "differ clearly" in n
+        )
+        return line
+
+    assert "noise: 1. t0 at 9.00 s; 2. t1 at 8.00 s; 3. t2 at 7.00 s." in said(3)
+    assert "in 8 trials, soonest in 8. t7 at 2.00 s; 7. t6 at 3.00 s; 6. t5 at 4.00 s (all in summary.json" in said(8)

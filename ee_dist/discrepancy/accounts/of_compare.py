@@ -24,6 +24,8 @@ from ee_dist.discrepancy.words import plain
 PARTS = "Measurement and prediction first differ clearly, three values in a row far beyond the noise"
 CLOSE = 1.1
 """Times the noise floor up to which a model is nearly right."""
+MANY, SOONEST = 8, 3
+"""Trials that are too many for each to be told, and how many of them are."""
 
 
 def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover]) -> Account:
@@ -33,8 +35,7 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}.", *assumed_text(problem.robot)]
     lines += beside_floor(found.error, found.noise_floor, bool(left))
     first = zip(problem.numbers, problem.trials, found.parted_s.values(), strict=False)
-    parted = [f"{k}. {t} at {s:.2f} s" for k, t, s in first if s is not None]
-    lines.append(f"{PARTS}: {'; '.join(parted) or 'nowhere'}.")
+    lines.append(f"{PARTS}: {_parted([(s, f'{k}. {t} at {s:.2f} s') for k, t, s in first if s is not None])}.")
     if left:
         lines.append(left_text(left, False))
     if ratio < CLOSE and not left:
@@ -76,3 +77,11 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
 
 def _times(ratio: float) -> str:
     return f"{ratio:.3g} times" if abs(ratio - 1) >= 0.005 else "about"
+
+
+def _parted(when: Sequence[tuple[float, str]]) -> str:
+    """When they did, (s, in words) of each trial; of many trials those that did first, and the summary has all."""
+    if len(when) < MANY:
+        return "; ".join(told for _, told in when) or "nowhere"
+    soonest = [told for _, told in sorted(when, key=lambda w: w[0])[:SOONEST]]
+    return f"in {len(when)} trials, soonest in {'; '.join(soonest)} (all in summary.json, parted_s)"
