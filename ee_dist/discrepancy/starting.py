@@ -91,12 +91,14 @@ def _starting(trial: MeasuredTrial, read: SpeedSensors, halfway: bool) -> Array:
 
 
 def speeds_off(trial: MeasuredTrial, robot: Robot) -> Array:
-    """(M,) standard deviations of ``starting_speeds``: of the noise that a sensor shows, or of the curve through positions."""
+    """(T, M) standard deviations of ``starting_speeds``: of the noise that a sensor shows, or of the curve through positions
+    about there. A slide that runs into its stop for a moment is no doubt about how fast it went before."""
     sensors, even = speed_sensors(robot), evenly_read(trial.log)
     sensed = _at(even, trial.log, read_speeds(trial.log, sensors, goes_halfway(robot)))
-    noise = slow_noise(even.times_s, sensed)
+    noise = np.broadcast_to(slow_noise(even.times_s, sensed), sensed.shape)
     curve = _curve(even) if trial.commands_held else None
-    return noise if curve is None else np.where(curve.better(sensors, sensed), curve.noise, noise)
+    off = noise if curve is None else np.where(curve.better(sensors, sensed), curve.noise, noise)
+    return np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in off.T], axis=1)
 
 
 def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> Array:
@@ -112,7 +114,8 @@ def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array)
 @dataclass(frozen=True, eq=False)
 class _Curve:
     """Speeds by a curve through the positions (T, M); how far off they may be at most (M,), their noise and all by which a more
-    supple curve parts from it; and their standard deviations (M,), of that only what noise does not make."""
+    supple curve parts from it; and their standard deviations (T, M), of what it parts by about there only what noise does not
+    make."""
 
     speeds: Array
     off: Array
@@ -134,7 +137,8 @@ def _curve(even: SensorLog) -> _Curve | None:
     read = slow_noise(even.times_s, even.joints)
     noise, parts = read * np.linalg.norm(long), _size(stiff - supple)
     apart = read * np.linalg.norm(long - np.pad(short, (len(long) - len(short)) // 2))
-    return _Curve(stiff, np.hypot(noise, parts), np.sqrt(noise**2 + np.maximum(parts**2 - apart**2, 0.0)))
+    near = scipy.ndimage.uniform_filter1d((stiff - supple) ** 2, 2 * AROUND[0] + 1, axis=0, mode="nearest")
+    return _Curve(stiff, np.hypot(noise, parts), np.sqrt(noise**2 + np.maximum(near - apart**2, 0.0)))
 
 
 def _at(even: SensorLog, log: SensorLog, speeds: Array) -> Array:

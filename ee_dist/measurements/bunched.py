@@ -16,6 +16,9 @@ AROUND = 5
 OFF, MOVES, THROWN = 0.3, 5.0, 8.0
 """Judged at steps that are off by this share of the usual one, where a joint goes so many times its noise in the rows around, and
 nowhere makes so many times the largest of most of its steps, as where an angle wraps."""
+HELD = 0.25
+"""Share of these that repeat the row before, from which a column is held there and was read at other times: of a log that has a
+row for whatever came."""
 BY_ROW = 0.35
 """Share of what stamps say beyond an even pace that positions may follow at most, with twice what is not known of it: 0 if
 the rows are even, 1 if the stamps are right, as in logs of robots whose pace wanders."""
@@ -53,7 +56,7 @@ def _followed(off: Array, readings: Array) -> float | None:
         told = (np.abs(off) > OFF) & (around * np.abs(speed) > MOVES * noise)
         told &= np.convolve(thrown, np.ones(around), "same") < 0.5
         told[:AROUND] = told[len(told) - AROUND :] = False
-        if told.any():
+        if told.any() and np.mean(went[told] == 0) < HELD:
             size = float(np.sqrt(np.mean(speed[told] ** 2)))
             asked.append(speed[told] * off[told] / size)
             seen.append((went[told] - speed[told]) / size)

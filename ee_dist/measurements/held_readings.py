@@ -25,6 +25,9 @@ STEPS = 3.0
 """unless it crosses a step of its encoder each time: changes are in the middle so many times the smallest one."""
 SLOWER = 0.9
 """Share of changes that come no sooner than what was told of another trial has it."""
+ABOUT, MOSTLY, SAME = 0.5, 0.8, 0.15
+"""Share of the usual time by which most times from one change of a column to the next, this share of those in motion, differ from
+it, where a log has a row for whatever came and each sensor comes at its own pace; and that by which paces of two trials do."""
 
 
 def held_readings(readings: Array, every: float | None = None) -> NDArray[np.intp] | None:
@@ -43,22 +46,50 @@ def held_readings(readings: Array, every: float | None = None) -> NDArray[np.int
         if every is None or every < SELDOM or (np.diff(rows) >= SLOWER * every).mean() < SLOWER:
             return None
         usual = every
-    edges = np.r_[0, rows, len(readings)]
-    step = round(usual)
+    return _at_rest_too(rows, len(readings), usual)
+
+
+def read_in_turn(column: Array, times_s: Array, pace_s: float | None = None) -> NDArray[np.intp] | None:
+    """Numbers of the rows in which a column (T,) was read, of a log that has a row whenever one of several sensors is read and
+    holds the others; None where its changes, at ``times_s`` (T,), keep to no pace of their own, or come as often as rows.
+    ``pace_s``: that which another trial of the same logger shows."""
+    rows = np.flatnonzero(np.diff(column)) + 1
+    if len(rows) < CLEAR:
+        return None
+    sizes, gaps_s = np.abs(np.diff(column))[rows - 1], np.diff(times_s[rows])
+    usual_s, usual = float(np.median(gaps_s)), float(np.median(np.diff(rows)))
+    moving = gaps_s[gaps_s < AT_REST * usual_s]
+    known = pace_s is not None and abs(usual_s / pace_s - 1) < SAME
+    # A motion that crosses the steps of an encoder keeps to no pace, but where it is even.
+    if usual < SELDOM or (np.median(sizes) < STEPS * sizes.min() and not known):
+        return None
+    if np.mean(np.abs(moving / usual_s - 1) < ABOUT) < MOSTLY:
+        return None
+    return _at_rest_too(rows, len(column), usual)
+
+
+def _at_rest_too(rows: NDArray[np.intp], count: int, usual: float) -> NDArray[np.intp]:
+    """The rows in which something changed, and every so many where nothing does for long: a robot at rest is read as
+    well."""
+    edges, step = np.r_[0, rows, count], round(usual)
     found = [np.arange(a, b, step) if b - a > AT_REST * usual else np.array([a]) for a, b in pairwise(edges) if a < b]
     return np.concatenate(found)
 
 
-def written_late(column: Array, rows: NDArray[np.intp]) -> int | None:
+def written_late(column: Array, rows: NDArray[np.intp], times_s: Array) -> int | None:
     """How many rows behind those in which sensors were read (``rows``) a column (T,) changes, for loggers write one quantity
-    after the other; None where it changes at other times, and is no reading of theirs."""
+    after the other; None where it changes at other ``times_s`` (T,), and is no reading of theirs."""
     changed = np.flatnonzero(np.diff(column)) + 1
     changed = changed[changed >= rows[0]]
     if len(changed) < FEWEST:
         return None
-    late = changed - rows[np.searchsorted(rows, changed, side="right") - 1]
+    own = rows[np.searchsorted(rows, changed, side="right") - 1]
+    late, late_s = changed - own, times_s[changed] - times_s[own]
     usual = int(np.argmax(np.bincount(late)))
-    return usual if (late == usual).mean() >= TOGETHER else None
+    # As many rows later at all times, where each row comes with a sensor of its own, is another reading.
+    wander_s = float(np.ptp(np.quantile(late_s, [1 - TOGETHER, TOGETHER])))
+    steady = wander_s <= (1 - MOSTLY) * float(np.median(np.diff(times_s[rows])))
+    return usual if steady and (late == usual).mean() >= TOGETHER else None
 
 
 def _regular(readings: Array, changes: NDArray[np.bool_]) -> float | None:

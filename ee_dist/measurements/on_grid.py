@@ -12,7 +12,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.clocks import Clocked, check_grid, other_clocks
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.frozen import frozen
-from ee_dist.measurements.held_readings import written_late
+from ee_dist.measurements.held_readings import read_in_turn, written_late
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.reading import between_readings, holes, paces_of, rows_read
 from ee_dist.measurements.report import COMMAND, TORQUE, Report
@@ -54,6 +54,8 @@ class OnGrid:
         self.as_is = timing.even and all(abs(s / step - 1) < SAME_RATE for s in steps_s)
         self.at_s = np.arange(len(times_s)) * step if self.as_is else grid(times_s, step)
         self.read_at, self.empty = rows_read(mapping, self.clocks), holes(mapping, self.clocks)
+        self.shown: AnyMapping[str, float] = {}
+        """Seconds between readings by table, as other trials show them."""
         self.frozen: dict[str, NDArray[np.intp]] = {}
         for name, own in self.clocks.items():
             for run in frozen(mapping, own, name, robot):
@@ -93,7 +95,7 @@ class OnGrid:
     def at_paces(self, paces: AnyMapping[str, float]) -> None:
         """Readings at the paces that other trials of the logger show. Raises MeasurementError."""
         if paces.keys() - self.paces().keys():
-            self.read_at = rows_read(self.mapping, self.clocks, paces)
+            self.read_at, self.shown = rows_read(self.mapping, self.clocks, paces), paces
 
     def filled(self) -> Array | None:
         """(T,) which rows lie between readings; None where none does. Tells how many."""
@@ -164,7 +166,9 @@ class OnGrid:
             values = np.unwrap(values, period=abs(column.rolls_over * column.scale) * size)
         rows = self.read_at.get(column.table)
         if (reading or name.startswith(TORQUE)) and rows is not None and len(rows) < len(values):
-            late = written_late(raw, rows)
+            late = written_late(raw, rows, own.times_s)
+            mine = read_in_turn(raw, own.times_s, self.shown.get(column.table)) if late is None else None
+            rows = rows if mine is None else mine
             # Torques are readings too where they keep to their pace; what was told to drives does not.
             if reading or late is not None:
                 # Between readings a state goes on: it does not stand still and jump.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ee_dist.measurements.clocks import Clocked
-from ee_dist.measurements.held_readings import held_readings
+from ee_dist.measurements.held_readings import held_readings, read_in_turn
 from ee_dist.measurements.mapping import Column, Mapping
 from ee_dist.measurements.sampling import filled
 from ee_dist.trials.log import GAP, Array
@@ -37,6 +37,8 @@ def rows_read(
         pace = (paces or {}).get(name)
         every = None if pace is None or not own.timing.median_s else pace / own.timing.median_s
         rows = held_readings(np.stack(read, axis=1), every)
+        if rows is None and (each := [r for c in read if (r := read_in_turn(c, own.times_s, pace)) is not None]):
+            rows = max(each, key=len)
         out[name] = np.arange(count) if rows is None else rows
     return out
 
@@ -86,7 +88,7 @@ def told_of(clocks: AnyMapping[str, Clocked], read_at: AnyMapping[str, Rows]) ->
     paces = paces_of(clocks, read_at)
     counts = {name: (len(clocks[name].times_s), len(read_at[name])) for name in paces}
     return [
-        f"the sensors were read every {1e3 * paces[name]:.4g} ms: {count - read} of {count} rows repeat all readings of the row "
+        f"the sensors were read every {1e3 * paces[name]:.4g} ms: {count - read} of {count} rows repeat readings of rows "
         "before, and count as none"
         for name, (count, read) in counts.items()
     ]

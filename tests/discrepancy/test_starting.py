@@ -12,7 +12,7 @@ from way_samples import evaluator_for, samples
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, speeds_of
 from ee_dist.discrepancy.problem import error
-from ee_dist.discrepancy.starting import starting_speeds
+from ee_dist.discrepancy.starting import speeds_off, starting_speeds
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.engines.drivers import Commands
 from ee_dist.robots.model import Drive, Robot
@@ -115,3 +115,16 @@ def test_a_swing_is_foretold_although_its_speed_was_read_late() -> None:
         problem = FreeRun((trial_of(robot, joints, late, real),), robot, evaluator_for(robot), windows_s=0.5)
         left[real] = problem.natural(error(problem.residuals([()])[0]))
     assert left[True] < 0.1 * left[False]
+
+
+def test_a_blow_is_no_doubt_about_the_speed_long_before_it() -> None:
+    t = np.arange(1500) * STEP_S
+    joints, speeds = course(t)
+    stopped = np.where(t[:, None] < 2.0, joints, joints[1000])
+    robot = replace(arm(), sensors=tuple(s for s in arm().sensors if s.kind == "position"))
+    off = speeds_off(trial_of(robot, stopped, speeds), robot)
+    assert off.shape == joints.shape
+    before, there, after = (
+        np.sqrt(np.mean(off[rows] ** 2)) for rows in (slice(0, 900), slice(990, 1010), slice(1100, None))
+    )
+    assert there > 100 * max(before, after)

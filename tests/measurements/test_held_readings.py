@@ -12,8 +12,9 @@ import small_logs as logs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ee_dist.measurements.bunched import pace_of
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.measurements.held_readings import held_readings, written_late
+from ee_dist.measurements.held_readings import held_readings, read_in_turn, written_late
 from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping_file import read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
@@ -116,9 +117,65 @@ def test_a_torque_that_is_written_a_row_later_is_of_the_same_reading() -> None:
     rows = np.arange(0, len(T), 15)
     slow, late = holding(motion(T, 1), rows)[:, 0], holding(motion(T, 1), rows)
     late = np.roll(late[:, 0], 2)
-    assert written_late(slow, rows) == 0 and written_late(late, rows) == 2
-    assert written_late(motion(T, 1)[:, 0], rows) is None, "what changes in every row is told, and not read"
-    assert written_late(np.zeros(len(T)), rows) is None
+    assert written_late(slow, rows, T) == 0 and written_late(late, rows, T) == 2
+    assert written_late(motion(T, 1)[:, 0], rows, T) is None, "what changes in every row is told, and not read"
+    assert written_late(np.zeros(len(T)), rows, T) is None
+
+
+def in_turn(paces: tuple[int, ...], seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times (T,) of a log with a row whenever one of several sensors is read, each at its own pace (ms) and a little late now and
+    then; what it holds of all of them then (T, S), and what they would read (T, S)."""
+    rng = np.random.default_rng(seed)
+    stamps = [
+        np.arange(1 + 3 * k, 12_000, p) + rng.integers(0, 2, len(range(1 + 3 * k, 12_000, p)))
+        for k, p in enumerate(paces)
+    ]
+    at = np.unique(np.concatenate(stamps))
+    times_s, true = at * 1e-3, motion(at * 1e-3, len(paces))
+    columns = [
+        true[np.searchsorted(at, own)[np.clip(np.searchsorted(own, at, side="right") - 1, 0, None)], k]
+        for k, own in enumerate(stamps)
+    ]
+    return times_s, np.stack(columns, axis=1), true
+
+
+def test_sensors_that_are_read_in_turn_are_known_by_their_own_paces() -> None:
+    times_s, held, true = in_turn((33, 35, 12))
+    assert held_readings(held) is None, "something changes in nearly every row"
+    for k, pace in enumerate((33, 35)):
+        rows = read_in_turn(held[:, k], times_s)
+        assert rows is not None and np.median(np.diff(times_s[rows])) == pytest.approx(1e-3 * pace, rel=0.1)
+        between = np.interp(times_s, times_s[rows], held[rows, k])
+        assert np.abs(between - true[:, k])[100:-100].max() < 0.2 * np.abs(held - true)[100:-100, k].max()
+    assert read_in_turn(true[:, 0], times_s) is None, "what changes in every row is read in every row"
+    assert read_in_turn(np.zeros(len(times_s)), times_s) is None
+    coarse = 0.05 * np.round(true[:, 0] / 0.05)
+    assert read_in_turn(coarse, times_s) is None, "the steps of an encoder come when its joint has moved by one"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_held_does_not_say_that_rows_are_even(seed: int) -> None:
+    """Between rows that each come with a sensor of their own most columns stand still, however long that was."""
+    times_s, held, _ = in_turn((33, 35, 31), seed)
+    assert pace_of(times_s, held) is None
+
+
+def test_readings_in_turn_go_on_between_one_another(tmp_path: Path) -> None:
+    described = samples.robot_file(tmp_path)
+    described.write_text(described.read_text().replace("time_step_s: 0.01", "time_step_s: 0.002"))
+    robot, _ = load_robot(described)
+    times_s, held, true = in_turn((33, 35))
+    file = logs.written(tmp_path, logs.frame_of(times_s, held, motion(times_s + 0.04, 2)))
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal_for([file], robot, Hints()), str(described), file.name))
+    ((record, report),) = import_files([file], read_mapping(tmp_path / "mapping.yaml"), robot)
+    log = record.log
+    assert any("were read every 3" in n for n in report.done)
+    assert log.filled is not None and abs(len(log.readings) - 12_000 / 33) < 0.1 * 12_000 / 33
+    off = (
+        log.sensors[log.readings, :2]
+        - np.stack([np.interp(log.times_s + times_s[0], times_s, v) for v in true.T], axis=1)[log.readings]
+    )
+    assert np.abs(off[5:-5]).max() < 0.3 * np.abs(held - true)[100:-100].max()
 
 
 def test_rest_noise_and_dead_channels_are_no_seldom_readings() -> None:
@@ -141,7 +198,7 @@ def test_commands_keep_their_rows_where_sensors_repeat_theirs(tmp_path: Path) ->
     (tmp_path / "mapping.yaml").write_text(as_yaml(proposal_for([file], robot, Hints()), str(described), file.name))
     ((record, report),) = import_files([file], read_mapping(tmp_path / "mapping.yaml"), robot)
     log = record.log
-    (line,) = [n for n in report.done if "repeat all readings" in n]
+    (line,) = [n for n in report.done if "repeat readings" in n]
     assert "read every 10 ms" in line and f"{len(T) - len(rows)} of {len(T)} rows" in line
     assert log.filled is not None and np.array_equal(log.readings, rows)
     assert np.allclose(log.commands, goals[: len(log)], atol=1e-6)

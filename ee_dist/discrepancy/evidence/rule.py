@@ -40,6 +40,7 @@ STARTS = 3.0
 NOTHING = 1e-12
 """Energy that is none, to be divided by."""
 LUCK = "its gain on held-out data is no more than luck"
+OF_STARTS = "what is left without it is no more than starts that are off may make"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes too little of what is above the noise"
 TOO_LITTLE_ALONE = (
@@ -75,8 +76,10 @@ def why_not(
     # Where a model is wrong all over, useless effects take more off it by luck, in proportion.
     enough = least_energy(tried, max(1, proposal.size)) * dispersion + CAUTION * problem.gained
     counts = min(gain, total - floor - _of_starts(problem)) if problem.layout.by_segment else gain
-    if not np.isfinite(gain) or counts < enough:
+    if not np.isfinite(gain) or gain < enough:
         return LUCK
+    if counts < enough:
+        return OF_STARTS
     if may_be_zero(gained, low):
         return MAY_BE_ZERO
     worth = least_share(problem, cut, proposal, held)

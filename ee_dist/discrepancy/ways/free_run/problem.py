@@ -27,7 +27,7 @@ from ee_dist.discrepancy.ways.free_run.layout import lay_out
 from ee_dist.discrepancy.ways.free_run.longer_steps import SLIGHT, every_row_is_known, moved_by
 from ee_dist.discrepancy.ways.free_run.noise import noise_by_unit, noiseless
 from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, ToPositions, in_turn, pieces, spared, thinned
-from ee_dist.discrepancy.ways.free_run.starts import GROWN, grown_by_start, positions_off
+from ee_dist.discrepancy.ways.free_run.starts import GROWN, grown_by_start, positions_off, speeds_there
 from ee_dist.discrepancy.ways.free_run.windows import led, window_s
 from ee_dist.discrepancy.ways.free_run.words import how_begun, in_unit, of_models, taken_less
 from ee_dist.effects.catalogue import Hypothesis
@@ -140,11 +140,11 @@ class FreeRun(Problem):
 
     def _by_start(self) -> Array:
         """(n,) by how much more than noise a perfect model would leave, for it starts from what was measured."""
-        noise = self.noise
-        starts = [
-            (self._simulated(k, ()), positions_off(self.robot, self.columns, own, noise), speeds_off(t, self.robot))
-            for k, (t, own) in enumerate(zip(self.measured, self.own, strict=True))
-        ]
+        noise, trials = self.noise, list(enumerate(zip(self.measured, self.own, strict=True)))
+        models = [self._simulated(k, ()) for k, _ in trials]
+        positions = [positions_off(self.robot, self.columns, own, noise) for _, (_, own) in trials]
+        speeds = [(t.log.times_s - t.log.times_s[0], speeds_off(t, self.robot)) for _, (t, _) in trials]
+        starts = [(models[p.trial], positions[p.trial], speeds_there(p, *speeds[p.trial])) for p in self.pieces]
         return grown_by_start(self.pieces, starts, self.columns, self.own, noise, self.evaluator)
 
     def _models(self, hypotheses: Sequence[Hypothesis], trials: Collection[int], steps: int) -> dict[int, list[Robot]]:

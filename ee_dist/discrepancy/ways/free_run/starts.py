@@ -29,6 +29,14 @@ def positions_off(robot: Robot, columns: Sequence[int], own: Index, noise: Array
     return np.array([joints.get(m, 0.0) / MEAN_ABSOLUTE for m in robot.motor_names])
 
 
+def speeds_there(piece: Piece, times_s: Array, off: Array) -> Array:
+    """(M,) standard deviations of the speeds that a simulation of a piece begins with, of those at ``times_s`` (T,) of its trial
+    since the start, ``off`` (T, M)."""
+    anew = piece.start_s + piece.log.times_s[[0, *(k for k, _ in piece.again)]] - piece.log.times_s[0]
+    rows = np.clip(np.searchsorted(times_s, anew - 1e-9), 0, len(times_s) - 1)
+    return np.asarray(np.sqrt(np.mean(off[rows] ** 2, axis=0)))
+
+
 def grown_by_start(
     pieces: Sequence[Piece],
     starts: Sequence[tuple[Robot, Array, Array]],
@@ -38,10 +46,9 @@ def grown_by_start(
     evaluator: Evaluator,
 ) -> Array:
     """(n,) by how much more than noise each value is off, by the robot as it is described, a standard deviation beside each
-    measured position and speed. ``starts``: of each trial what is simulated, and (M,) these deviations of both."""
+    measured position and speed. ``starts``: of each piece what is simulated, and (M,) these deviations of both."""
     jobs, count = [], []
-    for p in pieces:
-        model, positions, speeds = starts[p.trial]
+    for p, (model, positions, speeds) in zip(pieces, starts, strict=True):
         beside = [p, *p.beside(positions, speeds)]
         jobs += [Job(b.rollout(model, len(p.log), False), ToPositions(columns, p.rows)) for b in beside]
         count.append(len(beside))
