@@ -65,6 +65,7 @@ MOST = 24
 REFUSALS = 2
 """How many steps may be refused because what is held out gets no better by them, before no other is looked for."""
 NO_MORE = "no further effect earns its place: {why}"
+NOR = "; nor does all that may be a little wrong everywhere, fitted at once"
 WORSE = "with all values fitted anew, data held out are foretold no better"
 NOTHING_LEFT = "nothing is left that counts, above the noise and above the resolution at which channels are compared"
 ASKED = "the effects asked for were added"
@@ -106,7 +107,7 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))
     else:
-        exchanges, looked, spread, anew, refused = 0, -1, 0, 0, 0
+        exchanges, looked, spread, anew, refused, nor = 0, -1, 0, 0, 0, ""
         beside: set[str] = set()
         tried_with: set[str] = set()
         seen: dict[str, tuple[Candidate, Array]] = {}
@@ -146,6 +147,7 @@ def improve(
                             climb(rung)
                         continue
                     refused += 1
+                nor = NOR if found is None else ""
             if best is None:
                 other = None
                 if exchanges < EXCHANGES and len(current.u) < LARGE and leftovers(problem, last.base):
@@ -156,7 +158,7 @@ def improve(
                     climb(rung)
                     continue
                 why_not = WORSE if worse else last.judged[0].why_not if last.judged else LUCK
-                stopped = NO_MORE.format(why=why_not)
+                stopped = NO_MORE.format(why=why_not) + ("" if spread else nor)
                 if settled(leftovers(problem, last.base), ladder[-1].error_heldout, problem.noise_floor()[0]):
                     stopped = NOTHING_LEFT
                 break

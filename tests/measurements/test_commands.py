@@ -108,13 +108,14 @@ def test_a_currents_gain(file: Path) -> None:
         import_file(file, mapping(torques={"servo": {"column": "tau", "unit": "A"}}), robot("torque"))
 
 
-def test_a_motor_that_was_led_by_its_voltage(tmp_path: Path) -> None:
+@pytest.mark.parametrize("called", ["goal_pwm", "pwm_servo_motor"])
+def test_a_motor_that_was_led_by_its_voltage(tmp_path: Path, called: str) -> None:
     """What it was led by is no torque yet: it is said how it becomes one."""
     file = tmp_path / "log.csv"
-    table = {"time_s": T, "position_rad": np.sin(T), "current_a": np.cos(3 * T), "goal_pwm": 300 * np.cos(3 * T)}
+    table = {"time_s": T, "position_rad": np.sin(T), "current_a": np.cos(3 * T), called: 300 * np.cos(3 * T)}
     pd.DataFrame(table).to_csv(file, index=False)
     found = proposal_for([file], robot("torque"), Hints())
-    said = [n for n in found.notes + found.questions if "goal_pwm is a voltage or duty cycle" in n]
+    said = [n for n in found.notes + found.questions if f"{called} is a voltage or duty cycle" in n]
     assert len(said) == 1
     assert "'scale:' the torque at rest" in said[0]
 

@@ -16,7 +16,7 @@ from ee_dist.measurements.proposal.still_commands import allowed_units, held, st
 from ee_dist.measurements.proposal.torque_scale import torque_units
 from ee_dist.measurements.proposal.units import LOOSE, UnitChoice, by_ratio
 from ee_dist.measurements.proposal.view import Scored, View
-from ee_dist.measurements.proposal.words import CURRENT, POSITION, SPEED, TORQUE, VOLTAGES, read_name, tokens
+from ee_dist.measurements.proposal.words import CURRENT, DUTIES, POSITION, SPEED, TORQUE, VOLTAGES, read_name, tokens
 from ee_dist.measurements.robot_channels import command_kinds
 from ee_dist.measurements.units import UNITS
 from ee_dist.trials.log import Array
@@ -120,7 +120,8 @@ def _voltages(v: View, kind: str) -> str:
     """What to do where drives obey torques, and voltages or duty cycles were asked for."""
     names = [a for t in v.timed.tables for a in t.addresses()] if kind == "torque" else []
     asked = [a for a in names if read_name(a).command and VOLTAGES & set(tokens(a))]
-    if not asked:
+    # A voltage may be measured; a duty cycle is nothing but told.
+    if not (asked := asked or [a for a in names if DUTIES & set(tokens(a))]):
         return ""
     what = "is a voltage or duty cycle" if len(asked) == 1 else "are voltages or duty cycles"
     return (

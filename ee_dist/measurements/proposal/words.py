@@ -19,7 +19,8 @@ _QUANTITY = {
     "ft fts ftsensor loadcell",
     TIME: "t time times timestamp timestamps stamp stamps zeit clock sec secs seconds elapsed uptime tstamp date datetime",
 }
-VOLTAGES = frozenset(["pwm", "duty", "volt", "volts", "voltage"])
+DUTIES = frozenset(["pwm", "duty"])
+VOLTAGES = DUTIES | {"volt", "volts", "voltage"}
 """Of what is asked of a motor without a controller of its torque."""
 _KIND = {w: k for k, words in _QUANTITY.items() for w in words.split()}
 _COMMAND = frozenset(
