@@ -185,9 +185,10 @@ def from_dict(entry: Mapping[str, Any]) -> Term:
 
 def apply(robot: Model, hypothesis: Iterable[Term]) -> Model:
     """The model: the system under every effect of the hypothesis, in order. Raises EffectError for a wrong target."""
+    found = robot
     for t in hypothesis:
-        robot = _under(robot, t)
-    return robot
+        found = _under(found, t, robot)
+    return found
 
 
 def applied(robot: Model, hypotheses: Iterable[Iterable[Term]]) -> list[Model]:
@@ -200,20 +201,27 @@ def applied(robot: Model, hypotheses: Iterable[Iterable[Term]]) -> list[Model]:
         for t in hypothesis:
             key = id(model), t
             if key not in known:
-                known[key] = _under(model, t)
+                known[key] = _under(model, t, robot)
             model = known[key]
         out.append(model)
     return out
 
 
-def _under(robot: Model, t: Term) -> Model:
-    """The system under one effect."""
+def _places(entry: Effect, robot: System, target: str) -> tuple[str, ...]:
+    """Where an effect acts on a system: at its target, or at all members of a group; nowhere that it cannot."""
+    allowed = entry.targets(robot)
+    return (target,) if target in allowed else members_of(robot, target, allowed)
+
+
+def _under(robot: Model, t: Term, described: Model) -> Model:
+    """The system under one effect, of a hypothesis on a ``described`` one: where others left nothing of what it changes, as of
+    a rotor at one of two joints, is still a place of it."""
     entry = find(t.effect)
     if not isinstance(robot, entry.of):
         raise EffectError(f"{t.effect} is an effect on a {_kind(entry.of)}; {robot.name} is a {_kind(type(robot))}")
-    allowed = entry.targets(robot)
-    places = (t.target,) if t.target in allowed else members_of(robot, t.target, allowed)
+    places = _places(entry, robot, t.target) or _places(entry, described, t.target)
     if not places:
+        allowed = entry.targets(robot)
         shared = entry.shared(robot) if isinstance(robot, Robot) else ()
         near = nearest(t.target, [*allowed, *shared]) or allowed
         raise EffectError(f"{t.effect} cannot act on {quoted(t.target)} of {robot.name}; it can act on: {listed(near)}")

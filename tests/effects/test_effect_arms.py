@@ -11,7 +11,8 @@ from effect_robots import ARM_M, MASS_KG, POINT, Bench, G, lever, slider
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ee_dist.effects import CATALOGUE, apply, term
+from ee_dist.effects import CATALOGUE, EffectError, apply, term
+from ee_dist.effects.catalogue import applied
 from ee_dist.robots.instruments import with_motor_torques
 from ee_dist.robots.inverse_dynamics import joint_torques, parameters
 from ee_dist.robots.mass_matrix import mass_matrix
@@ -153,6 +154,17 @@ def test_speed_gain_is_a_factor_on_the_damping_of_the_drive(bench: Bench) -> Non
     for factor in (0.0, 2.0):
         log = bench.run(robot, term("speed_gain", "joint", factor=factor), steps=501, speed=1.0)
         assert log.channel("velocity")[-1] == pytest.approx(math.exp(-3.0 * factor * 0.5 / MASS_KG), rel=0.01)
+
+
+def test_a_place_where_another_effect_left_nothing_is_still_one_of_a_group() -> None:
+    """A search may take all of a rotor off one joint, and try a factor on those of all joints beside that."""
+    robot = arm().with_drive("shoulder", rotor_inertia=0.02).with_drive("elbow", rotor_inertia=0.006)
+    none = term("rotor_inertia", "elbow", added_kg_m2=-robot.drives[1].rotor_inertia)
+    both = apply(robot, [none, term("rotor_factor", "all_joints", factor=2.0)])
+    assert [d.rotor_inertia for d in both.drives] == [2 * robot.drives[0].rotor_inertia, 0.0]
+    assert applied(robot, [[none, term("rotor_factor", "elbow", factor=2.0)]]) == [apply(robot, [none])]
+    with pytest.raises(EffectError, match="cannot act on 'knee'"):
+        apply(robot, [none, term("rotor_factor", "knee", factor=2.0)])
 
 
 def test_rotor_factor_is_a_factor_on_what_is_described_at_each_joint() -> None:
