@@ -11,8 +11,10 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from ee_dist.tasks.steps import Clock
 from ee_dist.workbench.verbs import Ended, Request, Told, serve
 
+STARTING = "starting"
 GONE = "the process that searched is gone (status {status}); nothing is lost: start it again"
 CANCELLED = "cancelled; nothing was changed"
 BUSY = "still at work: wait for it, or cancel it"
@@ -24,34 +26,31 @@ class BusyError(RuntimeError):
 
 @dataclass(frozen=True)
 class Progress:
-    """Of the verb under way. ``stages``: what was done before, with the seconds that each took; ``share`` of the stage
-    ``what``; times in seconds."""
+    """Of the verb under way. ``stages``: what was done before, with the seconds that each took; ``clock``: what is done now, and
+    since when."""
 
     request: Request
-    what: str = "starting"
-    share: float = 0.0
+    clock: Clock = field(default_factory=Clock)
     error: float | None = None
-    began_s: float = field(default_factory=time.monotonic)
-    stage_began_s: float = field(default_factory=time.monotonic)
+    since_s: float = field(default_factory=time.monotonic)
     stages: tuple[tuple[str, float], ...] = ()
 
     def after(self, told: Told) -> Progress:
+        now, clock = time.monotonic(), self.clock.after(told.what, told.share)
         if told.what == self.what:
-            return replace(self, share=told.share, error=told.error)
-        now = time.monotonic()
-        past = (*self.stages, (self.what, now - self.stage_began_s))
-        return replace(self, what=told.what, share=told.share, error=told.error, stage_began_s=now, stages=past)
+            return replace(self, clock=clock, error=told.error)
+        past = (*self.stages, (self.what, now - self.since_s))
+        return replace(self, clock=clock, error=told.error, since_s=now, stages=past)
 
     @property
-    def left_s(self) -> float | None:
-        """Of the stage under way, as far as it can be told."""
-        if self.share <= 0.0:
-            return None
-        return (time.monotonic() - self.stage_began_s) * (1.0 - self.share) / self.share
+    def what(self) -> str:
+        return self.clock.what or STARTING
 
     @property
-    def spent_s(self) -> float:
-        return time.monotonic() - self.began_s
+    def told(self) -> str:
+        """All of it in words."""
+        ahead = self.clock.ahead(self.error) if self.clock.what else STARTING
+        return f"{ahead}, {self.clock.spent_s:.0f} s so far in all"
 
 
 class Worker:

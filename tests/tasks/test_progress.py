@@ -85,9 +85,43 @@ def test_a_long_stage_says_from_its_first_word_how_long_it_will_take(monkeypatch
             progress(what, share)
     assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [
         "1 s weighing",
-        "6 s screening 5 %, about 95 s left of this stage",
-        "56 s screening 50 %, about 55 s left of this stage",
+        "6 s screening 5 %, about 95 s left of this step",
+        "56 s screening 50 %, about 55 s left of this step",
         "107 s scanning",
-        "127 s fitting 20 %, up to 80 s left of this stage",
-        "217 s fitting 10 %, up to 90 s left of this stage",
+        "127 s fitting 20 %, up to 80 s left of this fit",
+        "217 s fitting 10 %, up to 90 s left of this fit",
     ]
+
+
+def test_what_is_left_is_that_of_a_fit_and_a_fit_that_makes_no_headway_does_not_begin_anew(monkeypatch) -> None:
+    """How many fits a stage has nobody knows: what is known is how long it has gone on."""
+    now = 0.0
+    monkeypatch.setattr(progress_line.time, "monotonic", lambda: now)
+    out = io.StringIO()
+    with SearchProgress(Console(file=out, width=200)) as progress:
+        for at, what, share in ((10.0, "one more: screening", 1.0), (50.0, "at once: fitting 46 values", 0.25),
+                                (80.0, "at once: fitting 46 values", 0.25), (90.0, "at once: fitting 46 values", 1.0),
+                                (130.0, "at once: fitting 46 values", 0.25)):  # fmt: skip
+            now = at
+            progress(what, share)
+    assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [
+        "10 s one more: screening",
+        "50 s at once: fitting 46 values 25 %, up to 120 s left of this fit",
+        "80 s at once: fitting 46 values 25 %, up to 210 s left of this fit",
+        "130 s at once: fitting 46 values 25 %, up to 120 s left of this fit (this stage: 120 s so far)",
+    ]
+
+
+def test_the_live_line_says_the_same(monkeypatch) -> None:
+    now = 0.0
+    monkeypatch.setattr(progress_line.time, "monotonic", lambda: now)
+    out = io.StringIO()
+    console = Console(file=out, width=200, force_terminal=True, color_system=None)
+    with SearchProgress(console) as progress:
+        for at, share in ((20.0, 1.0), (40.0, 0.5)):
+            now = at
+            progress("at once: fitting 46 values", share, 0.5)
+    said = (
+        "fitting 46 values 50 %, error 0.5, up to 20 s left of this fit (this stage: 40 s so far), 40 s so far in all"
+    )
+    assert said in out.getvalue()

@@ -10,6 +10,7 @@ from ee_dist.workbench.pages.curves import Curves
 from ee_dist.workbench.pages.plot import Plot
 from ee_dist.workbench.pages.view import View, heading, of, quiet
 from ee_dist.workbench.results import REFUSED, Ranked
+from ee_dist.workbench.worker import STARTING
 
 WORDS = {"best": "Best", "tied": "Tied with the best", "earned": "Earned its place", "not": "Refused"}
 STAGES = {"screening": "screened", "scanning": "scanned over their range", "fitting": "fitted and judged"}
@@ -45,7 +46,7 @@ class ExplainView(View):
         session, found = self.session, self.session.explained
         progress = session.progress
         if progress is not None and progress.request.verb == verbs.EXPLAIN:
-            done = [f"{STAGES.get(w, w)} ({s:.0f} s)" for w, s in progress.stages if w != "starting"]
+            done = [f"{STAGES.get(w, w)} ({s:.0f} s)" for w, s in progress.stages if w != STARTING]
             self.stages.set_text(f"Now {progress.what}. Done: {', '.join(done) or 'nothing yet'}.")
         elif "progress" in topics:
             self.stages.set_text("")

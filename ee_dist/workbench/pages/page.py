@@ -10,8 +10,7 @@ from nicegui.events import KeyEventArguments
 
 from ee_dist.basics.names import counted
 from ee_dist.discrepancy.accounts.account import error_name
-from ee_dist.discrepancy.words import percent, plain
-from ee_dist.tasks.progress_line import left_of
+from ee_dist.discrepancy.words import plain
 from ee_dist.trials.log import Array
 from ee_dist.workbench import verbs
 from ee_dist.workbench.pages.add import AddView
@@ -187,14 +186,8 @@ class Page:
         self.working.set_visibility(progress is not None)
         if progress is None:
             return
-        left = progress.left_s
-        self.bar.set_value(progress.share)
-        self.doing.set_text(
-            f"{progress.request.verb}: {progress.what} {percent(progress.share)}"
-            + ("" if progress.error is None else f", error {progress.error:.3g}")
-            + ("" if left is None else f", {left_of(progress.what, left)}")
-            + f", {progress.spent_s:.0f} s so far"
-        )
+        self.bar.set_value(progress.clock.share)
+        self.doing.set_text(f"{progress.request.verb}: {progress.told}")
 
     # -- acting --------------------------------------------------------------------------------------------------------
 
