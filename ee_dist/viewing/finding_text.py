@@ -58,7 +58,7 @@ def channel_table(found: Finding) -> list[str]:
     if not any(c.error for c in ranked):
         return [f"All {len(ranked)} channels agree exactly: every error is 0."]
     largest = max(c.error for c in ranked)
-    lines = [f"| error{_unit(found)} | | RMS | channel | worst |", "|---|---|---|---|---|"]
+    lines = [f"| error{_unit(found)} | from 0 | RMS | channel | worst |", "|---|---|---|---|---|"]
     for c in ranked:
         unit = "" if c.unit in ("", "1") else f" {c.unit}"
         where = f"{c.worst_case}, {c.worst_from_s:.1f} s" if c.worst_case else ""
@@ -71,7 +71,7 @@ def candidate_table(candidates: Sequence[Candidate]) -> list[str]:
     if not candidates:
         return ["No candidate was judged."]
     largest = max(c.gain for c in candidates)
-    lines = ["| # | gain | | 95 % interval | | missing effect |", "|---|---|---|---|---|---|"]
+    lines = ["| # | gain | from 0 | 95 % interval | | missing effect |", "|---|---|---|---|---|---|"]
     for k, c in enumerate(candidates):
         name = f"**{c.label}**" if c.kind in (BEST, TIED) else c.label
         gain, told = percent_within(c.gain, c.low, c.high), percents(c.low, c.high)
@@ -86,7 +86,7 @@ def ladder_table(found: Finding) -> list[str]:
     largest = max(r.error_heldout for r in found.ladder)
     # The model as it was given was fitted to nothing; of one kind of data that was held out a line says which.
     cuts = list(dict.fromkeys(r.held_out for r in found.ladder[1:]))
-    lines = [f"| # | error held out{_unit(found)} | | in the fit | model |", "|---|---|---|---|---|"]
+    lines = [f"| # | error held out{_unit(found)} | from 0 | in the fit | model |", "|---|---|---|---|---|"]
     for k, rung in enumerate(found.ladder):
         fit = "" if rung.error_fit is None else f"{rung.error_fit:.3g}"
         on = f" (held out: {rung.held_out})" if len(cuts) > 1 and rung.held_out else ""

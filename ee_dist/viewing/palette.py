@@ -27,12 +27,18 @@ SERIES: tuple[Rgb, ...] = (
     (240, 128, 128),
     (176, 190, 197),
 )
-"""For lists of things of one kind: passes, motors."""
+"""For lists of things of one kind: motors, actions."""
+PASSES: tuple[Rgb, ...] = ((196, 206, 214), (112, 126, 140))
+"""For passes of the search, by turns: their order tells which is which, and blue, orange and violet mean something."""
 
 MEASURED_NAME, PREDICTED_NAME, HINDSIGHT_NAME = "measured", "predicted", "predicted_after"
 """Places among the entities; the viewer draws lines in their order, and thin ones must lie upon the thick measured one."""
 RESIDUALS: tuple[Rgb, ...] = ((236, 94, 94), *SERIES[2:])
 """For what is left when the prediction is taken off: neither blue nor orange."""
+
+
+def pass_colour(index: int) -> Rgb:
+    return PASSES[index % len(PASSES)]
 
 
 def series_colour(index: int) -> Rgb:

@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 
 from ee_dist.recording.records import GenerationRecord, HypothesisRecord
-from ee_dist.viewing.palette import HINDSIGHT, series_colour
+from ee_dist.viewing.palette import HINDSIGHT, pass_colour
 
 BETWEEN_PASSES = 4
 """Empty places between the bars of two passes."""
@@ -44,7 +44,7 @@ def send_curve(
             place,
             rr.BarChart(
                 np.array([r.best for r in own]),
-                color=series_colour(pass_index),
+                color=pass_colour(pass_index),
                 abscissa=np.array([begin + r.generation for r in own], dtype=float),
             ),
             static=True,

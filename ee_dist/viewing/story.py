@@ -10,11 +10,13 @@ from ee_dist.discrepancy import words
 from ee_dist.effects.catalogue import EVERY, Hypothesis, Term, from_dict
 from ee_dist.effects.effect import EffectError
 from ee_dist.recording.records import (
+    DIAGNOSIS,
     EVOLVED,
     EVOLVING,
     HARDWARE,
     HINDSIGHT,
     PREDICTION,
+    REPAIR,
     STAGES,
     HypothesisRecord,
     RunRecord,
@@ -42,6 +44,18 @@ def guide(robot: System, hindsight: bool) -> str:
     if any(s.kind == "touch" for s in robot.sensors):
         said.append("**Green**: a foot whose sensor reports the floor.")
     return " ".join([*said, "Press play: the trials run one after another."])
+
+
+def bars_guide(run: RunRecord) -> list[str]:
+    """How to read the bars of the search; nothing where there are none."""
+    phases = {g.phase for g in run.generations if g.best}
+    if not phases.intersection((REPAIR, DIAGNOSIS)):
+        return []
+    believed = "; **violet**: the error of what was believed" if DIAGNOSIS in phases and beliefs(run) else ""
+    return [
+        f"**Grey bars**: the best of each generation, from 0; light and dark take turns, pass by pass{believed}.",
+        "",
+    ]
 
 
 def truth_of(run: RunRecord) -> Hypothesis | None:
@@ -161,6 +175,7 @@ def result_text(run: RunRecord) -> str:
         *finding(run),
         guide(run.robot, after),
         "",
+        *bars_guide(run),
         f"**{subject.meaning}{f' ({subject.unit})' if subject.unit else ''}**",
         "",
     ]

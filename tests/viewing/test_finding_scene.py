@@ -124,6 +124,7 @@ def test_the_ladder_falls_to_the_floor(tmp_path: Path) -> None:
     first = next(line for line in text.splitlines() if line.startswith("| 0 |"))
     last = next(line for line in text.splitlines() if line.startswith("| 1 |"))
     floor = next(line for line in text.splitlines() if "noise alone" in line and line.startswith("|"))
+    assert "| from 0 | in the fit |" in text, "where the bars begin"
     assert first.count("■") > last.count("■") >= floor.count("■") >= 1
     on = [replace(r, held_out="other windows") for r in f.ladder]
     text = "\n".join(ladder_table(replace(f, ladder=tuple(on))))

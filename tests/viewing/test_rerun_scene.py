@@ -21,7 +21,7 @@ from ee_dist.recording.records import HARDWARE, HINDSIGHT, PREDICTION, RunRecord
 from ee_dist.recording.writer import RunWriter
 from ee_dist.robots.kinematics import part_poses
 from ee_dist.viewing import story
-from ee_dist.viewing.palette import FOOT, TOUCHING
+from ee_dist.viewing.palette import FOOT, PASSES, TOUCHING
 from ee_dist.viewing.rerun_scene import APPLICATION, write_rrd
 from ee_dist.viewing.world import BESIDE_M, LOOK_AHEAD_M
 
@@ -213,6 +213,14 @@ def test_search_curves(run: RunRecord, rrd: Path) -> None:
             assert np.diff(axis["buffer"]).tolist() == [1.0] * (len(best) - 1)
             assert axis["buffer"][0] > last
             last = axis["buffer"][-1]
+
+
+def test_bars_have_colours_that_mean_nothing_else_and_the_text_says_which(run: RunRecord, rrd: Path) -> None:
+    shades = [rows_of(rrd, f"search/distance/repair_{p + 1}", "BarChart:color")[1][0][0] for p in range(3)]
+    coded = [sum(v << shift for v, shift in zip((*c, 255), (24, 16, 8, 0), strict=True)) for c in PASSES]
+    assert shades == [coded[0], coded[1], coded[0]]
+    text = rows_of(rrd, "texts/result", "TextDocument:text")[1][0][0]
+    assert "**Grey bars**: the best of each generation, from 0" in text and "**violet**: the error of what was" in text
 
 
 def test_the_first_lines_tell_what_was_found_how_sure_and_what_next(run: RunRecord, rrd: Path) -> None:
