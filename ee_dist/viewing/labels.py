@@ -19,6 +19,12 @@ def wrapped(name: str, width: int = 30) -> str:
     return "<br>".join(wrap(name, width))
 
 
+def cut(name: str, most: int) -> str:
+    """A name of so many characters at most, its end and beginning kept: those of one kind mostly differ there."""
+    half = (most - 1) // 2
+    return name if len(name) <= most else f"{name[: most - 1 - half]}…{name[-half:]}"
+
+
 def left_edge(intervals: Sequence[tuple[float, float]]) -> float:
     """Where a chart of gains begins (percent): it shows all losses, as far as there is room."""
     return max(min([100 * low for low, _ in intervals if math.isfinite(low)] + [0.0]) - 3, LOSS)

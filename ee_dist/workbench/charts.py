@@ -13,7 +13,7 @@ import numpy as np
 from ee_dist.discrepancy.words import plain
 from ee_dist.trials.log import Array
 from ee_dist.viewing.curves import Overlay
-from ee_dist.viewing.labels import STANDOFF, cut_marks, left_edge, wrapped
+from ee_dist.viewing.labels import STANDOFF, cut, cut_marks, left_edge, wrapped
 from ee_dist.workbench.bench import Step
 from ee_dist.workbench.sight import Cloud
 
@@ -23,6 +23,8 @@ DOTS = 1500
 """Points of a cloud that are drawn."""
 NUMBERED = 150
 """Cells of a map up to which each has its number in it."""
+CHANNEL, TRIAL, ACROSS = 18, 20, 36
+"""Letters beside a map in a line of a channel's name, of a trial's name on end, and of all trials' names side by side."""
 NAME, LINE = 24, 18
 """Letters that fit beside the upper curves before they run into what is told of the lower ones, and pixels of another line."""
 MARGIN = {"l": 56, "r": 14, "t": 28, "b": 40}
@@ -167,7 +169,11 @@ def heat(
     z = table[:, shown].T
     top = max(least_top, float(np.nanquantile(z, 0.98))) if z.size else least_top
     names = [plain(channels[k]) for k in shown]
-    labels = [wrapped(t, 14) for t in trials]
+    rows = [wrapped(cut(n, 2 * CHANNEL), CHANNEL) for n in names]
+    # Where a word would be broken, names stand on end; all of a name is told where the mouse is.
+    each = ACROSS // max(len(trials), 1)
+    on_end = any(len(word) > each for t in trials for word in t.split())
+    labels = [cut(t, TRIAL) if on_end else wrapped(t, each) for t in trials]
     trace: Chart = {
         "type": "heatmap", "z": [_short(row) for row in z], "x": list(range(len(trials))), "y": list(range(len(shown))),
         "customdata": [[[t, k] for t in range(len(trials))] for k in shown], "zmin": 0.0, "zmax": top, "colorscale": "Cividis",
@@ -184,12 +190,13 @@ def heat(
                        "line": {"color": "#d55e00", "width": 3}})  # fmt: skip
     return _rows(
         trace,
-        90 + 24 * len(shown),
-        {"tickvals": list(range(len(trials))), "ticktext": labels, "automargin": True, "showgrid": False},
-        {"tickvals": list(range(len(shown))), "ticktext": names, "showgrid": False},
+        90 + (30 if any("<br>" in r for r in rows) else 24) * len(shown) + (90 if on_end else 0),
+        {"tickvals": list(range(len(trials))), "ticktext": labels, "automargin": True, "showgrid": False,
+         "tickangle": -90 if on_end else 0},
+        {"tickvals": list(range(len(shown))), "ticktext": rows, "showgrid": False},
         shapes=shapes,
         margin={"l": 10, "r": 10, "t": 8, "b": 30},
-    )
+    )  # fmt: skip
 
 
 def bars(names: Sequence[str], values: Sequence[float], floor: float, axis: str = "error") -> Chart:

@@ -79,3 +79,18 @@ def test_the_colours_of_a_map_end_no_lower_than_is_asked() -> None:
     assert charts.heat(noise, ("a", "b"), ("one", "two"), None, 3.0)["data"][0]["zmax"] == 3.0
     assert charts.heat(30 * noise, ("a", "b"), ("one", "two"), None, 28.1)["data"][0]["zmax"] == 28.1
     assert charts.heat(50 * noise, ("a", "b"), ("one", "two"), None, 28.1)["data"][0]["zmax"] == pytest.approx(45.0)
+
+
+def test_names_of_a_map_have_room_and_are_whole_where_the_mouse_is() -> None:
+    channels, trials = (
+        ("torque_knee_front_right", "roll"),
+        [f"{k}. a_long_name_of_a_multisine_{k}" for k in range(1, 8)],
+    )
+    chart = charts.heat(np.ones((7, 2)), channels, trials, None, 3.0)
+    down, across = chart["layout"]["yaxis"]["ticktext"], chart["layout"]["xaxis"]
+    assert down == ["torque knee front<br>right", "roll"]
+    assert across["tickangle"] == -90 and all(len(t) <= charts.TRIAL for t in across["ticktext"])
+    assert len(set(across["ticktext"])) == 7
+    assert chart["data"][0]["text"][0][0] == f"torque knee front right<br>{trials[0]}<br>1"
+    few = charts.heat(np.ones((2, 2)), channels, ("1. multisine", "2. steps"), None, 3.0)["layout"]["xaxis"]
+    assert few["tickangle"] == 0 and few["ticktext"] == ["1. multisine", "2. steps"]
