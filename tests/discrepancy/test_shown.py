@@ -148,7 +148,7 @@ def test_regimes_and_root_mean_squares_say_what_they_are_of() -> None:
         RegimeReport("high load", 9.0, 0, 0.1),
     ]
     assert of_all_regimes(found.regimes) == pytest.approx(np.sqrt(5.6 / 0.8))
-    assert "joints' readings, 2.65 in all" in regimes_section(problem, found).caption
+    assert "joints' readings, error 2.65 in all" in regimes_section(problem, found).caption
     assert "also counts" not in regimes_section(problem, found).caption, "these are all that is compared"
     problem.layout = replace(problem.layout, reading=np.arange(len(problem.data)) > 0)
     why = f"The error of the model, {problem.told(found.error)}, also counts how much readings scatter and how often they repeat."
@@ -162,7 +162,8 @@ def test_regimes_and_root_mean_squares_say_what_they_are_of() -> None:
     console = Console(width=100, record=True, file=io.StringIO())
     show_comparison(console, problem, found)
     said = " ".join(console.export_text().split())
-    assert "channels (rmse: of means over 0.02 s)" in said and "regimes (joints' readings, 2.65 in all)" in said
+    assert "channels (rmse: of means over 0.02 s)" in said
+    assert "regimes, by what a joint was doing at the time (joints' readings, error 2.65 in all)" in said
 
 
 def test_forces_over_rows_that_were_lost_are_said_to_be_compared() -> None:

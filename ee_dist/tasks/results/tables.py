@@ -52,12 +52,13 @@ def show_comparison(console: Console, problem: Problem, found: Comparison) -> No
     ordered = sorted(found.regimes, key=lambda r: -r.error)
     rows2 = [(r.name, problem.told(r.error), excess_share(found, r), percent(r.values)) for r in ordered]
     columns = (("regime", False), ("error", True), ("share of excess", True), ("of data", True))
-    console.print(_table(f"Where it fails: regimes ({regimes_of(problem, found)})", columns, rows2))
+    doing = "Where it fails: regimes, by what a joint was doing at the time"
+    console.print(_table(f"{doing} ({regimes_of(problem, found)})", columns, rows2))
 
 
 def regimes_of(problem: Problem, found: Comparison) -> str:
     """What regimes are regimes of: not of all that the error of a model counts."""
-    return f"joints' readings, {problem.told(of_all_regimes(found.regimes))} in all"
+    return f"joints' readings, error {problem.told(of_all_regimes(found.regimes))} in all"
 
 
 def show_candidates(console: Console, problem: Problem, judged: Sequence[Judged], title: str) -> None:
