@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +83,9 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         known = [g for g in guessed if g in entry]
         marked = entry | {ASSUMED: known} if known else entry
         line(f"  {_plain(name)}: {_flow(marked)}", ", ".join(guessed) or None, known != guessed)
+    idle = _undriven(body)
+    if idle:
+        lines += _led(body, idle, inertia)
     assumed += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if names[3:] else ''}: {mark}"
                 for mark, names in by_mark.items()]  # fmt: skip
     assumed += told(blank, body, swinging)
@@ -113,7 +116,37 @@ def starter(body: Body, kind: str, source: str, where: str) -> Starter:
         tuple(_row(robot, j) for j in body.moving),
         (*read, *said),
         tuple(assumed),
-        _missing(robot) + _trusted(robot),
+        (*_nobody_leads(idle), *_missing(robot), *_trusted(robot)),
+    )
+
+
+def _undriven(body: Body) -> tuple[Joint, ...]:
+    """Joints that a file without any actuator has stops or passive forces of: of what drives them it says nothing."""
+    if any(known.get("command", "none") != "none" for known in body.drives.values()):
+        return ()
+    return tuple(j for j in body.moving if j.name in body.driven)
+
+
+def _led(body: Body, idle: Sequence[Joint], inertia: Mapping[str, float]) -> list[str]:
+    """Comments for a description: the lines of drives by whose controllers such joints are led, with gains as they are guessed
+    for a file that never has any."""
+    bare = {
+        n: {k: v for k, v in d.items() if k != "command" and (k, v) != ("torque_limit", math.inf)}
+        for n, d in body.drives.items()
+    }
+    undriven, found = replace(body, drives=bare, driven=()), ["# where a controller leads a joint, its line is"]
+    for joint in idle:
+        entry, guessed = _drive(joint, undriven, inertia[joint.name], blank=False)
+        found.append(f"#  {_plain(joint.name)}: {_flow(entry | {ASSUMED: guessed})}")
+    return found
+
+
+def _nobody_leads(idle: Sequence[Joint]) -> tuple[str, ...]:
+    if not idle:
+        return ()
+    return (
+        f"what drives {_first([j.name for j in idle])}: the file has no actuators, so each swings freely and no command of a log "
+        "is its own; where a controller leads one, take its line in the comments below the drives",
     )
 
 
@@ -188,7 +221,7 @@ def moving_mass(robot: Robot) -> float:
 
 
 def _acted_on(known: Mapping[str, float | str]) -> bool:
-    return known.get("command") != "none" or not set(known) <= {"command", "torque_limit"}
+    return known.get("command") != "none" or any(v for k, v in known.items() if k not in ("command", "torque_limit"))
 
 
 def _rounded(value: float) -> float:

@@ -101,6 +101,27 @@ def test_gains_that_a_file_states_are_asked_about(tmp_path: Path) -> None:
         assert any(m.startswith(torques) for m in made.missing) != asked
 
 
+def test_of_a_file_without_actuators_it_is_said_how_a_controller_leads_a_joint(tmp_path: Path) -> None:
+    """The comments are lines of drives: with their mark taken off they are the description of a robot that takes commands."""
+    cart = CART.replace("<joint ", '<joint limited="true" range="-1 1" ')
+    file = written(tmp_path, cart, "")
+    made = starter(read_mjcf(file), "mjcf", file.name, str(file))
+    assert {d.command for d in made.robot.drives} == {"none"}
+    assert any(m.startswith("what drives x, pole: the file has no actuators") for m in made.missing)
+    assert made.read[2].startswith("0 joints with a drive")
+    lines = made.text.splitlines()
+    led = [line.replace("#", " ", 1) for line in lines if line.startswith("#  ")]
+    kept = [line for line in lines if not line.startswith((*(f"  {d.joint}:" for d in made.robot.drives), "#"))]
+    kept[kept.index("drives:") + 1 : kept.index("drives:") + 1] = led
+    (tmp_path / "led.yaml").write_text("\n".join(kept))
+    robot, _ = load_robot(tmp_path / "led.yaml")
+    assert [(d.joint, d.command) for d in robot.drives] == [("x", "position"), ("pole", "position")]
+    assert all(d.kp > 0 and d.kd > 0 and np.isfinite(d.torque_limit) for d in robot.drives)
+    assert robot.assumed_joints("kp") and robot.assumed_joints("torque_limit")
+    driven = written(tmp_path, cart, '<actuator><motor joint="x"/></actuator>')
+    assert "#  " not in starter(read_mjcf(driven), "mjcf", driven.name, str(driven)).text
+
+
 def test_joints_that_the_file_leaves_undriven_swing_from_where_they_start(tmp_path: Path) -> None:
     file = written(tmp_path, CART, f'<actuator><motor joint="x"/></actuator>{TILTED}')
     body = read_mjcf(file)

@@ -86,3 +86,18 @@ def test_where_nothing_is_driven_a_log_of_positions_is_all_that_there_is(tmp_pat
     trials = (MeasuredTrial(record.name, record.log, Commands(record.log.commands)),)
     measured = Measurements(robot, trials, (file,), (), robot, tmp_path)
     assert way_of(measured, "auto").name == "free_run"
+
+
+def test_commands_that_no_joint_takes_are_said_to_be_left_out_with_what_would_be_right(tmp_path: Path) -> None:
+    m, path = samples.motion(), samples.robot_file(tmp_path)
+    text = path.read_text().split("drives:")[0]
+    path.write_text(f"{text}drives:\n" + "".join(f"  {j}: {{command: none}}\n" for j in samples.JOINTS))
+    robot, _ = load_robot(path)
+    frame = logs.frame_of(m["t"], m["q"], m["g"])
+    goals = [c for c in frame if "goal" in c]
+    file = logs.written(tmp_path, frame)
+    (said,) = [n for n in proposal_for([file], robot, Hints()).notes if "takes commands" in n]
+    assert said.startswith(f"{goals[0]}, {goals[1]}: called commands and left out, for no joint of {robot.name} takes")
+    assert "robot.drives=FILE" in said and "command: position, kp: ..., kd: ..." in said
+    without = logs.written(tmp_path, frame.drop(columns=goals))
+    assert not any("takes commands" in n for n in proposal_for([without], robot, Hints()).notes)

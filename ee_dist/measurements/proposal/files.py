@@ -20,6 +20,7 @@ from ee_dist.measurements.proposal.of_all_trials import tell_of_all_trials
 from ee_dist.measurements.proposal.one_by_one import behind_one_another, one_by_one
 from ee_dist.measurements.proposal.stated import add_stated
 from ee_dist.measurements.proposal.time import TimeChoice, time_of
+from ee_dist.measurements.proposal.undriven import untaken_commands
 from ee_dist.measurements.proposal.words import TIME, read_name, role_of, tokens
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.table import Recorded, Table
@@ -230,6 +231,7 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
     if left:
         more = f" and {len(left) - MOST_SHOWN} more" if len(left) > MOST_SHOWN else ""
         proposal.notes.append(f"columns not used: {', '.join(left[:MOST_SHOWN])}{more}")
+    proposal.notes += untaken_commands(left, robot)
     empty = [a for t in recorded.tables for a in t.addresses() if a not in used and not recorded_in(t, a)]
     if empty:
         more = f" and {len(empty) - MOST_SHOWN} more" if len(empty) > MOST_SHOWN else ""
