@@ -290,7 +290,10 @@ def ranking(
     return _rows(
         trace,
         104 + 36 * len(names),
-        {"title": {"text": "gain above the noise, held out (%)"}, "range": [left_edge(intervals), 106]},
+        {
+            "title": {"text": "gain above the noise,<br>held out (%)", "standoff": 4},
+            "range": [left_edge(intervals), 106],
+        },
         {"ticklabelstandoff": STANDOFF},
         showlegend=False,
         annotations=cut_marks(names, gains, intervals),

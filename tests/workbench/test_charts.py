@@ -94,3 +94,10 @@ def test_names_of_a_map_have_room_and_are_whole_where_the_mouse_is() -> None:
     assert chart["data"][0]["text"][0][0] == f"torque knee front right<br>{trials[0]}<br>1"
     few = charts.heat(np.ones((2, 2)), channels, ("1. multisine", "2. steps"), None, 3.0)["layout"]["xaxis"]
     assert few["tickangle"] == 0 and few["ticktext"] == ["1. multisine", "2. steps"]
+
+
+def test_the_axis_of_gains_has_room_on_a_phone() -> None:
+    title = charts.ranking(["a", "b"], [0.5, 0.2], [(0.4, 0.6), (0.1, 0.3)], ["best", "not"])["layout"]["xaxis"][
+        "title"
+    ]
+    assert max(len(line) for line in title["text"].split("<br>")) <= 24
