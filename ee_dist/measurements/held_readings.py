@@ -52,9 +52,9 @@ def held_readings(readings: Array, every: float | None = None) -> NDArray[np.int
 def read_in_turn(column: Array, times_s: Array, pace_s: float | None = None) -> NDArray[np.intp] | None:
     """Numbers of the rows in which a column (T,) was read, of a log that has a row whenever one of several sensors is read and
     holds the others; None where its changes, at ``times_s`` (T,), keep to no pace of their own, or come as often as rows.
-    ``pace_s``: that which another trial of the same logger shows."""
+    ``pace_s``: that which another trial of the same logger shows. What leaves cells empty between its readings holds none."""
     rows = np.flatnonzero(np.diff(column)) + 1
-    if len(rows) < CLEAR:
+    if len(rows) < CLEAR or not np.isfinite(column).all():
         return None
     sizes, gaps_s = np.abs(np.diff(column))[rows - 1], np.diff(times_s[rows])
     usual_s, usual = float(np.median(gaps_s)), float(np.median(np.diff(rows)))

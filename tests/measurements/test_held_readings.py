@@ -149,6 +149,8 @@ def test_sensors_that_are_read_in_turn_are_known_by_their_own_paces() -> None:
         assert np.abs(between - true[:, k])[100:-100].max() < 0.2 * np.abs(held - true)[100:-100, k].max()
     assert read_in_turn(true[:, 0], times_s) is None, "what changes in every row is read in every row"
     assert read_in_turn(np.zeros(len(times_s)), times_s) is None
+    empty = np.where(np.r_[True, np.diff(held[:, 0]) != 0], held[:, 0], np.nan)
+    assert read_in_turn(empty, times_s) is None
     coarse = 0.05 * np.round(true[:, 0] / 0.05)
     assert read_in_turn(coarse, times_s) is None, "the steps of an encoder come when its joint has moved by one"
 
