@@ -209,6 +209,8 @@ def _drive(joint: Joint, body: Body, inertia: float, blank: bool) -> tuple[dict[
     elif known.get("torque_limit") == math.inf and known.get("command") != "none":
         guessed.append("no torque limit in the file")
     order = ["command", "kp", "ki", "kd", "torque_limit"]
+    # A file that says damping by a force's bias has a zero with a sign.
+    known = {k: v + 0.0 if isinstance(v, float) else v for k, v in known.items()}
     return {k: known[k] for k in [*(o for o in order if o in known), *(k for k in known if k not in order)]}, guessed
 
 

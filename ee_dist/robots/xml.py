@@ -13,6 +13,8 @@ LARGEST_BYTES = 50_000_000
 DEEPEST = 200
 """Elements within one another: more than any robot has, and few enough for code that follows them."""
 
+YAML = (".yaml", ".yml")
+
 
 class XmlError(RobotError):
     """A file that is not well-formed XML, or that asks for more than a description of a robot needs; one line."""
@@ -21,6 +23,10 @@ class XmlError(RobotError):
 def read_xml(path: str | Path, what: str = "a robot") -> tuple[ET.Element, bytes]:
     """The outermost element, and the file's bytes. Raises XmlError: no file, too large, a DTD, too deep, not XML."""
     file = Path(path)
+    if file.suffix.lower() in YAML:
+        raise XmlError(
+            f"{file}: a YAML, where an XML file is asked for; a description of drives is given as robot.drives={file}"
+        )
     with told_as(XmlError, file, what):
         if file.stat().st_size > LARGEST_BYTES:
             raise XmlError(f"{file}: {file.stat().st_size / 1e6:.0f} MB; the description of {what} has at most 50")

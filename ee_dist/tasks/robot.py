@@ -19,6 +19,7 @@ from ee_dist.robots.ranges import span
 from ee_dist.robots.starter import JOINT_COLUMNS, Starter, moving_mass, source_from, starter
 from ee_dist.tasks.config import Config, ConfigError
 from ee_dist.tasks.folder import check_file_name
+from ee_dist.tasks.results.commands import command
 from ee_dist.tasks.summary import Stopwatch, digest_of, write_summary
 from ee_dist.tasks.terminal import terminal
 from ee_dist.trials.log import Array, SensorLog, start_of
@@ -68,7 +69,7 @@ def run(config: Config, options: Options, out: Path) -> None:
     }
     write_summary(out, "robot", config, options, watch, digest_of((robot, found.text)), rest)
     write_rrd(scene(robot), out / "robot.rrd")
-    tell(terminal(), found, out / options.output)
+    tell(terminal(), found, out / options.output, kind)
 
 
 def text_of(found: Starter) -> str:
@@ -81,8 +82,8 @@ def text_of(found: Starter) -> str:
     return "\n".join(head) + "\n" + found.text
 
 
-def tell(console: Console, found: Starter, file: Path) -> None:
-    """Print what was read, assumed and missing."""
+def tell(console: Console, found: Starter, file: Path, kind: str) -> None:
+    """Print what was read, assumed and missing, and what is next; ``kind``: of the robot (conf/robot)."""
     joints = Table(title=found.robot.name, title_justify="left", box=None, padding=(0, 1, 0, 0))
     for k, name in enumerate(JOINT_COLUMNS):
         # Where there is little room titles and names are folded, and numbers whole.
@@ -95,6 +96,8 @@ def tell(console: Console, found: Starter, file: Path) -> None:
         for line in lines or ("nothing",):
             console.print(f"{title:8} {line}", highlight=False, markup=False, soft_wrap=True)
     console.print(f"wrote {file} and {file.parent / 'robot.rrd'}", highlight=False, soft_wrap=True)
+    following = command(["task=import", "measured=YOUR_LOG", f"robot={kind}", f"robot.drives={file}"])
+    console.print(f"Next: {following}", highlight=False, markup=False, soft_wrap=True)
 
 
 def scene(robot: Robot) -> RunRecord:

@@ -188,6 +188,7 @@ def test_hobby_arms_of_lerobot(tmp_path: Path, scale: float, unit: str | None, f
         assert "say task.unit=deg or task.unit=percent" in proposal.questions[0]
         return
     assert not proposal.questions
+    assert any("range_min and range_max" in n for n in proposal.notes) == (unit == "percent")
     (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(tmp_path / "chain.yaml"), "set"))
     found = import_files([path], read_mapping(tmp_path / "mapping.yaml"), robot)
     assert [r.name for r, _ in found] == ["episode 0", "episode 1"]

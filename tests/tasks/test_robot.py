@@ -40,14 +40,19 @@ def test_a_urdf_becomes_a_description_with_its_assumptions_marked(cli):
     assert found["mass_kg"] == pytest.approx(sum(p.mass_kg for p in robot.parts))
     assert any("rotor inertia" in m for m in found["missing"])
     assert "turn, shoulder, elbow: command, kp, kd" in outcome.out
+    assert (
+        f"Next: python -m ee_dist task=import measured=YOUR_LOG robot=urdf robot.drives={run / 'robot.yaml'}"
+        in outcome.out
+    )
 
 
 def test_an_mjcf_brings_its_own_drives_and_the_robot_is_usable_at_once(cli, tmp_path):
     file = tmp_path / "swing.xml"
-    file.write_text(MJCF)
+    file.write_text(MJCF.replace('kv="1"', ""))
     outcome = cli("task=robot", f"mjcf={file}")
     assert outcome.status == 0, outcome.err
     (run,) = outcome.runs()
+    assert "-0.0" not in (run / "robot.yaml").read_text()
     robot, _ = load_robot(run / "robot.yaml")
     assert robot == load_robot(file)[0]
     assert "# assumed" not in (run / "robot.yaml").read_text().split("drives:")[1]
@@ -132,3 +137,11 @@ def test_who_stops_reading_ends_the_run_in_words():
     stop.__context__ = BrokenPipeError()
     assert "sys.exit" not in unasked_end(stop)
     assert "sys.exit(3)" in unasked_end(SystemExit(3))
+
+
+def test_a_description_in_the_place_of_its_xml_is_told_where_it_goes(cli, tmp_path):
+    file = tmp_path / "arm.yaml"
+    file.write_text("mjcf: arm.xml\n")
+    outcome = cli("task=trial", "robot=mjcf", f"robot.file={file}", "engine=mujoco")
+    assert outcome.status != 0
+    assert f"a description of drives is given as robot.drives={file}" in outcome.err

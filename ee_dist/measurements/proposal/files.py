@@ -21,6 +21,7 @@ from ee_dist.measurements.proposal.one_by_one import behind_one_another, one_by_
 from ee_dist.measurements.proposal.stated import add_stated
 from ee_dist.measurements.proposal.time import TimeChoice, time_of
 from ee_dist.measurements.proposal.undriven import untaken_commands
+from ee_dist.measurements.proposal.units import CALIBRATED, OF_RANGES
 from ee_dist.measurements.proposal.words import TIME, read_name, role_of, tokens
 from ee_dist.measurements.readers import read
 from ee_dist.measurements.table import Recorded, Table
@@ -232,6 +233,7 @@ def proposal_for(files: Sequence[Path], robot: Robot, hints: Hints) -> Proposal:
         more = f" and {len(left) - MOST_SHOWN} more" if len(left) > MOST_SHOWN else ""
         proposal.notes.append(f"columns not used: {', '.join(left[:MOST_SHOWN])}{more}")
     proposal.notes += untaken_commands(left, robot)
+    proposal.notes += [CALIBRATED] * any(OF_RANGES in c.why for c in proposal.choices)
     empty = [a for t in recorded.tables for a in t.addresses() if a not in used and not recorded_in(t, a)]
     if empty:
         more = f" and {len(empty) - MOST_SHOWN} more" if len(empty) > MOST_SHOWN else ""

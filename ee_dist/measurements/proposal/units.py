@@ -27,6 +27,13 @@ LOOSE = 4.0
 COUNTS = 360.0
 """Whole numbers beyond this may be the counts of an encoder where a joint has no end."""
 GRIPPERS = ("gripper", "jaw", "finger", "claw")
+OF_RANGES = "shares of each joint's range, taken to be that between the model's limits"
+CALIBRATED = (
+    f"positions in percent are {OF_RANGES}: a servo that was calibrated over less of it went less far than is read here, by that "
+    "share (LeRobot's calibration file has its ends, range_min and range_max, 4096 to a turn): put them into the joint's limits, "
+    "or mend 'scale' and 'offset' in the mapping"
+)
+"""What people are told of that."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +199,7 @@ def _share(block: Block, joints: Sequence[Joint]) -> UnitChoice:
         _of_range(j, 0.0 if any(g in c.lower() for g in GRIPPERS) else -100.0)
         for c, j in zip(block.columns, joints, strict=True)
     )
-    return UnitChoice(entries, LIKELY, "shares of each joint's range, taken to be that between the model's limits")
+    return UnitChoice(entries, LIKELY, OF_RANGES)
 
 
 def _of_range(joint: Joint, low: float) -> dict[str, Any]:
