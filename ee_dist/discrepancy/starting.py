@@ -98,7 +98,7 @@ def speeds_off(trial: MeasuredTrial, robot: Robot) -> Array:
     noise = np.broadcast_to(slow_noise(even.times_s, sensed), sensed.shape)
     curve = _curve(even) if trial.commands_held else None
     off = noise if curve is None else np.where(curve.better(sensors, sensed), curve.noise, noise)
-    return np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in off.T], axis=1)
+    return _at(trial.log, even, off)
 
 
 def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array) -> Array:
@@ -107,7 +107,7 @@ def _through_positions(trial: MeasuredTrial, sensors: SpeedSensors, read: Array)
     curve = _curve(even)
     if curve is None:
         return read
-    slopes = np.stack([np.interp(trial.log.times_s, even.times_s, v) for v in curve.speeds.T], axis=1)
+    slopes = _at(trial.log, even, curve.speeds)
     return np.where(curve.better(sensors, _at(even, trial.log, read)), slopes, read)
 
 
@@ -141,9 +141,9 @@ def _curve(even: SensorLog) -> _Curve | None:
     return _Curve(stiff, np.hypot(noise, parts), np.sqrt(noise**2 + np.maximum(near - apart**2, 0.0)))
 
 
-def _at(even: SensorLog, log: SensorLog, speeds: Array) -> Array:
-    """(R, M) speeds (T, M) of a log at the times of its even readings."""
-    return np.stack([np.interp(even.times_s, log.times_s, v) for v in speeds.T], axis=1)
+def _at(there: SensorLog, log: SensorLog, values: Array) -> Array:
+    """(R, M) values (T, M) of a log's rows at the times of another's, by straight lines."""
+    return np.stack([np.interp(there.times_s, log.times_s, v) for v in values.T], axis=1)
 
 
 def _size(values: Array) -> Array:

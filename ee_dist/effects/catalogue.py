@@ -21,7 +21,6 @@ from typing import Any, TypeVar
 from ee_dist.basics.names import did_you_mean, listed, nearest
 from ee_dist.basics.quoted import quoted
 from ee_dist.effects.effect import FAMILIES, OTHER_FAMILIES, Beside, Effect, EffectError, Parameter, Transform
-from ee_dist.effects.groups import members_of
 from ee_dist.effects.scales import Ranges
 from ee_dist.robots.model import Robot, RobotError
 from ee_dist.robots.system import System
@@ -207,19 +206,13 @@ def applied(robot: Model, hypotheses: Iterable[Iterable[Term]]) -> list[Model]:
     return out
 
 
-def _places(entry: Effect, robot: System, target: str) -> tuple[str, ...]:
-    """Where an effect acts on a system: at its target, or at all members of a group; nowhere that it cannot."""
-    allowed = entry.targets(robot)
-    return (target,) if target in allowed else members_of(robot, target, allowed)
-
-
 def _under(robot: Model, t: Term, described: Model) -> Model:
     """The system under one effect, of a hypothesis on a ``described`` one: where others left nothing of what it changes, as of
     a rotor at one of two joints, is still a place of it."""
     entry = find(t.effect)
     if not isinstance(robot, entry.of):
         raise EffectError(f"{t.effect} is an effect on a {_kind(entry.of)}; {robot.name} is a {_kind(type(robot))}")
-    places = _places(entry, robot, t.target) or _places(entry, described, t.target)
+    places = entry.places(robot, t.target) or entry.places(described, t.target)
     if not places:
         allowed = entry.targets(robot)
         shared = entry.shared(robot) if isinstance(robot, Robot) else ()

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from ee_dist.basics.altered import altered
 from ee_dist.effects.catalogue import Hypothesis, Term, apply, find
 from ee_dist.effects.effect import EffectError, Parameter
-from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Drive, Robot, RobotError
 from ee_dist.robots.numbers import checked
 from ee_dist.robots.ranges import drive_of
@@ -66,8 +65,7 @@ def _too_much(robot: Robot, terms: Hypothesis) -> Iterator[tuple[int, str, str]]
     shared: set[tuple[str, str]] = set()
     for k, t in enumerate(terms):
         entry, values = find(t.effect), dict(t.values)
-        places = entry.targets(robot)  # of a place that is none of them others say so
-        joints = members_of(robot, t.target, places) or tuple({t.target} & set(places))
+        joints = entry.places(robot, t.target)  # of a place that is none of them others say so
         for p in entry.parameters:
             if not p.on_top or values[p.name] >= 0:
                 continue

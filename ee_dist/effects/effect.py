@@ -136,6 +136,11 @@ class Effect:
             g for g in found if all(len({self._unit_at(p, robot, m) for m in members[g]}) == 1 for p in self.parameters)
         )
 
+    def places(self, robot: System, target: str) -> tuple[str, ...]:
+        """Where it acts on a system: at its target, or at all members of a group; nowhere that it cannot."""
+        allowed = self.targets(robot)
+        return (target,) if target in allowed else members_of(robot, target, allowed)
+
     def proposed(self, robot: Robot) -> tuple[str, ...]:
         """The targets at which ``explain`` proposes it by itself: all or none, but of parts that are fixed to one another only
         the heaviest."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import measurement_files as samples
 import numpy as np
+import pandas as pd
 import pytest
 import small_logs as logs
 
@@ -17,6 +18,7 @@ from ee_dist.measurements.proposal.files import proposal_for
 from ee_dist.measurements.proposal.model import Hints
 from ee_dist.measurements.proposal.write import as_yaml
 from ee_dist.robots.describe import load_robot
+from ee_dist.robots.model import Robot
 from ee_dist.tasks.measurements import Measurements
 from ee_dist.tasks.ways import way_of
 
@@ -70,12 +72,16 @@ def test_a_sensor_of_forces_is_no_command_of_the_one_joint_that_obeys_torques(
     assert [c.column for c in proposal.choices if c.group == "commands"] == ["torque"]
 
 
-def test_where_nothing_is_driven_a_log_of_positions_is_all_that_there_is(tmp_path: Path) -> None:
+def nothing_driven(tmp_path: Path) -> tuple[Path, Robot, pd.DataFrame]:
+    """The description of a robot whose joints all swing freely, that robot, and a log with goals of them."""
     m, path = samples.motion(), samples.robot_file(tmp_path)
     text = path.read_text().split("drives:")[0]
     path.write_text(f"{text}drives:\n" + "".join(f"  {j}: {{command: none}}\n" for j in samples.JOINTS))
-    robot, _ = load_robot(path)
-    frame = logs.frame_of(m["t"], m["q"], m["g"])
+    return path, load_robot(path)[0], logs.frame_of(m["t"], m["q"], m["g"])
+
+
+def test_where_nothing_is_driven_a_log_of_positions_is_all_that_there_is(tmp_path: Path) -> None:
+    path, robot, frame = nothing_driven(tmp_path)
     file = logs.written(tmp_path, frame.drop(columns=[c for c in frame if "goal" in c]))
     proposal = proposal_for([file], robot, Hints())
     assert not proposal.questions, proposal.questions
@@ -89,11 +95,7 @@ def test_where_nothing_is_driven_a_log_of_positions_is_all_that_there_is(tmp_pat
 
 
 def test_commands_that_no_joint_takes_are_said_to_be_left_out_with_what_would_be_right(tmp_path: Path) -> None:
-    m, path = samples.motion(), samples.robot_file(tmp_path)
-    text = path.read_text().split("drives:")[0]
-    path.write_text(f"{text}drives:\n" + "".join(f"  {j}: {{command: none}}\n" for j in samples.JOINTS))
-    robot, _ = load_robot(path)
-    frame = logs.frame_of(m["t"], m["q"], m["g"])
+    _, robot, frame = nothing_driven(tmp_path)
     goals = [c for c in frame if "goal" in c]
     file = logs.written(tmp_path, frame)
     (said,) = [n for n in proposal_for([file], robot, Hints()).notes if "takes commands" in n]

@@ -53,17 +53,24 @@ def test_a_diagnosis_is_over_when_it_is_polished_and_told() -> None:
     assert "believes: part lost at upper rear left" in out.getvalue()
 
 
-def test_steps_of_one_stage_are_told_now_and_then_with_the_error_so_far(monkeypatch) -> None:
+def lines_of(monkeypatch, told, width: int = 200) -> list[str]:
+    """What is printed where there is no terminal, in lines without spaces beside one another; ``told``: (s, what, share, perhaps
+    an error), one after the other."""
     now = 0.0
     monkeypatch.setattr(progress_line.time, "monotonic", lambda: now)
     out = io.StringIO()
-    with SearchProgress(Console(file=out, width=40)) as progress:
-        for at, what, share, error in ((1.0, "one more: screening", 0.5, None), (2.0, "one more: fitting", 0.5, 3.0),
-                                       (3.0, "at once: fitting", 1.0, 2.5), (4.0, "at once: fitting 48 values", 1.0, 2.0),
-                                       (14.0, "at once: fitting", 1.0, 1.5), (15.0, "at once: fitting", 1.0, 1.25)):  # fmt: skip
+    with SearchProgress(Console(file=out, width=width)) as progress:
+        for at, *said in told:
             now = at
-            progress(what, share, error)
-    assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [
+            progress(*said)
+    return [" ".join(line.split()) for line in out.getvalue().splitlines()]
+
+
+def test_steps_of_one_stage_are_told_now_and_then_with_the_error_so_far(monkeypatch) -> None:
+    told = ((1.0, "one more: screening", 0.5, None), (2.0, "one more: fitting", 0.5, 3.0),
+            (3.0, "at once: fitting", 1.0, 2.5), (4.0, "at once: fitting 48 values", 1.0, 2.0),
+            (14.0, "at once: fitting", 1.0, 1.5), (15.0, "at once: fitting", 1.0, 1.25))  # fmt: skip
+    assert lines_of(monkeypatch, told, 40) == [
         "1 s one more: screening",
         "3 s at once: fitting, error 2.5",
         "14 s at once: fitting, error 1.5",
@@ -72,18 +79,12 @@ def test_steps_of_one_stage_are_told_now_and_then_with_the_error_so_far(monkeypa
 
 def test_a_long_stage_says_from_its_first_word_how_long_it_will_take(monkeypatch) -> None:
     """Where there is no terminal too, and not more often than one reads; a short one says its name alone."""
-    now = 0.0
-    monkeypatch.setattr(progress_line.time, "monotonic", lambda: now)
-    out = io.StringIO()
-    with SearchProgress(Console(file=out, width=100)) as progress:
-        for at, what, share in ((1.0, "weighing", 0.0), (6.0, "screening", 0.05), (8.0, "screening", 0.07),
-                                (56.0, "screening", 0.5), (106.0, "screening", 1.0), (107.0, "scanning", 0.5),
-                                (127.0, "fitting", 0.2), (207.0, "fitting", 1.0), (217.0, "fitting", 0.1),
-                                (219.0, "fitting", 1.0), (220.0, "fitting", 0.03), (221.0, "fitting", 1.0),
-                                (223.0, "fitting", 0.03)):  # fmt: skip
-            now = at
-            progress(what, share)
-    assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [
+    told = ((1.0, "weighing", 0.0), (6.0, "screening", 0.05), (8.0, "screening", 0.07),
+            (56.0, "screening", 0.5), (106.0, "screening", 1.0), (107.0, "scanning", 0.5),
+            (127.0, "fitting", 0.2), (207.0, "fitting", 1.0), (217.0, "fitting", 0.1),
+            (219.0, "fitting", 1.0), (220.0, "fitting", 0.03), (221.0, "fitting", 1.0),
+            (223.0, "fitting", 0.03))  # fmt: skip
+    assert lines_of(monkeypatch, told, 100) == [
         "1 s weighing",
         "6 s screening 5 %, about 95 s left of this step",
         "56 s screening 50 %, about 55 s left of this step",
@@ -95,16 +96,10 @@ def test_a_long_stage_says_from_its_first_word_how_long_it_will_take(monkeypatch
 
 def test_what_is_left_is_that_of_a_fit_and_a_fit_that_makes_no_headway_does_not_begin_anew(monkeypatch) -> None:
     """How many fits a stage has nobody knows: what is known is how long it has gone on."""
-    now = 0.0
-    monkeypatch.setattr(progress_line.time, "monotonic", lambda: now)
-    out = io.StringIO()
-    with SearchProgress(Console(file=out, width=200)) as progress:
-        for at, what, share in ((10.0, "one more: screening", 1.0), (50.0, "at once: fitting 46 values", 0.25),
-                                (80.0, "at once: fitting 46 values", 0.25), (90.0, "at once: fitting 46 values", 1.0),
-                                (130.0, "at once: fitting 46 values", 0.25)):  # fmt: skip
-            now = at
-            progress(what, share)
-    assert [" ".join(line.split()) for line in out.getvalue().splitlines()] == [
+    told = ((10.0, "one more: screening", 1.0), (50.0, "at once: fitting 46 values", 0.25),
+            (80.0, "at once: fitting 46 values", 0.25), (90.0, "at once: fitting 46 values", 1.0),
+            (130.0, "at once: fitting 46 values", 0.25))  # fmt: skip
+    assert lines_of(monkeypatch, told) == [
         "10 s one more: screening",
         "50 s at once: fitting 46 values 25 %, up to 120 s left of this fit",
         "80 s at once: fitting 46 values 25 %, up to 210 s left of this fit",
