@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +17,7 @@ from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.evidence.intervals import BOUND, at_bound
 from ee_dist.discrepancy.evidence.judge import at_work
 from ee_dist.discrepancy.evidence.rule import NEAR
-from ee_dist.discrepancy.lags import told_anew_s
-from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.guesses import AHEAD, CARRIED, LATE, ROTORS, SOONER, TIMED, lag_of, stand_of, starts_of
 from ee_dist.discrepancy.search.candidates import Candidate, Proposal, candidate, values_of
 from ee_dist.discrepancy.search.fitted import Model
 from ee_dist.discrepancy.search.pool import as_slow
@@ -33,40 +31,21 @@ from ee_dist.robots.model import Robot
 from ee_dist.robots.ranges import drive_of
 from ee_dist.trials.log import Array
 
-TOGETHER = ("position_gain", "speed_gain", "torque_limit", "rotor_inertia", "coulomb_friction", "viscous_friction")
+LIMIT = "torque_limit"
+TOGETHER = ("position_gain", "speed_gain", LIMIT, "rotor_inertia", "coulomb_friction", "viscous_friction")
 """The limit is among them although files state one: it is often what a CAD program writes where nobody entered any."""
-GAINS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-"""Shares of the assumed gains to look from: a guess may be off by an order of magnitude."""
-ROTORS = ("rotor_factor", "rotor_inertia")
 OF_ONE = ("position_gain", "speed_gain", *ROTORS)
 """What a controller that somebody guessed at is known by as a whole: how late a joint follows tells no more than their ratios."""
-LAGS_RAD = (0.0, 0.02, 0.05)
-"""Errors (rad, m) at which a joint comes to rest by dry friction, to look from: those of hobby servos."""
-LIMITS = (0.0, 0.7)
-"""Shares of the stated torque limit that are not there, to look from."""
 STARTS = 3
-"""Of the starts that many are fitted."""
-MUCH_DAMPED = 2.0
-"""Times the damping that was guessed from which a joint that follows as late as it was seen to follows as a filter does."""
-CARRIED, MUCH = "weight_carried", 0.9
-"""Controllers of arms that are sold carry the weight. Held up by gains alone it takes stiff ones and much friction, which no
-single effect leads away from: soft gains sag. So they are looked for with most of it carried, too,"""
-LATE, LATER = "command_delay", (0.3, 0.7)
-"""What passes between a command and a controller that nobody knows is not known either; a soft one looks late too, and leads
-away from a stiff one that is. So they are looked for with a delay, from these shares of the lag that joints were seen to have,"""
-AHEAD, SOONER = "speed_feed_forward", 0.5
-"""A controller that knows how fast its goal goes follows sooner than its damping would let it; a guess that does not know it
-comes to gains many times too stiff. Where joints were seen to follow within this share of the lag that was guessed at, it is
-looked for so, too, and found so, also where it takes off less, where a guess ended at its bound otherwise and does not so,"""
-TIMED, TAKES = "command_duration", (0.5, 1.0)
-"""A controller that takes a set time to each goal looks soft and heavy, too. Where goals stand longer than joints lag, they are
-looked for so as well, from these shares of the time from one goal to the next;"""
+"""Of a grid of starts that many are fitted."""
 LESS = 0.9
-"""and found so where that leaves less than this share of what is above the noise otherwise."""
+"""Share of what is above the noise otherwise that drives must leave less than, to be found with one number more."""
 LEAST, MOST = -0.7, 1.0
 """Changes of mass, as shares, that parts may have all over a robot of which gains were assumed: torques have no scale then but
 the masses, and all may grow together. With gains that are known they may go farther: a load on a light part is many times it."""
-AGAIN = 2
+NOTHING = 1e-3
+"""Share of what is left by which it rises at most without a number that does nothing."""
+AGAIN = 8
 """How often more room is made for a guess that ended as far as it might go."""
 LABEL = "assumed drives"
 GUESSED = (
@@ -126,8 +105,8 @@ def assumed_drives(
         near = other if _leaves_less(other, near, noise) else near
     parts, best = near.parts, _farther(search, near)
     ahead = offered(AHEAD) if _sooner(robot, joints) else ()
-    late = offered(LATE) if _lag(robot, joints) else ()
-    timed = offered(TIMED) if 0 < _lag(robot, joints) < _stand(search.problem, joints) else ()
+    late = offered(LATE) if lag_of(robot, joints) else ()
+    timed = offered(TIMED) if 0 < lag_of(robot, joints) < stand_of(search.problem, joints) else ()
     for more, within_bounds in ((ahead, True), (late, False), (timed, False)):
         # Where next to nothing but noise is left, no time is missing.
         if not more or (more is timed and best.energy <= NEAR**2 * noise):
@@ -138,9 +117,22 @@ def assumed_drives(
         if _leaves_less(other, best, noise, share):
             parts, best = (*parts, *more), other
     model = Model(best.parts)
-    # The gain stays; nobody is told that no torque is missing.
-    keep = at_work(model, best.u, 1)
+    keep = _at_work(search, best)
     return Proposal(tuple(model.parts[k] for k in keep), LABEL), np.concatenate([best.u[model.places[k]] for k in keep])
+
+
+def _at_work(search: Search, found: Fitted) -> list[int]:
+    """Numbers of the parts that do anything: what a controller is known by, and each other without which more is left. Nobody is
+    told that no torque is missing, nor of a friction of next to nothing."""
+    model = Model(found.parts)
+    some = at_work(model, found.u, 1)
+    asked = [k for k in some if model.parts[k].effect.name not in OF_ONE]
+    points = np.repeat(found.u[None], len(asked), axis=0)
+    for u, k in zip(points, asked, strict=True):
+        u[model.places[k]] = 0.0
+    rows = search.residuals([model.hypothesis(u) for u in points])
+    idle = {k for k, r in zip(asked, rows, strict=True) if float(r @ r) <= (1.0 + NOTHING) * found.energy}
+    return [k for k in some if k not in idle]
 
 
 def _noise(search: Search) -> float:
@@ -176,8 +168,11 @@ def _ended(found: Fitted) -> bool:
 
 
 def _ends(c: Candidate, u: Array) -> bool:
-    """Whether a factor on a guess went up as far as it may."""
-    return c.effect.main.neutral == 1.0 and u[0] > 0 and at_bound(c, 0, float(u[0])) == BOUND
+    """Whether a guess is too small by as much as it may be: a factor on it, or what is on top of a rotor, went up as far as it
+    may, or of a limit there is as much more."""
+    grows = c.effect.main.neutral == 1.0 or c.effect.name in ROTORS
+    to_end = u[0] < 0 and c.guess if c.effect.name == LIMIT else u[0] > 0 and grows
+    return bool(to_end) and at_bound(c, 0, float(u[0])) == BOUND
 
 
 def _with_room(robot: Robot, c: Candidate, values: Sequence[tuple[str, float]]) -> Candidate:
@@ -188,6 +183,8 @@ def _with_room(robot: Robot, c: Candidate, values: Sequence[tuple[str, float]]) 
         low, high = beside[name]
         if p.neutral == 1.0:
             low, high = low * value, high * value
+        elif c.effect.name == LIMIT:
+            low, high = (1.0 - (1.0 - value) * (1.0 - loss) for loss in (low, high))
         elif p.on_top:
             low, high = low + value, high + value
         else:
@@ -199,7 +196,7 @@ def _with_room(robot: Robot, c: Candidate, values: Sequence[tuple[str, float]]) 
 def _fitted(search: Search, joints: Sequence[str], parts: tuple[Candidate, ...]) -> Fitted:
     """The parts, fitted from the best of a grid of starts."""
     model = Model(parts)
-    starts = _starts(search.problem, joints, model)
+    starts = starts_of(search.problem, joints, model)
     energies = [
         float(r @ r) if np.isfinite(r).all() else np.inf
         for r in search.residuals([model.hypothesis(u) for u in starts])
@@ -263,56 +260,7 @@ def _at(robot: Robot, effect: str, joints: Sequence[str]) -> list[Candidate]:
         return []
 
 
-def _lag(robot: Robot, joints: Sequence[str]) -> float:
-    """s by which most of the joints were seen to follow their commands; 0 where that is not known of most."""
-    return float(np.median([robot.joint(j).lag_s for j in joints]))
-
-
-def _stand(problem: Problem, joints: Sequence[str]) -> float:
-    """s from one goal of these joints to the next, of most; 0 where that is not known."""
-    return told_anew_s(problem.measured, [problem.robot.motor_names.index(j) for j in joints])
-
-
 def _sooner(robot: Robot, joints: Sequence[str]) -> bool:
     """Whether most of the joints were seen to follow much sooner than the damping that was guessed at lets them."""
     guessed = float(np.median([d.kd / d.kp if d.kp > 0 else 0.0 for d in (drive_of(robot, j) for j in joints)]))
-    return _lag(robot, joints) < SOONER * guessed
-
-
-def _starts(problem: Problem, joints: Sequence[str], model: Model) -> list[Array]:
-    """A grid: damping falls with the gain, so that a joint follows as fast, or is what makes it as late as it was seen to be,
-    and friction holds as large an error. Rotors are as assumed, or fall with the gain too: who took a motor for ten times as
-    strong as it is took its rotor for as heavy."""
-    robot, names = problem.robot, {c.effect.name for c in model.parts}
-    drives, lag = [drive_of(robot, j) for j in joints], _lag(robot, joints)
-    stiffness, damping, rotor = (
-        float(np.median([getattr(d, n) for d in drives])) for n in ("kp", "kd", "rotor_inertia")
-    )
-    scaled = (False, True) if names & {*ROTORS} else (False,)
-    delays = tuple(share * lag for share in LATER) if LATE in names else (0.0,)
-    stand = _stand(problem, joints) if TIMED in names else 0.0
-    times = tuple(share * stand for share in TAKES) if TIMED in names else (0.0,)
-    found = []
-    for gain, apart, limit, lighter, (delay, takes), filters in product(
-        GAINS, LAGS_RAD, LIMITS, scaled, tuple(product(delays, times)), (False, True)
-    ):
-        # Evenly on its way, a goal is half of its time late.
-        damped = (lag - delay - takes / 2) * stiffness / damping if filters and damping > 0 else 1.0
-        if (lighter and gain == 1.0) or (filters and damped < MUCH_DAMPED):
-            continue
-        values = {
-            "rotor_factor": gain if lighter else 1.0,
-            "rotor_inertia": (gain - 1.0) * rotor if lighter else 0.0,
-            "position_gain": gain,
-            "speed_gain": gain * damped,
-            "torque_limit": limit,
-            "coulomb_friction": apart * gain * stiffness,
-            LATE: delay,
-            TIMED: takes,
-            CARRIED: MUCH,
-            AHEAD: 1.0,
-        }
-        mains = [(c, c.effect.main) for c in model.parts]
-        u = [c.shares({p.name: values.get(c.effect.name, p.neutral)}) for c, p in mains]
-        found.append(np.clip(np.concatenate(u), model.lower, model.upper))
-    return found
+    return lag_of(robot, joints) < SOONER * guessed

@@ -7,11 +7,12 @@ them where twenty small ones would be right, and is caught there. This goes the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ee_dist.discrepancy.assumed import beside, puts_right
+from ee_dist.discrepancy.brief import briefly, in_brief
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, travelling
 from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge
 from ee_dist.discrepancy.examine import FAR, Current
@@ -45,9 +46,6 @@ TRIED = 20
 """Effects that are tried one by one beside all that may be a little wrong,"""
 HEATS = ((1, 10), (1, 5), (3, 2))
 """in a race: how many of them go on after how many steps."""
-BEGINNING_S, BUSY = 8.0, 0.5
-"""How much of each trial all values are fitted to first, and what it must have to explain for its length, as a share of what
-the whole has."""
 OF_DRIVES = ("coulomb", "viscous", "rotor_inertia")
 """What every drive has, and a description of it."""
 MOST_OF_IT = 0.5
@@ -90,7 +88,7 @@ def everywhere(
         model = Model(current.parts)
         without = [cross_fit(search, [(model, current.u)], cut)[0].residual for cut in cuts]
     calm = search.among(calm_trials(search.problem, as_it_is))
-    brief = _brief(calm, as_it_is, current)
+    brief = briefly(calm, as_it_is, current.hypothesis)
     look = _Look(search, calm, brief, own, tuple(pool), current, tuple(zip(cuts, without, strict=True)), tuple(seen))
     robot, places = search.problem.robot, Model(current.parts).places
     begun = list(instead(robot, current, own))
@@ -140,19 +138,6 @@ def instead(robot: Robot, current: Current, own: int) -> Iterator[list[int]]:
 def stands_out(robot: Robot, c: Candidate) -> bool:
     """Whether it is no small wrong everywhere, nor puts right what was assumed."""
     return not c.effect.everywhere and not puts_right(robot, c)
-
-
-def _brief(search: Search, residual: Array, current: Current) -> Search:
-    """The search on the beginning of its trials; itself where that is no shorter, or has less to explain than the rest."""
-    whole = search.problem
-    brief = replace(search, problem=whole.beginning(BEGINNING_S))
-    if brief.problem is whole:
-        return search
-    first, mine, own = brief.on(current.hypothesis).base(), brief.everything, search.everything
-    above, usual = (
-        float(np.mean(r[at] ** 2 - p.floor[at])) for r, at, p in ((first, mine, brief.problem), (residual, own, whole))
-    )
-    return brief if above >= BUSY * usual else search
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +271,8 @@ class _Look:
         now = search.on(alone.hypothesis)
         one = telling(search.problem, alone.residual, np.unique(search.problem.trial_of[search.everything]).tolist())
         others = possible(search.problem.robot, now.fixed, self._others(model))
-        screened = screen(now, others, refit=refit, trial=one)
+        chosen = None if one is None else in_brief(search.among([one]), alone.model, alone.u, alone.residual, refit)
+        screened = screen(now, others, refit=refit, few=None if chosen is None else chosen.ground)
         few = sorted((s for s in screened if s.starts), key=lambda s: -s.promise)[:TRIED]
         tried = []
         for s in few:

@@ -7,14 +7,13 @@ the model has already and judge them on data that the fits had not seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
-from itertools import combinations
 from typing import TypeVar
 
 import numpy as np
 
 from ee_dist.discrepancy.assumed import assumed_drives
+from ee_dist.discrepancy.brief import briefly, in_brief
 from ee_dist.discrepancy.evidence.by_joint import gains_of
 from ee_dist.discrepancy.evidence.holdout import Cut, cross_fit, travelling, windows
 from ee_dist.discrepancy.evidence.judge import FEW_SHOW, Judged, judge, ranked
@@ -32,6 +31,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, follow_slopes, slopes_at
 from ee_dist.discrepancy.search.trials import busiest, calm_trials, telling
 from ee_dist.discrepancy.search.valley import LARGE
+from ee_dist.discrepancy.several import families, pairs
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.groups import WHOLE
 from ee_dist.trials.log import Array
@@ -44,13 +44,11 @@ WORTH_JUDGING = 0.4
 """Share of what the best quick fit takes off that another must take off to be judged beside it, unless it is among the first
 AT_LEAST."""
 AT_LEAST = 4
+MOST_OF_IT = 0.5
+"""Share of what is above the noise that guesses put right may leave, for nothing else to be looked at before."""
 Looked = TypeVar("Looked", Screened, Scanned)
-GAIN = "position_gain"
 MANY_JOINTS = 3
 """Joints from which an effect at each of them is judged joint by joint too."""
-FAMILIES_TRIED, ADDS = 4, 0.3
-"""Effects whose members at all joints, each with a value of its own, are tried together, and the share of what the best member
-promises, or of what it leaves above the noise, that the others must add."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +100,16 @@ class Examined:
         return [] if best is None else [best, *(c for c in self.judged if c.name in best.tied_with)]
 
 
-def examine(search: Search, current: Current, pool: Sequence[Candidate], effort: Effort = STANDARD_EFFORT) -> Examined:
-    """Judge what of ``pool`` explains the residual of the current model. Raises ValueError for one that cannot be simulated."""
+def examine(
+    search: Search,
+    current: Current,
+    pool: Sequence[Candidate],
+    effort: Effort = STANDARD_EFFORT,
+    guesses_first: bool = False,
+) -> Examined:
+    """Judge what of ``pool`` explains the residual of the current model. ``guesses_first``: where drives were assumed and much of
+    it goes with them put right, nothing else is looked at: nobody believes in a guess, and beside it all the rest looks another.
+    Raises ValueError for a model that cannot be simulated."""
     problem, now = search.problem, search.on(current.hypothesis)
     pool = possible(problem.robot, now.fixed, pool)
     base = now.base()
@@ -115,20 +121,30 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     if len(current.u):
         leading = slopes_at(search, Model(current.parts), current.u)
     refit, busy = Refit(leading), busiest(problem, base, calm)
+    brief = briefly(now.among(busy), base, ())
+    guessed = assumed_drives(brief, pool, [t.name for t in now.fixed])
+    if guessed is not None and guesses_first:
+        right = _put_right(search, current, guessed, base, len(pool), leading)
+        if right is not None:
+            return Examined([right], [], base, leftovers(problem, right.residual), len(pool))
     alone = telling(problem, base, busy)
-    screened = screen(now.among(busy), pool, effort.shares, refit, alone)
+    chosen = None
+    if alone is not None:
+        chosen = in_brief(search.among([alone]), Model(current.parts), current.u, base, refit)
+    screened = screen(now.among(busy), pool, effort.shares, refit, None if chosen is None else chosen.ground)
     least = least_energy(len(pool))
     promising = sorted((s for s in screened if s.promise > 0.5 * least), key=lambda s: -s.promise)
     promising = _first(promising, effort.first)
     # Scans and quick fits only choose who is judged: where one trial tells that, on it alone.
-    one = None
-    if alone is not None and not problem.looped and not any(s.elsewhere for s in promising):
-        one = [alone]
-    scanned = sorted(scan(now.among(one or busy), promising, refit), key=lambda s: s.energy)
+    if chosen is not None and (problem.looped or any(s.elsewhere for s in promising)):
+        chosen = None
+    wide = now.among(busy) if chosen is None else chosen.ground.search
+    scanned = sorted(scan(wide, promising, refit if chosen is None else chosen.ground.refit), key=lambda s: s.energy)
     scanned = _first(scanned, effort.second)
-    few = one or calm
-    quick = sorted(_quick(search.among(few), current, scanned, effort.starts, leading), key=lambda f: f.energy)
-    energy = float((base[np.isin(problem.trial_of, few)] ** 2).sum())
+    few, slopes = (search.among(calm), leading) if chosen is None else (chosen.search, chosen.slopes)
+    quick = sorted(_quick(few, current, scanned, effort.starts, slopes), key=lambda f: f.energy)
+    first, own = base if few.problem is problem else few.on(current.hypothesis).base(), few.everything
+    energy = float((first[own] ** 2).sum())
     quick = [
         f
         for k, f in enumerate(quick)
@@ -140,20 +156,40 @@ def examine(search: Search, current: Current, pool: Sequence[Candidate], effort:
     has = {t.effect for t in (*search.fixed, *current.hypothesis) if t.target in WHOLE}
     looked_at = np.isin(problem.trial_of, busy)
     above = float((base[looked_at] ** 2 - problem.floor[looked_at]).sum())
-    starts += _families(screened, starts, least, has, above, held_still(problem))
-    guessed = assumed_drives(now.among(busy), pool, [t.name for t in (*search.fixed, *current.hypothesis)])
+    starts += families(screened, starts, least, has, above, held_still(problem))
     starts += [guessed] if guessed is not None else []
-    nearest = min((f.energy for f in quick), default=0.0) / max(_floor_of(problem, few), 1e-12)
+    nearest = min((f.energy for f in quick), default=0.0) / max(float(few.problem.floor[own].sum()), 1e-12)
     far = nearest > (NEARLY if problem.layout.by_segment else FAR) ** 2
     judged = _judged(search, current, starts, base, len(pool), leading, far)
     if judged and not judged[0].earned and not far and leftovers(problem, base):
-        pairs = _pairs(screened, now)
-        if pairs:
-            judged = ranked([*judged, *_judged(search, current, pairs, base, len(pool), leading)])
+        two = pairs(screened, now)
+        if two:
+            judged = ranked([*judged, *_judged(search, current, two, base, len(pool), leading)])
     judged = that_hold_run_through(problem, search.fixed, current.hypothesis, judged)
     best = judged[0] if judged and judged[0].earned else None
     left = leftovers(problem, base if best is None else best.residual)
     return Examined(judged, screened, base, left, len(pool))
+
+
+def _put_right(
+    search: Search,
+    current: Current,
+    guessed: tuple[Proposal, Array],
+    base: Array,
+    tried: int,
+    leading: Array | None,
+) -> Judged | None:
+    """What was assumed of drives put right, where that takes most of what is above the noise off data held out."""
+    problem, (proposal, u) = search.problem, guessed
+    left = search.residuals([Model((*current.parts, *proposal.parts)).hypothesis(np.concatenate([current.u, u]))])[0]
+    far = float(left @ left) > FAR**2 * float(problem.floor.sum())
+    found = _judged(search, current, [guessed], base, tried, leading, far)
+    found = that_hold_run_through(problem, search.fixed, current.hypothesis, found)
+    noise = float(problem.floor.sum())
+    if not found or not found[0].earned:
+        return None
+    most = noise + MOST_OF_IT * (float(base @ base) - noise)
+    return found[0] if float(found[0].held.sum()) < most else None
 
 
 def _judged(
@@ -188,11 +224,6 @@ def _judged(
 def _first(found: Sequence[Looked], count: int) -> list[Looked]:
     """The first ``count``, and whatever puts right what was only assumed: nobody has to believe in that."""
     return [s for k, s in enumerate(found) if k < count or s.candidate.guess]
-
-
-def _floor_of(problem: Problem, trials: Sequence[int]) -> float:
-    """Energy that noise leaves in some trials."""
-    return float(problem.floor[np.isin(problem.trial_of, list(trials))].sum())
 
 
 def under(
@@ -276,72 +307,3 @@ def _quick(
         if i not in best or fit.energy < best[i].energy:
             best[i] = fit
     return [best[i] for i in sorted(best)]
-
-
-def _families(
-    screened: Sequence[Screened],
-    singles: Sequence[tuple[Proposal, Array]],
-    least: float,
-    has: AbstractSet[str],
-    above: float,
-    held: AbstractSet[str],
-) -> list[tuple[Proposal, Array]]:
-    """Effects at all joints, each joint with a value of its own, where several joints promise something: one number for all of
-    them, which the model may have already (``has``), may be too few. Of joints that were only ``held`` nothing tells a gain from
-    a torque, and theirs is as that of the others. ``above``: energy above the noise. And friction by load, linear and quadratic,
-    which pay together."""
-    out: list[tuple[float, Proposal, Array]] = []
-    by_effect: dict[str, list[Screened]] = {}
-    whole = has | {s.candidate.effect.name for s in screened if s.candidate.target in WHOLE}
-    for s in screened:
-        if s.candidate.effect.name in whole and s.candidate.target in _joints(screened, s.candidate.effect.name):
-            by_effect.setdefault(s.candidate.effect.name, []).append(s)
-    for name, members in by_effect.items():
-        visible = [s for s in members if s.starts and s.promise > least]
-        if name == GAIN:
-            visible = [s for s in visible if s.candidate.target not in held]
-        if len(visible) < 2:
-            continue
-        promise, most = sum(s.promise for s in visible), max(s.promise for s in visible)
-        # A shoulder's friction is little beside that of an elbow that leaves four fifths, and most of what this one cannot say.
-        if promise - most > ADDS * min(most, max(above - most, 0.0)):
-            label = f"{name}@each of {len(visible)} joints"
-            parts = Proposal(tuple(s.candidate for s in visible), label)
-            out.append((promise / np.sqrt(parts.size), parts, np.concatenate([s.starts[0] for s in visible])))
-    out = sorted(out, key=lambda f: -f[0])[:FAMILIES_TRIED]
-    found = [(p, u) for _, p, u in out]
-    by_name = {s.candidate.name: s for s in screened}
-    for single, u in singles:
-        c = single.parts[0]
-        other = by_name.get(f"quadratic_friction@{c.target}")
-        if c.effect.name == "load_friction" and other is not None and other.reach > 0:
-            start = np.where(other.candidate.upper > 0, 0.05, -0.05)
-            found.append((Proposal((c, other.candidate)), np.concatenate([u, start])))
-    return found
-
-
-def _joints(screened: Sequence[Screened], effect: str) -> set[str]:
-    """Targets of an effect that are single joints."""
-    return {
-        s.candidate.target
-        for s in screened
-        if s.candidate.effect.name == effect and s.candidate.target not in WHOLE and "+" not in s.candidate.target
-    }
-
-
-def _pairs(screened: Sequence[Screened], now: Search) -> list[tuple[Proposal, Array]]:
-    """Pairs of effects at the place that promises most: some pay only together."""
-    hopeful = sorted((s for s in screened if s.promise > 0), key=lambda s: -s.promise)
-    if not hopeful:
-        return []
-    place = hopeful[0].candidate.target
-    there = [s for s in hopeful if s.candidate.target == place and s.candidate.size][:4]
-    best = {s.candidate.name: s.starts[0] for s in scan(now, there)}
-    pairs = [p for p in combinations(there, 2) if all(s.candidate.name in best for s in p)][:4]
-    return [
-        (
-            Proposal((a.candidate, b.candidate)),
-            0.5 * np.concatenate([best[a.candidate.name], best[b.candidate.name]]),
-        )
-        for a, b in pairs
-    ]

@@ -107,7 +107,8 @@ def improve(
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))
     else:
-        exchanges, looked, spread, anew, refused, nor = 0, -1, 0, 0, 0, ""
+        exchanges, spread, anew, refused, nor = 0, 0, 0, 0, ""
+        looked: set[str] | None = None
         beside: set[str] = set()
         tried_with: set[str] = set()
         seen: dict[str, tuple[Candidate, Array]] = {}
@@ -118,7 +119,7 @@ def improve(
             refused_too = {c.name for p in worse for c in p.parts}
             others = [c for c in _offered(problem.robot, pool, current, ladder) if c.name not in refused_too]
             others = on_top_of(problem.robot, has, others)
-            last = examine(search.doing(ONE_MORE), current, others, effort)
+            last = examine(search.doing(ONE_MORE), current, others, effort, guesses_first=True)
             if own and len(current.parts) == own:
                 kept = as_it_was(search, last, before, as_it_is, others, effort)
                 if kept is not None:
@@ -128,7 +129,8 @@ def improve(
                 if j.earned and len(j.proposal.parts) == 1:
                     seen.setdefault(j.name, (j.proposal.parts[0], j.own))
             special = {c.name for c in current.parts[own:] if stands_out(problem.robot, c)}
-            ready = anew < OFTEN and special != beside and bool(special) if spread else len(current.parts) != looked
+            there = {c.name for c in current.parts}
+            ready = anew < OFTEN and special != beside and bool(special) if spread else there != looked
             plain = best is not None and _seen_by_itself(best)
             if ready and not plain and refused < REFUSED and _many(search, last, len(current.parts) - own, spread > 0):
                 alike = [(k, p.parts[0], u) for k, p, u in twins_of(current, ladder, own)]
@@ -137,12 +139,12 @@ def improve(
                 found = everywhere(
                     at_once, current, own, some, held_out_by(problem), spread > 0, alike, [*seen.values()]
                 )
-                looked = len(current.parts)
+                looked = there
                 # Where a single one does more than all of them, it goes first, and they are looked for beside it.
                 if found is None or best is None or found.held < float(best.held.sum()):
                     anew, beside = anew + (spread > 0), special
                     if found is not None:
-                        current, looked, spread = found.current, len(found.current.parts), spread + 1
+                        current, spread = found.current, spread + 1
                         for rung in found.rungs:
                             climb(rung)
                         continue

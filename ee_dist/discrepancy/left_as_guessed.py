@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ee_dist.discrepancy.assumed import ROTORS, guess_of
+from ee_dist.discrepancy.assumed import guess_of
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.evidence.together import flat_widths
+from ee_dist.discrepancy.guesses import ROTORS
 from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search

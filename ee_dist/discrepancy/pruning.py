@@ -12,6 +12,7 @@ from ee_dist.discrepancy.evidence.judge import at_work
 from ee_dist.discrepancy.evidence.rule import WORTH, least_energy
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
+from ee_dist.discrepancy.search.candidates import Candidate
 from ee_dist.discrepancy.search.fit import fit_all
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
@@ -156,10 +157,13 @@ def units_of(model: Model, first: int, end: int) -> list[list[int]]:
     for k in range(first, end):
         c = model.parts[k]
         if c.size and k not in stays:
-            units.setdefault(c.effect.name if c.effect.family == "body" and c.effect.everywhere else c.name, []).append(
-                k
-            )
+            units.setdefault(c.effect.name if goes_with_others(c) else c.name, []).append(k)
     return list(units.values())
+
+
+def goes_with_others(c: Candidate) -> bool:
+    """Whether it is one of a body's small effects, as a mass of one of its parts."""
+    return c.effect.family == "body" and c.effect.everywhere
 
 
 def without_useless(

@@ -7,12 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ee_dist.discrepancy.assumed import of_one_guess
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, HeldOut, held_by_slopes, prior_of
 from ee_dist.discrepancy.evidence.intervals import half_widths
 from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.problem import Problem
-from ee_dist.discrepancy.pruning import AGAIN, as_many, halves, may_leave, may_reach, units_of, without_these
+from ee_dist.discrepancy.pruning import (
+    AGAIN,
+    as_many,
+    goes_with_others,
+    halves,
+    may_leave,
+    may_reach,
+    units_of,
+    without_these,
+)
 from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import NEAR, gauss_newton, weighed
@@ -51,6 +59,9 @@ def told_only(search: Search, current: Current, own: int, cut: Cut, tried: int, 
     told = Told(told.then, (*same, *told.gone), told.instead)
     problem = search.problem
     if open_only or fit.energy <= NEAR * float(problem.floor.sum()):
+        return told
+    stayed = Model(told.then.parts)
+    if not any(len(unit) > 1 for unit in units_of(stayed, own, len(stayed.parts))):
         return told
     more, _ = _left_out(search, told.then, own, cut, tried, open_only, _each)
     return Told(more.then, (*told.gone, *more.gone), told.instead | more.instead)
@@ -120,9 +131,9 @@ def _left_out(
 
 
 def _each(model: Model, first: int, end: int) -> list[list[int]]:
-    """Numbers of the parts from ``first`` to ``end`` that have values, each by itself, but for what stays."""
-    stays = of_one_guess(model)
-    return [[k] for k in range(first, end) if model.parts[k].size and k not in stays]
+    """Numbers of the parts from ``first`` to ``end``, each by itself, of those that go together: of all others it was asked
+    whether they are told."""
+    return [[k] for k in range(first, end) if model.parts[k].size and goes_with_others(model.parts[k])]
 
 
 @dataclass(frozen=True, eq=False)

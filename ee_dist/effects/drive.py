@@ -59,7 +59,7 @@ def _limits(robot: Robot, target: str) -> dict[str, Range]:
     targets=motors_with_torque_limit,
     parameters=(
         Parameter(
-            "loss", "1", -9.0, 0.95, 0.0, "share of the torque limit that is lost; below 0 there is more of it", 0.02
+            "loss", "1", -99.0, 0.95, 0.0, "share of the torque limit that is lost; below 0 there is more of it", 0.02
         ),
     ),
     ranges=_limits,

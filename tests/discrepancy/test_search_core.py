@@ -19,9 +19,12 @@ from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.examine import Current, Effort, examine
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, explain
 from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.search import ground as grounds
 from ee_dist.discrepancy.search import screen as screening
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates, known, parse
 from ee_dist.discrepancy.search.fitted import Model
+from ee_dist.discrepancy.search.ground import Ground
+from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.scan import scan
 from ee_dist.discrepancy.search.screen import screen
 from ee_dist.discrepancy.search.search import Search
@@ -243,7 +246,7 @@ def test_screening_looks_to_both_sides_where_the_model_is_far_off(
     monkeypatch: pytest.MonkeyPatch, far: float, sides: set[float]
 ) -> None:
     """Nearer to the noise the side that a small step promises is enough."""
-    monkeypatch.setattr(screening, "FAR", far)
+    monkeypatch.setattr(grounds, "FAR", far)
     problem = Resonant((term("command_gain", "hip_rear_left", change=-0.3),))
     problem.asked = []
     (found,) = screen(Search(problem), [candidate(ROBOT, "command_gain", "hip_rear_left")])
@@ -275,7 +278,8 @@ class OneBlind(Asked):
 )
 def test_screening_on_one_trial_looks_into_the_others_for_what_does_not_show_in_it(hidden: Term) -> None:
     pool = [*POOL, *candidates(ROBOT, only=["motors_swapped"])]
-    found = screen(Search(OneBlind((hidden,), motions=2)), pool, trial=0)
+    search = Search(OneBlind((hidden,), motions=2))
+    found = screen(search, pool, few=Ground.of(search.among([0]), Refit()))
     best = max(found, key=lambda s: s.promise).candidate
     assert (best.effect.name, best.target) == (hidden.effect, hidden.target)
 
@@ -301,8 +305,10 @@ def test_scans_are_on_one_trial_unless_something_shows_in_others_alone(
 
 def test_screening_on_one_trial_promises_what_all_hold() -> None:
     problem = Asked((term("joint_jam", "hip_rear_left", loss=0.5),), motions=2)
+    search = Search(problem)
     alone, both = (
-        {s.candidate.name: s.promise for s in screen(Search(problem), POOL, trial=trial)} for trial in (0, None)
+        {s.candidate.name: s.promise for s in screen(search, POOL, few=few)}
+        for few in (Ground.of(search.among([0]), Refit()), None)
     )
     best = max(both, key=lambda name: both[name])
     assert best == "joint_jam@hip_rear_left" == max(alone, key=lambda name: alone[name])

@@ -10,7 +10,7 @@ from linear_problem import ROBOT, Linear
 
 from ee_dist.discrepancy import last_steps as ending
 from ee_dist.discrepancy.evidence.holdout import PRIOR, cross_fit, held_by_slopes, prior_of, travelling
-from ee_dist.discrepancy.examine import Current, _families
+from ee_dist.discrepancy.examine import Current
 from ee_dist.discrepancy.kinds import Everywhere
 from ee_dist.discrepancy.ladder import Rung
 from ee_dist.discrepancy.search.candidates import Candidate, candidate
@@ -18,6 +18,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.screen import Screened
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import LARGE, follow_valley
+from ee_dist.discrepancy.several import families
 from ee_dist.discrepancy.told import Told
 from ee_dist.effects.catalogue import term
 from ee_dist.effects.groups import ALL_JOINTS
@@ -70,7 +71,7 @@ def test_joints_that_add_to_what_one_of_them_leaves_are_tried_together(above: fl
         return Screened(c, promise, (np.full(c.size, 0.1),), promise)
 
     screened = [promising(JOINTS[0], 740.0), promising(JOINTS[1], 200.0), promising(ALL_JOINTS, 800.0)]
-    found = _families(screened, [], 20.0, set(), above, frozenset())
+    found = families(screened, [], 20.0, set(), above, frozenset())
     assert [p.name for p, _ in found] == (["coulomb_friction@each of 2 joints"] if tried else [])
 
 
@@ -82,7 +83,7 @@ def test_a_joint_that_is_only_held_has_no_gain_of_its_own(effect: str, left: int
         Screened(c := candidate(ROBOT, effect, place), promise, (np.full(c.size, 0.1),), promise)
         for place, promise in [*((p, 500.0) for p in places), (ALL_JOINTS, 600.0)]
     ]
-    ((proposal, _),) = _families(screened, [], 20.0, set(), 1000.0, frozenset(places[:1]))
+    ((proposal, _),) = families(screened, [], 20.0, set(), 1000.0, frozenset(places[:1]))
     assert len(proposal.parts) == left
 
 

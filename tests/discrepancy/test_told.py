@@ -10,6 +10,7 @@ import pytest
 from linear_problem import ROBOT, Linear
 from way_samples import Sample, measure, problem_by
 
+from ee_dist.discrepancy import told as telling
 from ee_dist.discrepancy.evidence.holdout import PRIOR, travelling
 from ee_dist.discrepancy.evidence.intervals import parameters
 from ee_dist.discrepancy.examine import Current
@@ -19,7 +20,7 @@ from ee_dist.discrepancy.search.fitted import Fit, Model
 from ee_dist.discrepancy.search.pool import pool_of
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.valley import follow_valley
-from ee_dist.discrepancy.told import Told, _told, told_only
+from ee_dist.discrepancy.told import Told, _left_out, _told, told_only
 from ee_dist.discrepancy.torque_scale import STRENGTH
 from ee_dist.effects.catalogue import Term, term
 from ee_dist.robots.servo_pendulum import servo_pendulum
@@ -158,6 +159,21 @@ def test_masses_go_together_but_for_those_that_nothing_tells_far_from_the_noise(
     left = told_only(search, Current(fit.model.parts, fit.u), 0, travelling(search.problem)[0], 100)
     assert {c.target for c in left.then.parts} == ({parts[0]} if apart else set(parts))
     assert len(left.gone) == (3 if apart else 0)
+
+
+def test_what_goes_by_itself_is_asked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Far from the noise only masses, which went together, are asked for once more."""
+    asked: list[object] = []
+    monkeypatch.setattr(telling, "_left_out", lambda *a: asked.append(a[-1]) or _left_out(*a))
+    friction = tuple(candidate(ROBOT, "coulomb_friction", m) for m in ROBOT.motor_names[:3])
+    masses = tuple(candidate(ROBOT, "part_mass", p.name) for p in ROBOT.parts[1:3])
+    hidden = tuple(c.term(np.full(c.size, 0.5)) for c in (*friction, *masses))
+    search = Search(Linear(hidden, motions=4, extra=6.0))
+    for parts, times in ((friction, 1), ((*friction, *masses), 2)):
+        (fit,) = follow_valley(search, [(Model(parts), np.zeros(len(parts)))], search.everything, PRIOR)
+        asked.clear()
+        told_only(search, Current(fit.model.parts, fit.u), 0, travelling(search.problem)[0], 100)
+        assert len(asked) == times
 
 
 def test_when_a_sensor_sticks_does_not_tell_that_it_does() -> None:

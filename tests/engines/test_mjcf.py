@@ -236,3 +236,21 @@ def test_a_world_of_several_bolted_trees_is_one_robot(tmp_path: Path) -> None:
     body_read = read_mjcf(file)
     assert [p.name for p in body_read.parts] == ["world", "l", "r"]
     assert body_read.joints[1].position_m == (1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("option", "step"), [('timestep="0.002"', 0.002), ('integrator="implicitfast"', 0.005)])
+def test_a_file_that_names_no_step_is_simulated_as_finely_as_its_drives_need(
+    option: str, step: float, tmp_path: Path
+) -> None:
+    """MuJoCo's own default is for contacts, and most files of arms leave it at that."""
+    file = tmp_path / "servos.xml"
+    file.write_text(
+        """<mujoco><include file="options.xml"/><worldbody><body name="base"><body name="link">
+          <inertial mass="1" pos="0 0 0.1" diaginertia="0.004 0.004 0.001"/>
+          <joint name="turn" axis="0 1 0" armature="0.02" range="-1 1"/></body></body></worldbody>
+          <actuator><position name="servo" joint="turn" kp="20" kv="2"/></actuator></mujoco>"""
+    )
+    (tmp_path / "options.xml").write_text(f"<mujoco><option {option}/></mujoco>")
+    robot, _ = load_robot({"mjcf": str(file), "free_base": False})
+    assert robot.time_step_s == step
+    assert read_mjcf(file).time_step_s == (step if "timestep" in option else None)

@@ -29,9 +29,11 @@ def race(
     width: float = WIDEST,
     heats_on: Mask | None = None,
     same: int = 0,
+    wanted: float = np.inf,
 ) -> list[Fit]:
     """Fits to the residual values of ``mask`` (n,) of the last that are left of the (model, start), the best first; each heat
-    ends with those of the least energy, on fewer values (``heats_on``) where these tell enough. ``same`` as in valley.py."""
+    ends with those of the least energy, on fewer values (``heats_on``) where these tell enough. ``same``, and ``wanted``
+    for the last of them, as in valley.py."""
     fits: list[Fit] = []
     for iterations, left in heats:
         if len(starts) > left:
@@ -40,5 +42,5 @@ def race(
             same = 0
             best = np.argsort([f.energy for f in fits], kind="stable")[:left]
             starts = [(fits[k].model, fits[k].u) for k in best]
-    fits = follow_valley(search, starts, mask, prior, ITERATIONS, widths=(width,), rivals=True)
+    fits = follow_valley(search, starts, mask, prior, ITERATIONS, widths=(width,), rivals=True, wanted=wanted)
     return sorted(fits, key=lambda f: f.energy)

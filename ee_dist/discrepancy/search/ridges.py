@@ -45,7 +45,7 @@ def over_ridges(search: Search, fit: Fit, prior: float = 0.0) -> Fit:
         starts = _beyond(search.within(few), fit, few, prior)
         best = fit
         if starts:
-            best = race(search, [(fit.model, u) for u in starts], fit.mask, HEATS, prior, WIDTH, few)[0]
+            best = race(search, [(fit.model, u) for u in starts], fit.mask, HEATS, prior, WIDTH, few, wanted=wanted)[0]
         if not best.energy < wanted:
             best = over_rows(search, fit, wanted, prior)
         if not best.energy < wanted:

@@ -14,15 +14,13 @@ import numpy as np
 
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Candidate
+from ee_dist.discrepancy.search.ground import Ground
 from ee_dist.discrepancy.search.refit import Refit
 from ee_dist.discrepancy.search.search import Search
 from ee_dist.trials.log import Array
 
 SHOWS = 30.0
 """Energy (in variances of noise) of a change of the prediction from which its shape tells what more of it would do."""
-FAR = 4.0
-"""Error over the noise floor from which a small probe speaks against no side: a leg described with rotors ten times too heavy
-swings beyond its resonance, where a little more is better and so is much less."""
 FURTHER = 40
 """Candidates at most whose small probes show and that are looked at further on: of fewer all are. Of 160 effects drawn on
 six robots the hidden one was among the first twenty as often as with all."""
@@ -47,24 +45,22 @@ def screen(
     pool: Sequence[Candidate],
     shares: Sequence[float] = (0.1, 0.6),
     refit: Refit = Refit(),  # noqa: B008
-    trial: int | None = None,
+    few: Ground | None = None,
 ) -> list[Screened]:
     """Promise of each candidate on top of what the search has fixed, in the order of the pool. ``refit``: what the values of
     the model so far can make up for by themselves is no promise.
 
     The smallest probes come first, to one side. What shows in them and is not among the FURTHER best by them needs no more, and
     the larger ones go to the side that they promise; to both for guesses, and where the model is FAR off. What does not show in
-    them may show further on. One ``trial`` of the search, where one is named, is enough for all this, but for what does not show
-    in it at all."""
-    whole = _Ground.of(search, refit)
+    them may show further on. A ``few`` of its rows, where they are given, are enough for all this, but for what does not show
+    in them at all."""
+    whole = Ground.of(search, refit)
     pool = [seen_beside(search.problem, c, whole.base) for c in pool]
-    alone = whole if trial is None or search.trials == (trial,) else _Ground.of(search.among([trial]), refit)
-    if alone.total <= 0:
-        alone = whole
+    alone = whole if few is None or few.total <= 0 else few
     rows: list[list[_Probe]] = [[] for _ in pool]
     small = [(i, u) for i, c in enumerate(pool) for u in _smallest(c, shares)]
 
-    def ask(ground: _Ground, points: Sequence[tuple[int, Array]], begun: float, ended: float) -> None:
+    def ask(ground: Ground, points: Sequence[tuple[int, Array]], begun: float, ended: float) -> None:
         for part in search.batches(len(points)):
             some = points[part]
             found = ground.search.residuals([(pool[i].term(u),) for i, u in some])
@@ -86,27 +82,6 @@ def screen(
         ask(whole, [(i, u) for i in sorted(hidden) for u in pool[i].probes((max(shares),))], 0.9, 1.0)
     search.progress("screening", 1.0)
     return [_screened(c, found, i in hidden) for i, (c, found) in enumerate(zip(pool, rows, strict=True))]
-
-
-@dataclass(frozen=True, eq=False)
-class _Ground:
-    """Trials that probes are made on, what the model as it is leaves there (n,), and its energy."""
-
-    search: Search
-    refit: Refit
-    base: Array
-    total: float
-
-    @classmethod
-    def of(cls, search: Search, refit: Refit) -> _Ground:
-        refit = refit.among(search)
-        base = refit(search.base())
-        return cls(search, refit, base, float(base @ base))
-
-    @property
-    def far(self) -> bool:
-        """Whether the model is off by so much that slopes say little."""
-        return self.total > FAR**2 * float(self.search.problem.floor[self.search.everything].sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +161,7 @@ def _two_sided(c: Candidate, k: int) -> bool:
     return bool(c.lower[k] < 0 < c.upper[k])
 
 
-def _promise(ground: _Ground, residual: Array, energy: float, candidate: Candidate, u: Array) -> _Probe:
+def _promise(ground: Ground, residual: Array, energy: float, candidate: Candidate, u: Array) -> _Probe:
     """``energy``: of the trials that promises are for, of which these may be one."""
     base, r = ground.base, ground.refit(residual)
     d = base - r

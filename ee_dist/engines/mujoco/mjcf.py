@@ -16,7 +16,7 @@ import numpy as np
 
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
-from ee_dist.engines.mujoco.mjcf_bare import MjcfError, bare_model
+from ee_dist.engines.mujoco.mjcf_bare import MjcfError, bare_model, names_step
 from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
 from ee_dist.engines.mujoco.mjcf_floor import floor_of
 from ee_dist.engines.mujoco.mjcf_left_out import carries_all, left_out
@@ -136,7 +136,7 @@ class _Reader:
             has_floor=has_floor,
             gravity_m_s2=0.0 if carried else float(-gravity[2]) + 0.0,
             weight_carried=carried,
-            time_step_s=float(m.opt.timestep),
+            time_step_s=float(m.opt.timestep) if names_step(self.file) else None,
             start_position_m=start[0],
             start_rotation=start[1],
             notes=(*self.notes, *self.assumed),

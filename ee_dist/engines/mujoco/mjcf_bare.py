@@ -57,15 +57,20 @@ def bare_model(path: str | Path) -> tuple[Any, Counter[int]]:
             raise MjcfError(f"{file}: MuJoCo cannot build it: {' '.join(str(told).split())}") from None
 
 
-def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> None:
-    """Look through a file and all that it names before MuJoCo reads it. Raises XmlError."""
+def names_step(path: str | Path) -> bool:
+    """Whether the file, or one that it includes, says in what steps it is to be simulated. Raises XmlError."""
+    return _scan(Path(path), Path(path).parent, (), 1)
+
+
+def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> bool:
+    """Look through a file and all that it names before MuJoCo reads it: whether any names a time step. Raises XmlError."""
     here = real(file)
     if here in above or len(above) > INCLUDES_DEEP:
         raise XmlError(f"{above[0] if above else file}: {file.name} includes itself")
     root, _ = read_xml(file, "an MJCF")
     if not above and root.tag != "mujoco":
         raise XmlError(f"{file}: the outermost element is <{root.tag}>; an MJCF begins with <mujoco>")
-    waiting = [(root, copies)]
+    waiting, stepped = [(root, copies)], False
     while waiting:
         element, many = waiting.pop()
         if element.tag in COPIERS:
@@ -82,8 +87,10 @@ def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> Non
                 raise XmlError(
                     f"{file}: <{element.tag} file={quoted(name)}> lies outside of its folder; put it beside the file"
                 )
-            _scan(folder / name, folder, (*above, here), many)
+            stepped |= _scan(folder / name, folder, (*above, here), many)
+        stepped |= element.tag == "option" and element.get("timestep") is not None
         waiting += [(child, many) for child in element]
+    return stepped
 
 
 def _count(element: ET.Element) -> int:
