@@ -145,6 +145,16 @@ def _leaves_less(one: Fitted, other: Fitted, noise: float, share: float = LESS) 
     return one.energy - noise < share * (other.energy - noise)
 
 
+def with_more_room(search: Search, parts: tuple[Candidate, ...], u: Array) -> Fitted | None:
+    """The parts with more room for guesses among them that ended at an end of theirs; None where none did, or nothing is won."""
+    if not any(c.guess and _ends(c, u[at]) for c, at in zip(parts, Model(parts).places, strict=True)):
+        return None
+    (row,) = search.residuals([Model(parts).hypothesis(u)])
+    near = Fitted(parts, u, float(row @ row))
+    found = _farther(search, near)
+    return None if found is near else found
+
+
 def _farther(search: Search, found: Fitted) -> Fitted:
     """The same with more room where a guess ended as far from it as it may go: from what was found one may go as far again, as
     somebody would who wrote that into the description. Kept where it takes much off what is left."""

@@ -14,7 +14,7 @@ import numpy as np
 from ee_dist.discrepancy.assumed import beside, puts_right
 from ee_dist.discrepancy.brief import briefly, in_brief
 from ee_dist.discrepancy.evidence.holdout import PRIOR, Cut, cross_fit, travelling
-from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, judge
+from ee_dist.discrepancy.evidence.judge import TIE_ENERGY, Judged, judge
 from ee_dist.discrepancy.examine import FAR, Current
 from ee_dist.discrepancy.kinds import Everywhere, Kept, Steps, luck, values_at
 from ee_dist.discrepancy.problem import Problem
@@ -76,12 +76,14 @@ def everywhere(
     again: bool = False,
     twins: Sequence[tuple[int, Candidate, Array]] = (),
     seen: Sequence[tuple[Candidate, Array]] = (),
+    single: Judged | None = None,
 ) -> Everywhere | None:
     """On top of the current model, whose first ``own`` parts stay. None where it does not earn its place on the data held out
     in each of ``cuts``. ``again``: after such effects were added, only from neutral: beside what was added since, and beside
     whatever else promises most, for its twin may have been added; and beside each of ``twins``, which were tied with the part
     whose number they have, with the values that suited. ``seen``: single effects that were worth their place before, and the
-    values that they had: they are tried too, whatever they promise on top of values that stood in for them."""
+    values that they had: they are tried too, whatever they promise on top of values that stood in for them. ``single``: what
+    was just judged by itself: where it does more than all of these, the two are fitted together."""
     as_it_is = search.on(current.hypothesis).base()
     without = [as_it_is for _ in cuts]
     if current.parts:
@@ -108,6 +110,8 @@ def everywhere(
                 found is None or other.held < found.held + (look.luck(other.held) if bare else 0.0)
             ):
                 found = other
+    if found is not None and single is not None and float(single.held.sum()) <= found.held:
+        found = look.beside_single(found, single)
     return Steps(search, calm, own, current, look.cuts, len(pool)).of(found) if found is not None else None
 
 
@@ -183,6 +187,17 @@ class _Look:
         if alone is None or beside_it is None:
             return beside_it or alone
         return beside_it if beside_it.held + self.luck(beside_it.held) < alone.held else alone
+
+    def beside_single(self, found: Kept, single: Judged) -> Kept:
+        """What was found, or what is left of it and a single proposal that were fitted together, where that is better."""
+        names = {c.name for c in found.model.parts}
+        if names & {c.name for c in single.proposal.parts}:
+            return found
+        model = Model((*found.model.parts, *single.proposal.parts))
+        start = np.concatenate([found.model.u, single.own])
+        (fit,) = follow_valley(self.calm, [(model, start)], self.calm.everything, PRIOR, widths=(AGAIN,))
+        both = self._worth(fit, {}, np.inf)
+        return both if both is not None and both.held < found.held else found
 
     def _everywhere(self, base: Current) -> list[Candidate]:
         return [c for c in self._others(Model(base.parts)) if c.effect.everywhere]

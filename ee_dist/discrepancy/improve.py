@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ee_dist.discrepancy.assumed import with_more_room
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, looked_for_at_once, stands_out
 from ee_dist.discrepancy.evidence.holdout import (
@@ -106,6 +107,9 @@ def improve(
             judged = _asked(search, current, as_long(problem, c))
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))
+        if (wider := with_more_room(search, current.parts, current.u)) is not None:
+            current = Current(wider.parts, wider.u)
+            climb(refitted(search, current, "with more room for what was guessed"))
     else:
         exchanges, spread, anew, refused, nor = 0, 0, 0, 0, ""
         looked: set[str] | None = None
@@ -137,10 +141,10 @@ def improve(
                 at_once, some = search.doing(AT_ONCE), looked_for_at_once(problem, pool)
                 tried_with |= special
                 found = everywhere(
-                    at_once, current, own, some, held_out_by(problem), spread > 0, alike, [*seen.values()]
+                    at_once, current, own, some, held_out_by(problem), spread > 0, alike, [*seen.values()], best
                 )
                 looked = there
-                # Where a single one does more than all of them, it goes first, and they are looked for beside it.
+                # Where a single one does more than all of them and it together, it goes first.
                 if found is None or best is None or found.held < float(best.held.sum()):
                     anew, beside = anew + (spread > 0), special
                     if found is not None:
@@ -149,6 +153,8 @@ def improve(
                             climb(rung)
                         continue
                     refused += 1
+                else:
+                    looked = there | {c.name for c in best.proposal.parts}
                 nor = NOR if found is None else ""
             if best is None:
                 other = None
