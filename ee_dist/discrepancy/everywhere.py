@@ -190,14 +190,18 @@ class _Look:
 
     def beside_single(self, found: Kept, single: Judged) -> Kept:
         """What was found, or what is left of it and a single proposal that were fitted together, where that is better."""
-        names = {c.name for c in found.model.parts}
-        if names & {c.name for c in single.proposal.parts}:
+        alone = {c.name for c in single.proposal.parts}
+        if alone & {c.name for c in found.model.parts}:
             return found
         model = Model((*found.model.parts, *single.proposal.parts))
         start = np.concatenate([found.model.u, single.own])
         (fit,) = follow_valley(self.calm, [(model, start)], self.calm.everything, PRIOR, widths=(AGAIN,))
         both = self._worth(fit, {}, np.inf)
-        return both if both is not None and both.held < found.held else found
+        if both is None or both.held >= found.held:
+            return found
+        # Where nothing stays beside the single one, that is judged already.
+        more = {c.name for c in both.model.parts} - {c.name for c in self.current.parts} - alone
+        return both if more else found
 
     def _everywhere(self, base: Current) -> list[Candidate]:
         return [c for c in self._others(Model(base.parts)) if c.effect.everywhere]

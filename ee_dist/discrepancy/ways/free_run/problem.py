@@ -28,7 +28,7 @@ from ee_dist.discrepancy.ways.free_run.longer_steps import SLIGHT, every_row_is_
 from ee_dist.discrepancy.ways.free_run.noise import noise_by_unit, noiseless
 from ee_dist.discrepancy.ways.free_run.pieces import FEWEST, ToPositions, in_turn, pieces, spared, thinned
 from ee_dist.discrepancy.ways.free_run.starts import GROWN, grown_by_start, positions_off, speeds_there
-from ee_dist.discrepancy.ways.free_run.windows import led, window_s
+from ee_dist.discrepancy.ways.free_run.windows import led, longer, most_telling, window_s
 from ee_dist.discrepancy.ways.free_run.words import how_begun, in_unit, of_models, taken_less
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.integral import INTEGRAL
@@ -255,8 +255,23 @@ class FreeRun(Problem):
 
     @cached_property
     def _in_windows(self) -> FreeRun:
-        """The same by windows, all of them."""
-        return self._by(window_s(self.robot))
+        """The same by windows, all of them: of the usual length, or longer ones where what starts are off by drowns what models
+        are off by, and does so less in these."""
+        found = self._by(window_s(self.robot))
+        if not found.layout.by_segment:
+            return found
+        usual, shortest = window_s(self.robot), min(float(np.ptp(t.log.times_s)) for t in self.measured)
+        best = most_telling(usual, longer(usual, shortest), lambda s: self._by(s)._above_starts)
+        return found if best == usual else self._by(best)
+
+    @property
+    def _above_starts(self) -> float:
+        """Energy that the robot as described leaves, over what starts and noise may leave; none where it flies apart, nor where
+        starts are next to nothing beside the noise on average, and no part of the floor."""
+        if not self.layout.by_segment:
+            return 0.0
+        left = self.residuals([()])[0]
+        return float(left @ left / self.floor.sum()) if np.isfinite(left).all() else 0.0
 
     @cached_property
     def _whole(self) -> FreeRun:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 from ee_dist.robots.model import Robot
 
 RESTART_S = 0.5
@@ -10,11 +12,29 @@ LATE, LAGS = 0.5, 4.0
 """but of so many lags where a joint was seen to come later than by so much of it: by the end of such a window it has hardly come
 to what it was told, and any soft controller does as well."""
 
+TELLS = 1.25
+"""Times as far above what starts may do that longer windows must bring the described robot, to be taken."""
+
 
 def window_s(robot: Robot) -> float:
     """How long windows of a robot are, by what was seen of it."""
     lag = max((robot.joint(d.joint).lag_s for d in robot.drives), default=0.0)
     return RESTART_S if lag <= LATE * RESTART_S else round(LAGS * lag, 1)
+
+
+def longer(first_s: float, shortest_s: float) -> Iterator[float]:
+    """Windows (s) twice as long, four times, and so on, at least two of which a trial of ``shortest_s`` has."""
+    while (first_s := 2.0 * first_s) <= 0.5 * shortest_s:
+        yield first_s
+
+
+def most_telling(first_s: float, lengths: Iterator[float], above: Callable[[float], float]) -> float:
+    """The windows (s) by which the described robot is farthest ``above`` what starts may do (a ratio of energies), if that is
+    much farther than by the ``first_s``. What a start is off by dies out in a robot that controllers hold, and grows in one that
+    falls; what is wrong with a model stays."""
+    at_first = above(first_s)
+    found = max(((above(s), s) for s in lengths), default=(0.0, first_s))
+    return found[1] if found[0] >= TELLS * at_first else first_s
 
 
 def led(robot: Robot) -> bool:
