@@ -26,7 +26,7 @@ def briefly(search: Search, residual: Array, hypothesis: Hypothesis) -> Search:
     """The search on the beginning of its trials; itself where that is no shorter, or has less to explain than the rest of what
     the model of ``hypothesis`` leaves: the ``residual`` (n,)."""
     brief = replace(search, problem=search.problem.beginning(BEGINNING_S))
-    if brief.problem is search.problem:
+    if brief.problem is search.problem or not brief.everything.any():
         return search
     first = brief.on(hypothesis).base()
     begun, usual = (float(a.sum() / n.sum()) for a, n in (_above(brief, first), _above(search, residual)))

@@ -12,7 +12,7 @@ from test_windows import quiet, trial_of
 from way_samples import evaluator_for, samples
 
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
-from ee_dist.discrepancy.ways.free_run.windows import RESTART_S, longer, most_telling
+from ee_dist.discrepancy.ways.free_run.windows import RESTART_S, SECOND, longer, most_telling
 from ee_dist.effects.catalogue import Term, apply, term
 
 NOISE_RAD = 1e-3
@@ -43,7 +43,7 @@ def test_a_robot_that_is_held_is_started_anew_less_often_where_starts_say_little
     assert isinstance(found, FreeRun) and found.windows_s is not None
     assert (found.windows_s > RESTART_S) == longer_ones == usual.layout.by_segment
     if longer_ones:
-        assert found.windows_s <= 6.0, "two of a record at least"
+        assert found.windows_s <= 6.6, "two of a record at least"
         assert f"windows of {found.windows_s:g} s" in found.error_definition
         as_described, right = ([float(r @ r) for r in p.residuals([(), (heavier(rotor),)])] for p in (usual, found))
         assert as_described[0] < 1.6 * as_described[1], "in short ones there is nothing to be seen"
@@ -54,13 +54,13 @@ def test_a_robot_that_is_held_is_started_anew_less_often_where_starts_say_little
 @given(st.floats(0.1, 4.0), st.floats(0.1, 60.0))
 def test_windows_double_as_long_as_each_record_has_two(first: float, shortest: float) -> None:
     found = list(longer(first, shortest))
-    assert all(2.0 * s <= shortest for s in found)
+    assert all(s <= SECOND * shortest for s in found)
     assert found == [first * 2.0 ** (k + 1) for k in range(len(found))]
-    assert not found or 4.0 * found[-1] > shortest
+    assert not found or 2.0 * found[-1] > SECOND * shortest
 
 
 @pytest.mark.parametrize(("above", "taken"), [((2.0, 1.0, 1.5), 0.5), ((2.0, 2.4, 2.4), 0.5), ((2.0, 3.0, 2.8), 1.0)])
 def test_much_more_has_to_be_seen_in_longer_windows(above: tuple[float, ...], taken: float) -> None:
     by_length = dict(zip((0.5, 1.0, 2.0), above, strict=True))
     assert most_telling(0.5, longer(0.5, 4.0), by_length.__getitem__) == taken
-    assert most_telling(0.5, longer(0.5, 1.0), by_length.__getitem__) == 0.5, "there are none"
+    assert most_telling(0.5, longer(0.5, 1.5), by_length.__getitem__) == 0.5, "there are none"

@@ -12,6 +12,8 @@ LATE, LAGS = 0.5, 4.0
 """but of so many lags where a joint was seen to come later than by so much of it: by the end of such a window it has hardly come
 to what it was told, and any soft controller does as well."""
 
+SECOND = 0.55
+"""Share of the shortest trial that a window may be: the second may end a little before it does."""
 TELLS = 1.25
 """Times as far above what starts may do that longer windows must bring the described robot, to be taken."""
 
@@ -23,8 +25,8 @@ def window_s(robot: Robot) -> float:
 
 
 def longer(first_s: float, shortest_s: float) -> Iterator[float]:
-    """Windows (s) twice as long, four times, and so on, at least two of which a trial of ``shortest_s`` has."""
-    while (first_s := 2.0 * first_s) <= 0.5 * shortest_s:
+    """Windows (s) twice as long, four times, and so on, two of which a trial of ``shortest_s`` has, or next to that."""
+    while (first_s := 2.0 * first_s) <= SECOND * shortest_s:
         yield first_s
 
 
