@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.importer import import_files
 from ee_dist.measurements.mapping import Mapping
 from ee_dist.measurements.mapping_file import mapping_of, read_mapping
 from ee_dist.measurements.proposal.files import proposal_for
@@ -169,3 +170,46 @@ def test_gains_that_differ_are_held_against_that_of_each_drive(tmp_path: Path) -
     shoulder, elbow = of_two_trials(tmp_path, robot_of(tmp_path, "kp: 80, kd: 4", "kp: 50, kd: 4"), 40, 80)
     assert shoulder[:2] == ("shoulder", pytest.approx({40: 0.5, 80: 1.0})) and "80, is one of these" in shoulder[2]
     assert elbow[:2] == ("elbow", pytest.approx({40: 0.8, 80: 1.6})) and "50, is between these" in elbow[2]
+
+
+def gains_of_trials(folder: Path, robot: Robot, column: str, gains: tuple[float, ...]) -> Proposal:
+    """Of a log for each of the ``gains``, which stand in a column of its own, with commands of the driven joints."""
+    m = samples.motion()
+    driven = [d.command != "none" for d in robot.drives]
+    goals = {f"goal_{joint}_rad": m["g"][:, k] for k, joint in enumerate(robot.motor_names) if driven[k]}
+    for k, gain in enumerate(gains):
+        read = np.column_stack([m["q"], 0.3 * np.sin(3.1 * m["t"])])
+        rows = {"time_s": m["t"]} | {f"position_{joint}_rad": read[:, j] for j, joint in enumerate(robot.motor_names)}
+        pd.DataFrame(rows | goals | {column: gain}).to_csv(folder / f"run{k}.csv", index=False)
+    return proposal_for([folder / f"run{k}.csv" for k in range(len(gains))], robot, Hints())
+
+
+@pytest.mark.parametrize("column", ["kp", "shoulder_kp"])
+def test_a_gain_beside_a_joint_that_nothing_drives_is_that_of_the_driven_one(tmp_path: Path, column: str) -> None:
+    robot = robot_of(tmp_path, "kp: 2, kd: 0.5", "command: none, viscous: 0.001")
+    found = gains_of_trials(tmp_path, robot, column, (1.0, 2.0, 3.0))
+    (choice,) = (c for c in found.choices if c.group == "settings")
+    factor = {"column": column, "scale": 0.5}
+    assert choice.entry == {"effect": "position_gain", "target": "shoulder", "factor": factor}
+    assert not any("kp" in note for note in found.notes), found.notes
+
+
+def test_a_gain_of_several_driven_joints_is_no_gain_of_those_that_nothing_drives(tmp_path: Path) -> None:
+    joints = ("shoulder", "elbow", "tail")
+    path = samples.robot_file(tmp_path, joints)
+    path.write_text(path.read_text().replace("tail: {kp: 20, speed_limit: 8}", "tail: {command: none}"))
+    robot, _ = load_robot(path)
+    found = gains_of_trials(tmp_path, robot, "kp", (10.0, 20.0))
+    (choice,) = (c for c in found.choices if c.group == "settings")
+    assert (choice.entry or {})["target"] == "driven_joints"
+    (tmp_path / "mapping.yaml").write_text(as_yaml(found, str(path), "log"))
+    files = [tmp_path / f"run{k}.csv" for k in (0, 1)]
+    held = [record.believed for record, _ in import_files(files, read_mapping(tmp_path / "mapping.yaml"), robot)]
+    assert [dict(terms[0].values)["factor"] for terms in held] == pytest.approx([0.5, 1.0])
+
+
+def test_one_gain_of_all_trials_takes_the_place_of_the_assumed_ones_of_driven_joints_only(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, ASSUMED, "command: none")
+    found = gains_of_trials(tmp_path, robot, "kp", (200.0, 200.0))
+    assert found.head["gains"] == {"shoulder": {"kp": 200.0}}
+    assert not any("is taken for it" in note for note in found.notes), found.notes

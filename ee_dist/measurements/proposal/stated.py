@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from ee_dist.basics.names import listed
-from ee_dist.effects.groups import ALL_JOINTS
+from ee_dist.effects.groups import ALL_JOINTS, DRIVEN_JOINTS
+from ee_dist.effects.targets import powered
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.proposal.model import LIKELY, Choice, Proposal
 from ee_dist.measurements.proposal.words import tokens
@@ -97,8 +98,7 @@ def _known(
     effect, target = found
     key = KEYS[effect]
     guessed = {
-        d.joint: getattr(d, key) for d in robot.drives
-        if target in (ALL_JOINTS, d.joint) and (d.joint, key) in robot.assumed
+        d.joint: getattr(d, key) for d in robot.drives if d.joint in _at(target, robot) and (d.joint, key) in robot.assumed
     }  # fmt: skip
     if not guessed:
         return False
@@ -113,7 +113,7 @@ def _known(
     for joint in [ALL_JOINTS] if len(guessed) == len(robot.drives) else guessed:
         known.setdefault(joint, {})[key] = value
     proposal.unused[:] = [column for column in proposal.unused if column != name]
-    return len(guessed) == len(robot.drives) or target != ALL_JOINTS
+    return [*guessed] == [*_at(target, robot)]
 
 
 def _offered(known: dict[str, dict[str, float]], robot: Robot) -> str:
@@ -137,7 +137,7 @@ def _offered(known: dict[str, dict[str, float]], robot: Robot) -> str:
 def _settings(found: tuple[str, str], place: str, name: str, values: Sequence[float], robot: Robot) -> Iterator[Choice]:
     """A factor on the description's gain of each trial: on that of all its drives at once, where it is the same of all."""
     effect, target = found
-    described = {d.joint: getattr(d, KEYS[effect]) for d in robot.drives if target in (ALL_JOINTS, d.joint)}
+    described = {d.joint: getattr(d, KEYS[effect]) for d in robot.drives if d.joint in _at(target, robot)}
     known = {j: _in_the_unit(g, (j, KEYS[effect]) in robot.assumed, values) for j, g in described.items()}
     if not all(known.values()):
         # The usual value, of those as usual the smallest, stands for the description's gain.
@@ -211,6 +211,11 @@ def _together(known: dict[str, dict[str, float]], robot: Robot) -> dict[str, dic
     return {ALL_JOINTS: every[0]} if every[0] and all(gains == every[0] for gains in every) else known
 
 
+def _at(target: str, robot: Robot) -> tuple[str, ...]:
+    """The driven joints that a gain of this target is of."""
+    return powered(robot) if target in (ALL_JOINTS, DRIVEN_JOINTS) else (target,)
+
+
 def _gain_words(name: str) -> tuple[str, list[str]] | None:
     """What a gain is called by, and the words of the name that are left."""
     words = tokens(name)
@@ -239,9 +244,12 @@ def _gain(name: str, robot: Robot, order: Mapping[int, str]) -> tuple[str, str] 
         joint = order.get(int(at[1]))
         return (effect, joint) if joint in able else None
     if not rest:
-        if len(robot.drives) == 1:
-            return (effect, able[0]) if able else None
-        return (effect, ALL_JOINTS) if len(able) == len(robot.drives) else None
+        # Joints that nothing drives have no gains that could be meant.
+        driven = powered(robot)
+        if not driven or len(able) < len(driven):
+            return None
+        whole = ALL_JOINTS if len(driven) == len(robot.drives) else DRIVEN_JOINTS
+        return effect, driven[0] if len(driven) == 1 else whole
     of_joint = [j for j in able if [w for w in tokens(j) if w not in FILLING] == rest]
     return (effect, of_joint[0]) if len(of_joint) == 1 else None
 
