@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ee_dist.discrepancy.asked_for import to_be_added
 from ee_dist.discrepancy.assumed import with_more_room
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, looked_for_at_once, stands_out
@@ -69,8 +70,6 @@ NO_MORE = "no further effect earns its place: {why}"
 NOR = "; nor does all that may be a little wrong everywhere, fitted at once"
 WORSE = "with all values fitted anew, data held out are foretold no better"
 NOTHING_LEFT = "nothing is left that counts, above the noise and above the resolution at which channels are compared"
-ASKED = "the effects asked for were added"
-REFITTED = "only the model's own values were to be fitted"
 ONE_MORE = "one more effect"
 """What the search is at, for who waits."""
 
@@ -86,7 +85,8 @@ def improve(
     climbed: Callable[[Rung], None] | None = None,
 ) -> Improvement:
     """Add ``wanted`` (an empty list: fit only what the model has), or (None) whatever of ``pool`` earns its place, to the
-    model ``before``; fit everything anew. ``climbed`` hears of every step of the ladder when it is taken."""
+    model ``before``; fit everything anew. What is wanted twice, or is in the model with free values, is not added again.
+    ``climbed`` hears of every step of the ladder when it is taken."""
     as_it_is = residual_as_it_is(problem, before)
     search, current = begin(problem, before, progress)
     ladder = [_start("the model as it was", before, as_it_is, problem)]
@@ -102,8 +102,8 @@ def improve(
     last: Examined | None = None
     own, twins = len(current.parts), list[Twin]()
     if wanted is not None:
-        stopped = ASKED if wanted else REFITTED
-        for c in wanted:
+        new, stopped = to_be_added(problem.robot, current.parts, wanted)
+        for c in new:
             judged = _asked(search, current, as_long(problem, c))
             current = Current(judged.model.parts, judged.u)
             climb(_rung(search, judged))

@@ -9,6 +9,8 @@ import pytest
 from linear_problem import ROBOT, Linear
 
 import ee_dist.discrepancy.improve as improving
+from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.asked_for import ASKED
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
 from ee_dist.discrepancy.evidence.rule import TOO_LITTLE, TOO_LITTLE_ALONE
 from ee_dist.discrepancy.examine import STANDARD_EFFORT
@@ -65,6 +67,35 @@ def test_a_step_that_foretells_no_better_with_all_values_fitted_anew_is_refused(
     found = improve(Linear(HIDDEN), POOL)
     assert [r.name for r in found.ladder[1:]] == [WEAK] and {t.name for t in found.terms} == {WEAK}
     assert improving.WORSE in found.stopped and found.verdict == BETTER
+
+
+def test_what_is_asked_for_and_there_already_is_fitted_anew_in_its_place() -> None:
+    before = (term("motor_weak", "knee_front_left", loss=0.1),)
+    named = improve(Linear(HIDDEN[:1]), POOL, before, [POOL[0]])
+    only = improve(Linear(HIDDEN[:1]), POOL, before, [])
+    assert named.terms == only.terms and [t.name for t in named.terms] == [WEAK]
+    assert dict(named.terms[0].values)["loss"] == pytest.approx(0.4, abs=0.05)
+    assert not any(r.added for r in named.ladder)
+    assert named.stopped == f"{WEAK}, which the model has already, was fitted anew in its place"
+    account = improve_account(Linear(HIDDEN[:1]), named)
+    assert account.headline.startswith("Added: nothing; the model's own values were fitted anew.")
+    assert any(named.stopped in line for line in account.lines)
+
+
+def test_what_is_asked_for_twice_is_added_once() -> None:
+    asked = [POOL[0], POOL[1], POOL[0]]
+    found = improve(Linear(HIDDEN), POOL, wanted=asked)
+    assert [t.name for t in found.terms] == [WEAK, JAM] and found.stopped == ASKED
+    beside = improve(Linear(HIDDEN), POOL, HIDDEN[:1], asked)
+    assert [t.name for t in beside.terms] == [WEAK, JAM] and [r.name for r in beside.ladder if r.added] == [JAM]
+    assert beside.stopped.startswith(f"{ASKED}; {WEAK}, which the model has already")
+
+
+def test_the_same_joints_by_another_name_are_the_same() -> None:
+    joints = "+".join(ROBOT.motor_names)
+    asked = [parse(ROBOT, "viscous_friction@all_joints"), parse(ROBOT, f"viscous_friction@{joints}")]
+    found = improve(Linear(()), POOL, wanted=asked)
+    assert [t.name for t in found.terms] == ["viscous_friction@all_joints"]
 
 
 def test_a_twin_is_called_tied() -> None:
