@@ -59,13 +59,14 @@ CLOCKS, MOST_APART = 1.03, 15.0
 
 def suspicions(name: str, values: Array, turn: float = TURN, asked: bool = False) -> list[str]:
     """Sentences about one series (T,): stuck, clipped, a wrapped counter or angle; ``turn`` is a whole turn in its numbers.
-    ``asked``: a command, which may well rest at its largest value, however it came there."""
+    ``asked``: a command, which may well rest at its largest value, however it came there, and is held at its last goal to the end
+    as long as anybody likes, as that of a step response."""
     found: list[str] = []
     spread = float(np.ptp(values))
     if spread == 0:
         return [f"{name}{STUCK_AT}{values[0]:.6g} for the whole record"]
     run, start = _longest_run(values)
-    if run > STUCK_SHARE * len(values):
+    if run > STUCK_SHARE * len(values) and not (asked and start + run == len(values)):
         found.append(f"{name}: does not change for {run} rows of {len(values)}, from row {start}")
     for edge, what in () if asked else ((values.max(), "highest"), (values.min(), "lowest")):
         at = values == edge

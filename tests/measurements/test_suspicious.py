@@ -76,6 +76,20 @@ def test_bad_signals_are_named(values: np.ndarray, word: str) -> None:
     assert any(word in s for s in suspicions("x", values))
 
 
+def test_a_command_that_is_held_at_its_goal_to_the_end_is_a_step_and_a_sensor_stuck(tmp_path: Path) -> None:
+    step = np.repeat([0.0, 1.0], [300, 1700])
+    assert suspicions("command of j", step, asked=True) == []
+    assert suspicions("command of j", np.repeat([0.0, 1.0, 0.0], [300, 1500, 200]), asked=True), "not to the end"
+    assert "stuck at 1" in suspicions("command of j", np.ones(2000), asked=True)[0]
+    assert "does not change for 1700 rows" in suspicions("position", step)[0]
+    follows = signal.lfilter([0.05], [1, -0.95], step) + 1e-3 * WAVE
+    stands = np.r_[WAVE[:500], np.full(1500, WAVE[499])]
+    frame = logs.frame_of(T, np.stack([follows, stands], axis=1), np.stack([step, WAVE], axis=1))
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, frame))
+    still = [s.partition(" (")[0] for s in report.suspicious if "does not change" in s]
+    assert still and all(s.endswith("elbow") and not s.startswith("command") for s in still), report.suspicious
+
+
 @pytest.mark.parametrize("way_s", [0.05, 0.5])
 def test_goals_that_rest_where_they_go_are_not_clipped(tmp_path: Path, way_s: float) -> None:
     """Goals in steps, or at an even speed, now here and now there, and four times as far as they ever go. The joint stays where
