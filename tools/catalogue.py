@@ -21,6 +21,7 @@ FAMILY = {
     "sensing": "what a channel reports",
     "wiring": "between controller and motors",
 }
+DESCRIBED = "-described"
 INTRO = """# The effect catalogue
 
 Written by `python tools/catalogue.py` from the effects themselves; edit those, not this page.
@@ -34,8 +35,10 @@ What several joints share is one effect with one target, `all_joints` or their n
     python -m ee_dist task=trial engine=mujoco 'hidden=[{effect: zero_offset, target: all_joints, offset_rad: 0.03}]'
 
 At its neutral value an effect leaves every result bit for bit as it was. On a slide read m for rad and N for N.m. A value
-outside the limits is refused; within them, `explain` and `improve` look in a range that suits the robot and the target,
-of which the tables give examples: for the quadruped (its first target) and, where that has none, for another robot.
+outside the limits is refused; `-described` is all that the description has of it, and what several joints share in the model: no
+more can be taken off, and nothing where there is none. Within the limits `explain` and `improve` look in a range that suits the
+robot and the target, of which the tables give examples: for the quadruped (its first target) and, where that has none, for
+another robot.
 Effects marked * are settings and calibrations: they can be used and fitted, but `explain` does not propose them by itself.
 An effect of your own is [one short file](own_effect.md).
 """
@@ -84,6 +87,9 @@ def _rows(effect: Effect) -> list[str]:
 
 
 def _limits(p: Parameter) -> str:
+    if p.on_top:
+        # Of what is in the description there cannot be less than none, whatever the parameter itself allows.
+        return f"{DESCRIBED} to {p.upper:g}" if math.isfinite(p.upper) else f"from {DESCRIBED}"
     if math.isinf(p.lower) and math.isinf(p.upper):
         return "none"
     if math.isinf(p.upper):

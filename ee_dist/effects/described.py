@@ -56,7 +56,8 @@ def _not_too_much(robot: Robot, terms: Hypothesis) -> None:
         t, p = terms[k], find(terms[k].effect).parameter(name)
         has = getattr(drive_of(robot, joint), p.on_top)
         raise EffectError(
-            f"{t}: {joint} is described with {has:g} {p.unit} of it; {-dict(t.values)[name]:g} cannot be taken off"
+            f"{t}: {joint} is described with {has:g} {p.unit} of it; {-dict(t.values)[name]:g} cannot be taken off, so that "
+            f"{name} is {0.0 - has:g} or more"
         )
 
 
