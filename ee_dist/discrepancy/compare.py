@@ -50,11 +50,24 @@ class RegimeReport:
     values: float
 
 
+@dataclass(frozen=True)
+class AtLimit:
+    """A joint whose simulated drive is at its torque ``limit`` (in ``unit``, as the model has it) in a ``share``, 0 to 1, of the
+    rows in which the joint does not rest; ``assumed``: whether the description only assumed the limit."""
+
+    joint: str
+    limit: float
+    unit: str
+    share: float
+    assumed: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """Everything compare says. ``heat``: (segments, channels) root mean square, of values whose floor is ``heat_floor``;
     ``trial_errors`` by trial; ``parted_s``: by trial, when the first three values in a row of a channel stood out, None
-    where none did; ``unsure``: channels in which what is left may be noise or not."""
+    where none did; ``unsure``: channels in which what is left may be noise or not; ``at_limit``: joints whose simulated
+    drives are often at their torque limits, where somebody looked."""
 
     error: float
     noise_floor: float
@@ -66,6 +79,7 @@ class Comparison:
     heat: Array
     trial_errors: list[float]
     unsure: list[str] = field(default_factory=list)
+    at_limit: list[AtLimit] = field(default_factory=list)
 
 
 def compare(problem: Problem, residual: Array) -> Comparison:

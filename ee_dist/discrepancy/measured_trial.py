@@ -13,9 +13,10 @@ from ee_dist.discrepancy.past import Past, limited
 from ee_dist.discrepancy.steps import SPEEDS, between_steps, held
 from ee_dist.effects.catalogue import Hypothesis, applied, term
 from ee_dist.effects.fixture import STAND
+from ee_dist.engines.contract import Rollout
 from ee_dist.engines.drivers import Commands, Driver, Network
 from ee_dist.engines.halfway import goes_halfway
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.excitation import Excitation
 from ee_dist.trials.log import Array, SensorLog, State
 
@@ -100,6 +101,13 @@ class MeasuredTrial:
     def simulated(self, model: Robot) -> Robot:
         """The model as the steps of a simulation take it."""
         return between_steps(model) if self.commands_held else model
+
+
+def shown(rollout: Rollout, beside: Sequence[Sensor] = ()) -> Rollout:
+    """The rollout for people to look at: with the poses of all parts, and after its own channels those of sensors ``beside`` the
+    robot's, which commands that were recorded do not listen to."""
+    model = rollout.model
+    return replace(rollout, model=replace(model, sensors=(*model.sensors, *beside)) if beside else model, pose=True)
 
 
 def driver_of(excitation: Excitation, robot: Robot) -> Commands | Network:

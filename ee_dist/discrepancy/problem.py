@@ -22,7 +22,7 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.recorded import bridged, not_compared
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.effect import FAMILIES, Beside
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import Array, SensorLog, late
 
 Index = NDArray[np.int64]
@@ -195,8 +195,9 @@ class Problem(ABC):
         none where a way cannot tell one from the other."""
         return []
 
-    def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
-        """The simulated motion of each trial with the poses of all parts; None where nothing is simulated."""
+    def simulated(self, hypothesis: Hypothesis, beside: Sequence[Sensor] = ()) -> list[SensorLog | None]:
+        """The simulated motion of each trial with the poses of all parts, and, after its own channels, what sensors ``beside``
+        the robot's would read; None where nothing is simulated."""
         return [None] * len(self.measured)
 
     def shows(self, effect: str, target: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
+from ee_dist.discrepancy.at_limit import often_at_limit
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.compare import Comparison, compare
 from ee_dist.discrepancy.evidence.left import leftovers
@@ -48,7 +49,7 @@ def run(config: Config, options: Options, out: Path) -> tuple[Problem, Compariso
     way = way_of(measured, options.by)
     problem = way.make(measured, for_few(config))
     residual = residual_as_it_is(problem, measured.model)
-    found = compare(problem, residual)
+    found = replace(compare(problem, residual), at_limit=often_at_limit(problem, measured.model))
     left = leftovers(problem, residual)
     account = compare_account(problem, found, left).warned(measured.remarks)
     if not account.good:

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
+from ee_dist.discrepancy.compare import AtLimit
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
 
 def compared(
-    error: float, left: list[Leftover], there: float | None = None, parted: dict[str, float | None] | None = None
+    error: float,
+    left: list[Leftover],
+    there: float | None = None,
+    parted: dict[str, float | None] | None = None,
+    at_limit: Sequence[AtLimit] = (),
 ) -> Account:
     """``there``: the error of the worst channel, where it is another than that of the model."""
     found = SimpleNamespace(
         error=error, noise_floor=1.0, floor_source="told", definition="e", parted_s=parted or {},
         channels=[SimpleNamespace(name="a_b", normalised=there or error), SimpleNamespace(name="command_b", normalised=0.0)],
 
-        unsure=[],
+        unsure=[], at_limit=list(at_limit),
     )  # fmt: skip
     problem = SimpleNamespace(
         robot=servo_pendulum(),

@@ -257,6 +257,19 @@ def test_a_sealed_trial_is_explained_improved_and_revealed(cli, by):
     assert "Named: nothing. Not right." in told.out
 
 
+def test_a_model_that_is_at_its_torque_limit_says_so_in_the_terminal_the_report_and_the_summary(cli, tmp_path):
+    plan = "task.excitations=['multisine:seconds=1.6,amplitude=0.4,seed=1']"
+    tried, _ = run(cli, "task=trial", "robot=servo_pendulum", "engine=mujoco", plan, "task.noise=0.0005")
+    weak = tmp_path / "weak.yaml"
+    weak.write_text("robot: servo_pendulum\neffects:\n  - {effect: torque_limit, target: servo, loss: 0.9}\n")
+    found, said = run(cli, "task=compare", f"measured={tried}", f"model={weak}", "task.rerun=false", *QUICK)
+    (line,) = (w for w in json.loads((found / "summary.json").read_text())["words"] if "at its torque limit" in w)
+    assert line.startswith("servo (0.0") and line in " ".join(said.out.split())
+    assert line in html.unescape((found / "report.html").read_text())
+    other, said = run(cli, "task=compare", f"measured={tried}", "task.rerun=false", *QUICK)
+    assert "torque limit" not in said.out + (other / "summary.json").read_text()
+
+
 def test_a_model_is_calibrated_on_an_untouched_robot_and_its_calibration_holds_one_way(cli):
     plan = "task.excitations=['multisine:seconds=1.6,amplitude=0.2,seed=1','steps:seconds=1.6,amplitude=0.15,seed=2']"
     tried, _ = run(cli, "task=trial", "robot=servo_pendulum", "engine=mujoco", plan, "task.noise=0.0005")

@@ -16,6 +16,7 @@ from ee_dist.discrepancy.accounts.account import (
     slower,
 )
 from ee_dist.discrepancy.assumed import assumed_text
+from ee_dist.discrepancy.at_limit import limit_text
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.problem import TIMES_NOISE, Problem
@@ -72,7 +73,12 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     settled = ratio < CLOSE and not left
     advice = "" if not settled else slower(found.unsure) if found.unsure else CONTENT
     good = settled and not found.unsure
-    return Account(head, error, sure, (*lines, *problem.notes), good, advised(problem, advice))
+    # Where the model agrees its limits are those of the robot; one that nobody stated may decide everything.
+    limits = () if settled else tuple(limit_text(found.at_limit))
+    warnings, notes = (limits, ()) if any(a.assumed for a in found.at_limit) else ((), limits)
+    return Account(
+        head, error, sure, (*notes, *lines, *problem.notes), good, advised(problem, advice), warnings=warnings
+    )
 
 
 def _times(ratio: float) -> str:

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from ee_dist.basics.altered import altered
-from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, shown
 from ee_dist.discrepancy.problem import TIMES_NOISE, Index, Problem, Series, Through, error
 from ee_dist.discrepancy.starting import speeds_off
 from ee_dist.discrepancy.ways.free_run.at_rest import doubt, hardly_better, stands_still
@@ -34,7 +34,7 @@ from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.integral import INTEGRAL
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
 from ee_dist.measurements.errors import MeasurementError
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import Array, SensorLog
 
 BLOCKS = 6
@@ -337,17 +337,17 @@ class FreeRun(Problem):
         )
         return float(np.sqrt(np.abs(gap).mean()))
 
-    def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
+    def simulated(self, hypothesis: Hypothesis, beside: Sequence[Sensor] = ()) -> list[SensorLog | None]:
         """Of the first stretch of each trial; of a robot that is led, the whole trial."""
         if self.windows_s is not None and led(self.robot):
-            return self._whole.simulated(hypothesis)
+            return self._whole.simulated(hypothesis, beside)
         if self.steps > 1:
-            return self._by(self.windows_s, self.one_in).simulated(hypothesis)
+            return self._by(self.windows_s, self.one_in).simulated(hypothesis, beside)
         first = {p.trial: p for p in reversed(self.pieces)}
         jobs = []
         for k, p in sorted(first.items()):
             rollout = p.rollout(self._simulated(k, hypothesis), len(p.log), False)
-            jobs.append(Job(replace(rollout, pose=True), Whole()))
+            jobs.append(Job(shown(rollout, beside), Whole()))
         return list(self.evaluator.evaluate(jobs))
 
     def mean_absolute(self, hypothesis: Hypothesis) -> Array:

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s
+from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s, shown
 from ee_dist.discrepancy.problem import EVENT, Index, Problem, Series
 from ee_dist.discrepancy.recorded import means_of, row_by_row
 from ee_dist.discrepancy.ways.open_loop.falls import fallen
@@ -56,7 +56,7 @@ from ee_dist.effects.integral import INTEGRAL
 from ee_dist.effects.stamps import STAMPED_LATE
 from ee_dist.engines.drivers import Network
 from ee_dist.evaluation.jobs import Evaluator, Job, Whole
-from ee_dist.robots.model import Robot
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import Array, SensorLog
 
 BLOCK_S = 0.04
@@ -332,9 +332,9 @@ class OpenLoop(Problem):
     def _in_units(self, model: Hypothesis) -> InUnits:
         return in_units(self.whole.series(model), self.robot.sensors)
 
-    def simulated(self, hypothesis: Hypothesis) -> list[SensorLog | None]:
+    def simulated(self, hypothesis: Hypothesis, beside: Sequence[Sensor] = ()) -> list[SensorLog | None]:
         believed = apply(self.robot, hypothesis)
-        rollouts = [replace(rollout_of(t, apply(believed, t.setup)), pose=True) for t in self.measured]
+        rollouts = [shown(rollout_of(t, apply(believed, t.setup)), beside) for t in self.measured]
         return list(self.evaluator.evaluate([Job(r, Whole()) for r in rollouts]))
 
     def predicted(self, hypothesis: Hypothesis) -> list[Array]:
