@@ -331,6 +331,11 @@ class Problem(ABC):
         """(n,) what of the floor is noise beyond doubt; less, where the floor is only known to be no higher."""
         return self.floor
 
+    def floor_under(self, hypothesis: Hypothesis) -> float:
+        """The sum of the floor, were the robot as a hypothesis says: what starts that are off make of a motion is another's then.
+        Raises EffectError for one that does not fit the robot."""
+        return float(self.floor.sum())
+
     @cached_property
     def curves(self) -> tuple[tuple[int, str], ...]:
         """The trials, and the channels of each, that a residual has values of."""

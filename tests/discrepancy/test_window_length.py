@@ -11,6 +11,10 @@ from hypothesis import strategies as st
 from test_windows import quiet, trial_of
 from way_samples import evaluator_for, samples
 
+from ee_dist.discrepancy.evidence import judge as judging
+from ee_dist.discrepancy.evidence.rule import OF_STARTS
+from ee_dist.discrepancy.explain import explain
+from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.discrepancy.ways.free_run.problem import FreeRun
 from ee_dist.discrepancy.ways.free_run.windows import RESTART_S, SECOND, longer, most_telling
 from ee_dist.effects.catalogue import Term, apply, term
@@ -64,3 +68,13 @@ def test_much_more_has_to_be_seen_in_longer_windows(above: tuple[float, ...], ta
     by_length = dict(zip((0.5, 1.0, 2.0), above, strict=True))
     assert most_telling(0.5, longer(0.5, 4.0), by_length.__getitem__) == taken
     assert most_telling(0.5, longer(0.5, 1.5), by_length.__getitem__) == 0.5, "there are none"
+
+
+def test_what_coasts_as_far_on_a_wrong_start_is_told_by_what_it_takes_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So few windows are left that what starts do in them may be nearly all, by itself; but a heavier rotor does not tame it."""
+    found = servo(0.2).searched
+    rotor = candidate(found.robot, "rotor_inertia", "servo")
+    (judged,) = explain(found, [rotor]).candidates
+    assert judged.earned and judged.hypothesis[0].values[0][1] == pytest.approx(0.04, rel=0.2)
+    monkeypatch.setattr(judging, "tamed", lambda *_: np.inf)
+    assert explain(found, [rotor]).candidates[0].why_not == OF_STARTS

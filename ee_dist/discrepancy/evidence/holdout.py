@@ -21,6 +21,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.discrepancy.search.slopes import WIDTHS, Leading
 from ee_dist.discrepancy.search.valley import LARGE
 from ee_dist.discrepancy.thinning import place
+from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.fixture import STAND
 from ee_dist.evaluation.gathered import side_by_side
 from ee_dist.robots.ranges import travel
@@ -87,12 +88,13 @@ class Cut:
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """A model judged on what its fits had not seen: ``residual`` (n,) there, ``seen`` mean square where it was fitted,
-    ``fits`` one a turn."""
+    ``fits`` one a turn, on top of what is ``fixed``."""
 
     cut: Cut
     residual: Array
     seen: float
     fits: tuple[Fit, ...]
+    fixed: Hypothesis = ()
 
     @property
     def energy(self) -> float:
@@ -254,7 +256,10 @@ def cross_fit(
             residuals[i][~mask] = fit.residual[~mask]
             seen[i] += fit.energy
             fits[i].append(fit)
-    return [HeldOut(cut, r, float(s) / max(count, 1), tuple(f)) for r, s, f in zip(residuals, seen, fits, strict=True)]
+    return [
+        HeldOut(cut, r, float(s) / max(count, 1), tuple(f), search.fixed)
+        for r, s, f in zip(residuals, seen, fits, strict=True)
+    ]
 
 
 def held_by_slopes(search: Search, fits: Sequence[Fit], cut: Cut) -> list[HeldOut]:

@@ -13,11 +13,13 @@ from ee_dist.discrepancy.evidence.intervals import BOUND, at_bound, half_widths
 from ee_dist.discrepancy.evidence.rule import (
     NEAR,
     NOTHING,
+    OF_STARTS,
     WORTH,
     above_noise,
     least_energy,
     least_share,
     may_be_zero,
+    tamed,
     told_in,
     why_not,
 )
@@ -146,6 +148,8 @@ def judge(
     total, gain = float(before.sum()), float(gained.sum())
     above = above_noise(problem, total)
     why = why_not(problem, cut, proposal, before, held, tried, least)
+    if why == OF_STARTS:
+        why = why_not(problem, cut, proposal, before, held, tried, least, tames=tamed(problem, found, total))
     partly = False
     if why and fitted:
         told = told_in(problem, found, fitted, proposal, tried)

@@ -40,6 +40,8 @@ STARTS = 3.0
 NOTHING = 1e-12
 """Energy that is none, to be divided by."""
 LUCK = "its gain on held-out data is no more than luck"
+AS_MUCH, OTHERS = 0.1, 1.5
+"""Share of all that is left, and times what usual starts come to less, that these starts may come to less by."""
 OF_STARTS = "what is left without it is no more than starts that are off may make"
 MAY_BE_ZERO = "its gain on held-out data may be zero"
 TOO_LITTLE = "it takes too little of what is above the noise"
@@ -63,9 +65,10 @@ def why_not(
     tried: int,
     least: float = 1.0,
     which: Mask | None = None,
+    tames: float = math.inf,
 ) -> str:
     """Why held-out energies (segments,) before and with a proposal do not speak for it, in the segments ``which`` (all):
-    nothing if they do. ``least``: see judge."""
+    nothing if they do. ``least``: see judge. ``tames``: energy that it may take off by letting starts that are off do less."""
     chosen = np.ones(len(held), dtype=bool) if which is None else which
     units = np.unique(cut.unit_of[chosen])
     gained = cut.by_unit(before - held)[units]
@@ -75,7 +78,9 @@ def why_not(
     dispersion = max(least, float(held[chosen].sum()) / int(values.sum()))
     # Where a model is wrong all over, useless effects take more off it by luck, in proportion.
     enough = least_energy(tried, max(1, proposal.size)) * dispersion + CAUTION * problem.gained
-    counts = min(gain, total - floor - _of_starts(problem)) if problem.layout.by_segment else gain
+    counts = gain
+    if problem.layout.by_segment:
+        counts = max(min(gain, total - floor - _of_starts(problem)), gain - tames)
     if not np.isfinite(gain) or gain < enough:
         return LUCK
     if counts < enough:
@@ -112,6 +117,15 @@ def told_in(problem: Problem, found: HeldOut, without: Sequence[float], proposal
         if before - fit.energy >= max(enough, WORTH * above):
             told[np.unique(problem.segment_of[~fit.mask])] = True
     return told
+
+
+def tamed(problem: Problem, found: HeldOut, total: float) -> float:
+    """Energy of ``total`` that a model may take off by letting starts that are off do less than they do to the robot as it is
+    described, were they all of it. A pole that rubs falls slower, whatever it truly does; a motor that is heavier *and* stiffer
+    coasts as far on a wrong start, and what it takes off is its own."""
+    floor = problem.floor_under(found.fixed)
+    least = min((problem.floor_under((*found.fixed, *f.hypothesis)) for f in found.fits), default=floor)
+    return total * (AS_MUCH + OTHERS * max(0.0, 1.0 - least / max(floor, NOTHING)))
 
 
 def _of_starts(problem: Problem) -> float:

@@ -138,10 +138,16 @@ class FreeRun(Problem):
             out[:, self.slices[i]] = np.where(np.isfinite(value), value, np.inf).reshape(len(hypotheses), -1)
         return out
 
-    def _by_start(self) -> Array:
-        """(n,) by how much more than noise a perfect model would leave, for it starts from what was measured."""
+    def floor_under(self, hypothesis: Hypothesis) -> float:
+        if not self.layout.by_segment:
+            return super().floor_under(hypothesis)
+        return float((self.weight * self._by_start(hypothesis)).sum())
+
+    def _by_start(self, hypothesis: Hypothesis = ()) -> Array:
+        """(n,) by how much more than noise a perfect model would leave that moves as the robot with a hypothesis does, for it
+        starts from what was measured."""
         noise, trials = self.noise, list(enumerate(zip(self.measured, self.own, strict=True)))
-        models = [self._simulated(k, ()) for k, _ in trials]
+        models = [self._simulated(k, hypothesis) for k, _ in trials]
         positions = [positions_off(self.robot, self.columns, own, noise) for _, (_, own) in trials]
         speeds = [(t.log.times_s - t.log.times_s[0], speeds_off(t, self.robot)) for _, (t, _) in trials]
         starts = [(models[p.trial], positions[p.trial], speeds_there(p, *speeds[p.trial])) for p in self.pieces]
