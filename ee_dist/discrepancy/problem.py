@@ -273,10 +273,9 @@ class Problem(ABC):
         """For people to look at: all of these measurements, of which a search may have taken a part."""
         return self
 
-    @property
-    def as_searched(self) -> Problem:
-        """The measure that a search goes by, of all of these trials, for what took no part in it: errors stand beside those of
-        the search."""
+    def as_searched(self, like: Problem) -> Problem:
+        """The measure that a search of another problem (``like``) went by, of all of these trials, which took no part in it:
+        errors stand beside those of the search."""
         return self
 
     @cached_property

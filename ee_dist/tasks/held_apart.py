@@ -16,5 +16,5 @@ def told_of(apart: Measurements, way: Way, config: Config, terms: Hypothesis, fi
     """How far the model as it was and the one with ``terms`` are from trials that nothing was fitted to, compared
     by the same measure, and their commands taken as those of what was ``fitted``."""
     models = (apart.model, terms)
-    problems = [way.as_read(replace(apart, model=m), config, fitted).as_searched for m in models]
+    problems = [way.as_read(replace(apart, model=m), config, fitted).as_searched(fitted) for m in models]
     return last_word(problems, models, fitted.compared)

@@ -75,7 +75,7 @@ def test_motions_stay_the_evidence_and_people_are_told() -> None:
     (note,) = set(some.notes) - set(whole.notes)
     assert "of the 80 s, in 14 stretches" in note and "compare takes all of it" in note
     assert some.whole is whole is whole.whole, "what is drawn is all of it"
-    assert some.as_searched is some and whole.as_searched is whole
+    assert some.as_searched(some) is some and whole.as_searched(some) is whole
     brief = some.beginning(8.0)
     assert isinstance(brief, OpenLoop) and len(brief.parts) == 4
 

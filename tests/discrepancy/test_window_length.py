@@ -55,6 +55,13 @@ def test_a_robot_that_is_held_is_started_anew_less_often_where_starts_say_little
         assert right[1] < 1.3 * float(found.floor.sum()), "the truth is at the floor"
 
 
+def test_what_took_no_part_is_judged_in_windows_as_long() -> None:
+    fitted, apart = servo(0.2).searched, servo(0.01)
+    assert isinstance(fitted, FreeRun) and fitted.windows_s != RESTART_S
+    assert apart.as_searched(fitted).windows_s == fitted.windows_s
+    assert fitted.as_searched(fitted) is fitted
+
+
 @given(st.floats(0.1, 4.0), st.floats(0.1, 60.0))
 def test_windows_double_as_long_as_each_record_has_two(first: float, shortest: float) -> None:
     found = list(longer(first, shortest))

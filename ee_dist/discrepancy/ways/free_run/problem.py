@@ -230,9 +230,11 @@ class FreeRun(Problem):
         one_in = spared(found.pieces, steps)
         return found if one_in == steps == 1 else self._by(found.windows_s, one_in, steps)
 
-    @property
-    def as_searched(self) -> FreeRun:
-        return self if self.windows_s is not None else self._in_windows
+    def as_searched(self, like: Problem) -> FreeRun:
+        if self.windows_s is not None:
+            return self
+        windows_s = like.windows_s if isinstance(like, FreeRun) else None
+        return self._in_windows if windows_s is None else self._by(windows_s)
 
     def beginning(self, seconds: float) -> Problem:
         """Windows from all over the trials, half as many as the beginning would have: each begins from what was measured, and
