@@ -194,11 +194,11 @@ def test_a_search_that_simulates_nothing_keeps_its_model_too(cli, tmp_path, monk
     ask = ("task=improve", "effect=auto", "task.only=[coulomb_friction,viscous_friction]", *same)
     so_far, real, told = run / "unfinished" / "model.yaml", improving.examine, []
 
-    def examine(*args):
+    def examine(*args, **how):
         if so_far.exists() or not due:
             told.append(_what_is_kept(run))
             raise RuntimeError("the power went")
-        return real(*args)
+        return real(*args, **how)
 
     monkeypatch.setattr(improving, "examine", examine)
     due = False
