@@ -25,12 +25,17 @@ COUNTS = 0.02
 def briefly(search: Search, residual: Array, hypothesis: Hypothesis) -> Search:
     """The search on the beginning of its trials; itself where that is no shorter, or has less to explain than the rest of what
     the model of ``hypothesis`` leaves: the ``residual`` (n,)."""
+    return _beginning(search, residual, hypothesis)[0]
+
+
+def _beginning(search: Search, residual: Array, hypothesis: Hypothesis) -> tuple[Search, Array]:
+    """The same, with what the model leaves of it."""
     brief = replace(search, problem=search.problem.beginning(BEGINNING_S))
     if brief.problem is search.problem or not brief.everything.any():
-        return search
+        return search, residual
     first = brief.on(hypothesis).base()
     begun, usual = (float(a.sum() / n.sum()) for a, n in (_above(brief, first), _above(search, residual)))
-    return brief if begun >= BUSY * usual else search
+    return (brief, first) if begun >= BUSY * usual else (search, residual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +60,9 @@ def in_brief(search: Search, model: Model, u: Array, residual: Array, refit: Ref
 def _tells_in_brief(search: Search, residual: Array, hypothesis: Hypothesis) -> Search:
     """The same where the beginning of one trial tells explanations apart by itself too, and no channel that has much to explain
     is at rest there."""
-    brief = briefly(search, residual, hypothesis)
+    brief, first = _beginning(search, residual, hypothesis)
     if brief is search or brief.problem.channels != search.problem.channels:
         return search
-    first = brief.on(hypothesis).base()
     if telling(brief.problem, first, np.unique(brief.problem.trial_of[brief.everything]).tolist()) is None:
         return search
     (begun, few), (usual, many) = _above(brief, first), _above(search, residual)

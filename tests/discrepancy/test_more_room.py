@@ -5,16 +5,29 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from assumed_samples import DRIER
+from assumed_samples import put_right, rubbing
 from way_samples import Sample, measure, problem_by, samples
 
-from ee_dist.discrepancy.assumed import assumed_drives
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import candidate, candidates
-from ee_dist.discrepancy.search.fitted import Model
-from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import term
+
+
+def test_a_guess_that_is_farther_off_than_one_may_go_at_first_is_found_by_going_on_from_there() -> None:
+    sample, softer = samples()["arm"], 40.0
+    hidden = tuple(term("coulomb_friction", j, torque_nm=0.05) for j in sample.robot.motor_names)
+    drives = tuple(replace(d, kp=d.kp / softer, kd=d.kd / softer) for d in sample.robot.drives)
+    robot = replace(sample.robot, drives=drives, assumed=tuple((d.joint, f) for d in drives for f in ("kp", "kd")))
+    (at_first,) = candidate(robot, "position_gain", "all_joints").bounds
+    assert at_first[1] < 0.7 * softer
+    problem = problem_by("open_loop", measure(sample, hidden), robot)
+    pool = candidates(robot, only=["position_gain", "speed_gain", "coulomb_friction"])
+    terms, found = put_right(problem, pool)
+    assert found["position_gain"]["factor"] == pytest.approx(softer, rel=0.15)
+    as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
+    assert better < 0.2 * as_it_is
+
 
 FORTY = 40.0
 """Times too weak that all drives were taken to be: beyond what any single guess may be off."""
@@ -23,9 +36,7 @@ FORTY = 40.0
 def far_too_weak() -> Problem:
     """Their limits, of a file that states none, and their rotors too."""
     sample: Sample = samples()["arm"]
-    hidden = tuple(
-        term("coulomb_friction", j, torque_nm=c) for j, c in zip(sample.robot.motor_names, DRIER, strict=True)
-    )
+    hidden = rubbing(sample.robot)
     fields = ("kp", "kd", "rotor_inertia", "torque_limit")
     drives = tuple(replace(d, **{f: getattr(d, f) / FORTY for f in fields}) for d in sample.robot.drives)
     robot = replace(sample.robot, drives=drives, assumed=tuple((d.joint, f) for d in drives for f in fields))
@@ -34,9 +45,7 @@ def far_too_weak() -> Problem:
 
 def test_drives_that_are_stronger_by_far_than_any_guess_may_be_off_are_found() -> None:
     problem = far_too_weak()
-    proposal, u = assumed_drives(Search(problem), candidates(problem.robot)) or pytest.fail("nothing was proposed")
-    terms = Model(proposal.parts).hypothesis(u)
-    found = {t.effect: dict(t.values) for t in terms}
+    terms, found = put_right(problem)
     assert found["position_gain"]["factor"] == pytest.approx(FORTY, rel=0.2)
     as_it_is, better = (error(r) for r in problem.residuals([(), terms]))
     assert better < 0.2 * as_it_is

@@ -70,7 +70,9 @@ def test_windows_double_as_long_as_each_record_has_two(first: float, shortest: f
     assert not found or 2.0 * found[-1] > SECOND * shortest
 
 
-@pytest.mark.parametrize(("above", "taken"), [((2.0, 1.0, 1.5), 0.5), ((2.0, 2.4, 2.4), 0.5), ((2.0, 3.0, 2.8), 1.0)])
+@pytest.mark.parametrize(
+    ("above", "taken"), [((2.0, 1.0, 1.5), 0.5), ((2.0, 2.4, 2.4), 0.5), ((2.0, 3.0, 2.8), 1.0), ((0.0, 0.0, 0.0), 0.5)]
+)
 def test_much_more_has_to_be_seen_in_longer_windows(above: tuple[float, ...], taken: float) -> None:
     by_length = dict(zip((0.5, 1.0, 2.0), above, strict=True))
     assert most_telling(0.5, longer(0.5, 4.0), by_length.__getitem__) == taken

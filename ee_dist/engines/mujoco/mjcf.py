@@ -16,7 +16,7 @@ import numpy as np
 
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
-from ee_dist.engines.mujoco.mjcf_bare import MjcfError, bare_model, names_step
+from ee_dist.engines.mujoco.mjcf_bare import MjcfError, bare_model
 from ee_dist.engines.mujoco.mjcf_drives import drives_of, sensors_of
 from ee_dist.engines.mujoco.mjcf_floor import floor_of
 from ee_dist.engines.mujoco.mjcf_left_out import carries_all, left_out
@@ -51,8 +51,8 @@ _SHAPES = {
 
 def read_mjcf(path: str | Path) -> Body:
     """The body that an MJCF describes, with a drive for each actuator of a joint. Raises MjcfError."""
-    m, untouching = bare_model(path)
-    return _Reader(Path(path), m, untouching).body()
+    m, untouching, stepped = bare_model(path)
+    return _Reader(Path(path), m, stepped, untouching).body()
 
 
 @dataclass
@@ -61,6 +61,8 @@ class _Reader:
 
     file: Path
     m: Any
+    stepped: bool
+    """Whether the file names a time step."""
     untouching: Counter[int] = field(default_factory=Counter)
     """By body how many shapes would touch the floor, but have none of the forms that do."""
     notes: list[str] = field(default_factory=list)
@@ -136,7 +138,7 @@ class _Reader:
             has_floor=has_floor,
             gravity_m_s2=0.0 if carried else float(-gravity[2]) + 0.0,
             weight_carried=carried,
-            time_step_s=float(m.opt.timestep) if names_step(self.file) else None,
+            time_step_s=float(m.opt.timestep) if self.stepped else None,
             start_position_m=start[0],
             start_rotation=start[1],
             notes=(*self.notes, *self.assumed),

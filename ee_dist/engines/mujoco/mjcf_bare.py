@@ -38,28 +38,24 @@ def compiled(path: str | Path) -> Any:
     return bare_model(path)[0]
 
 
-def bare_model(path: str | Path) -> tuple[Any, Counter[int]]:
-    """The same, and by body how many shapes were taken out that touch. Raises MjcfError."""
+def bare_model(path: str | Path) -> tuple[Any, Counter[int], bool]:
+    """The same; by body how many shapes were taken out that touch; and whether the file, or one that it includes, says in what
+    steps it is to be simulated. Raises MjcfError."""
     file = Path(path)
     no_file_of_warnings()
     try:
-        _scan(file, file.parent, (), 1)
+        stepped = _scan(file, file.parent, (), 1)
     except XmlError as error:
         raise MjcfError(str(error)) from None
     try:
-        return _built(file, every_mesh=False)
+        return *_built(file, every_mesh=False), stepped
     except (ValueError, RuntimeError, MemoryError) as first:
         # A sensor may name a mesh that weighs nothing.
         try:
-            return _built(file, every_mesh=True)
+            return *_built(file, every_mesh=True), stepped
         except (ValueError, RuntimeError, MemoryError) as error:
             told = error if "mass" in str(first) or "inertia" in str(first) else first
             raise MjcfError(f"{file}: MuJoCo cannot build it: {' '.join(str(told).split())}") from None
-
-
-def names_step(path: str | Path) -> bool:
-    """Whether the file, or one that it includes, says in what steps it is to be simulated. Raises XmlError."""
-    return _scan(Path(path), Path(path).parent, (), 1)
 
 
 def _scan(file: Path, folder: Path, above: tuple[Path, ...], copies: int) -> bool:

@@ -265,12 +265,12 @@ class FreeRun(Problem):
     def _in_windows(self) -> FreeRun:
         """The same by windows, all of them: of the usual length, or longer ones where what starts are off by drowns what models
         are off by, and does so less in these."""
-        found = self._by(window_s(self.robot))
+        usual = window_s(self.robot)
+        found = self._by(usual)
         if not found.layout.by_segment:
             return found
-        usual, shortest = window_s(self.robot), min(float(np.ptp(t.log.times_s)) for t in self.measured)
-        best = most_telling(usual, longer(usual, shortest), lambda s: self._by(s)._above_starts)
-        return found if best == usual else self._by(best)
+        shortest = min(float(np.ptp(t.log.times_s)) for t in self.measured)
+        return most_telling(found, map(self._by, longer(usual, shortest)), lambda p: p._above_starts)
 
     @property
     def _above_starts(self) -> float:

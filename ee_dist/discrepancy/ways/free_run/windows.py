@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
 
 from ee_dist.robots.model import Robot
 
@@ -17,6 +18,9 @@ SECOND = 0.55
 TELLS = 1.25
 """Times as far above what starts may do that longer windows must bring the described robot, to be taken."""
 
+Windows = TypeVar("Windows")
+"""Whatever goes by windows of one length."""
+
 
 def window_s(robot: Robot) -> float:
     """How long windows of a robot are, by what was seen of it."""
@@ -30,13 +34,15 @@ def longer(first_s: float, shortest_s: float) -> Iterator[float]:
         yield first_s
 
 
-def most_telling(first_s: float, lengths: Iterator[float], above: Callable[[float], float]) -> float:
-    """The windows (s) by which the described robot is farthest ``above`` what starts may do (a ratio of energies), if that is
-    much farther than by the ``first_s``. What a start is off by dies out in a robot that controllers hold, and grows in one that
-    falls; what is wrong with a model stays."""
-    at_first = above(first_s)
-    found = max(((above(s), s) for s in lengths), default=(0.0, first_s))
-    return found[1] if found[0] >= TELLS * at_first else first_s
+def most_telling(first: Windows, others: Iterable[Windows], above: Callable[[Windows], float]) -> Windows:
+    """The windows by which the described robot is farthest ``above`` what starts may do (a ratio of energies), if that is much
+    farther than by the ``first``. What a start is off by dies out in a robot that controllers hold, and grows in one that falls;
+    what is wrong with a model stays."""
+    best, found = TELLS * above(first), first
+    for windows in others:
+        if (now := above(windows)) > best:
+            best, found = now, windows
+    return found
 
 
 def led(robot: Robot) -> bool:
