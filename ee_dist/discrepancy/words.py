@@ -14,6 +14,8 @@ DIGITS, MOST_DIGITS = 3, 8
 """Of the ends of an interval."""
 CHANGES, SIGNED = ("change", "along_x", "along_y", "along_z"), "+"
 """Shares of what is described that come on top of it: told with a sign."""
+LOSS, MORE = "loss", -1.0
+"""A share that is lost: from that much below nothing it is told as how many times as much there is."""
 SHARED = " than joints share"
 MANY = 3
 """Places of one effect from which their values are told as a range: each has its line in a table."""
@@ -52,7 +54,13 @@ def told(term: Term, robot: Robot | None = None) -> str:
 
 def amounts(term: Term, robot: Robot | None = None) -> str:
     """``torque 0.3 N.m``: how much of it, without what and where."""
-    return ", ".join(f"{quantity(term, k, robot)} {_value(term, k, v, robot)}".strip() for k, v in term.values)
+    return ", ".join(_amount(term, k, v, robot) for k, v in term.values)
+
+
+def _amount(term: Term, key: str, value: float, robot: Robot | None) -> str:
+    if key == LOSS and value <= MORE:
+        return f"{1.0 - value:.3g} times as much"
+    return f"{quantity(term, key, robot)} {_value(term, key, value, robot)}".strip()
 
 
 def much(term: Term, robot: Robot | None = None) -> str:
@@ -93,6 +101,8 @@ def span(term: Term, key: str, low: float, high: float, robot: Robot | None, *, 
     there is is told as it is: no joint shares anything with itself."""
     share = is_share(term.effect, key)
     unit, (a, b) = (" %", apart(100 * low, 100 * high)) if share else (_unit(term, key, robot), apart(low, high))
+    if share:
+        a, b = in_full(a), in_full(b)
     below = bool(EVERY[term.effect].parameter(key).on_top) and low < 0
     if below and not (interval and _than(term, key, low, robot) == SHARED):
         than = _than(term, key, low, robot)
@@ -100,6 +110,11 @@ def span(term: Term, key: str, low: float, high: float, robot: Robot | None, *, 
             return f"{b.removeprefix('-')} to {a.removeprefix('-')}{unit} less{than}"
         return f"{a.removeprefix('-')}{unit} less to {b}{unit} more{than}"
     return f"{a} to {b}{unit}"
+
+
+def in_full(number: str) -> str:
+    """A large number without its exponent: nobody reads ``-9.9e+03 %``."""
+    return f"{float(number):.0f}" if "e+" in number else number
 
 
 def apart(low: float, high: float) -> tuple[str, str]:

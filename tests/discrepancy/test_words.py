@@ -86,6 +86,13 @@ def test_shares_are_told_in_percent_and_factors_are_not(said: str, effect: str, 
     assert span(one, key, value - 0.01, value + 0.01, None).endswith(" %") is said.endswith("%)")
 
 
+def test_much_more_than_described_is_told_in_times_and_without_exponents() -> None:
+    strong = term("torque_limit", "servo", loss=-99.0)
+    assert told(strong) == "torque limit at servo (100 times as much)"
+    assert span(strong, "loss", -99.0, -0.5, None) == "-9900 to -50 %"
+    assert told(term("torque_limit", "servo", loss=-0.5)) == "torque limit at servo (loss -50 %)"
+
+
 def test_units_are_told_behind_values_and_not_in_names():
     stage, servo = linear_stage(), servo_pendulum()
     assert (
