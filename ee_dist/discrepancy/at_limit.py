@@ -12,13 +12,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ee_dist.basics.names import counted, listed
-from ee_dist.discrepancy.compare import MOVING_SHARE, AtLimit
+from ee_dist.discrepancy.compare import MOVING_SHARE
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
+from ee_dist.discrepancy.meters import AtLimit, meters
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.effects.catalogue import Hypothesis, apply
 from ee_dist.effects.targets import motors_with_torque_limit
-from ee_dist.robots.instruments import MOTOR_TORQUE
-from ee_dist.robots.model import Drive, Robot, Sensor
+from ee_dist.robots.model import Drive, Robot
 from ee_dist.robots.ranges import drive_of
 from ee_dist.trials.log import Array, SensorLog
 
@@ -38,10 +38,9 @@ def often_at_limit(problem: Problem, hypothesis: Hypothesis) -> list[AtLimit]:
     joints = motors_with_torque_limit(robot)
     if not joints:
         return []
-    meters = tuple(Sensor(f"{kind}@{j}", kind, j) for kind in (MOTOR_TORQUE, "velocity") for j in joints)
     rows = [
         _rows(trial, trial.models(robot, [hypothesis])[0], joints, log)
-        for trial, log in zip(problem.measured, problem.simulated(hypothesis, meters), strict=True)
+        for trial, log in zip(problem.measured, problem.simulated(hypothesis, meters(robot)), strict=True)
         if log is not None
     ]
     if not rows:
@@ -57,8 +56,22 @@ def often_at_limit(problem: Problem, hypothesis: Hypothesis) -> list[AtLimit]:
     return sorted(found, key=lambda a: -a.share)
 
 
-def limit_text(found: Sequence[AtLimit]) -> list[str]:
-    """A line for people on joints that are often at their limits; none where none is."""
+def unsaid(robot: Robot, found: Sequence[AtLimit], terms: Hypothesis) -> list[AtLimit]:
+    """Those of the joints whose limits ``terms``, which a verdict tells with their values, leave as they are described."""
+    if not found:
+        return []
+    model = apply(robot, terms)
+    return [a for a in found if drive_of(model, a.joint).torque_limit == drive_of(robot, a.joint).torque_limit]
+
+
+def limit_lines(found: Sequence[AtLimit], lead: str = "") -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The same as warnings, and as notes: a limit that nobody stated may decide everything."""
+    told = tuple(limit_text(found, lead))
+    return (told, ()) if any(a.assumed for a in found) else ((), told)
+
+
+def limit_text(found: Sequence[AtLimit], lead: str = "") -> list[str]:
+    """A line for people on joints that are often at their limits, which begins with ``lead``; none where none is."""
     if not found:
         return []
     first, *others = [(f"{a.joint} ({a.limit:.3g} {a.unit})", f"in {100 * a.share:.0f} %") for a in found[:NAMED]]
@@ -71,7 +84,7 @@ def limit_text(found: Sequence[AtLimit]) -> list[str]:
     guessed = [a.joint for a in found if a.assumed]
     which = "that limit" if len(found) == 1 else f"the limit of {listed(guessed)}"
     doubt = f", and the description only assumes {which}" if guessed else ""
-    return [f"{', '.join(told)}: to ask for more changes nothing there{doubt}."]
+    return [f"{lead}{', '.join(told)}: to ask for more changes nothing there{doubt}."]
 
 
 def _rows(trial: MeasuredTrial, model: Robot, joints: Sequence[str], log: SensorLog) -> Array:

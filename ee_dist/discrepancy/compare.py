@@ -9,6 +9,7 @@ import numpy as np
 
 from ee_dist.discrepancy.evidence.left import may_be_noise
 from ee_dist.discrepancy.measured_trial import released
+from ee_dist.discrepancy.meters import AtLimit
 from ee_dist.discrepancy.problem import Index, Problem, error
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.signals import change
@@ -48,18 +49,6 @@ class RegimeReport:
     error: float
     share: float
     values: float
-
-
-@dataclass(frozen=True)
-class AtLimit:
-    """A joint whose simulated drive is at its torque ``limit`` (in ``unit``, as the model has it) in a ``share``, 0 to 1, of the
-    rows in which the joint does not rest; ``assumed``: whether the description only assumed the limit."""
-
-    joint: str
-    limit: float
-    unit: str
-    share: float
-    assumed: bool
 
 
 @dataclass(frozen=True, eq=False)

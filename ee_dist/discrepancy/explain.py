@@ -14,6 +14,7 @@ from ee_dist.discrepancy.evidence.left import Leftover, leftovers, may_be_noise
 from ee_dist.discrepancy.evidence.signs import either_sign
 from ee_dist.discrepancy.examine import STANDARD_EFFORT, Current, Effort, Examined, examine
 from ee_dist.discrepancy.left_as_guessed import beside_guesses
+from ee_dist.discrepancy.meters import AtLimit
 from ee_dist.discrepancy.problem import Problem, error
 from ee_dist.discrepancy.search.candidates import Candidate, known, on_top_of, values_of
 from ee_dist.discrepancy.search.fit import fit_one
@@ -52,6 +53,8 @@ class Explanation:
     """The model as it was given, whose terms ``before`` has with their values fitted anew."""
     offered: int = 0
     """Candidates that were there to be tried."""
+    at_limit: list[AtLimit] = field(default_factory=list)
+    """Joints that are often at their torque limits with the model ``before``, where somebody looked."""
 
     @property
     def candidates(self) -> list[Judged]:

@@ -10,6 +10,7 @@ from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.evidence.worth import Worth
 from ee_dist.discrepancy.examine import Examined
+from ee_dist.discrepancy.meters import AtLimit
 from ee_dist.discrepancy.search.candidates import Proposal
 from ee_dist.effects.catalogue import Hypothesis, Term
 from ee_dist.trials.log import Array
@@ -54,7 +55,8 @@ class Improvement:
     rows of records of which the search took stretches; ``worth``: what goes with each effect. ``last``: what was tried on
     top of it. ``odd``: of a calibration, the joints whose values stand out from those of like joints (see calibrated_away.py).
     ``unsure``: channels in which what is left may be noise or not; ``twins``: what does as well as an effect
-    of the model, if other values follow."""
+    of the model, if other values follow; ``at_limit``: joints that are often at their torque limits with the final model, where
+    somebody looked."""
 
     verdict: str
     explained: float
@@ -74,6 +76,7 @@ class Improvement:
     twins: list[Twin] = field(default_factory=list)
     judged_on: str = ""
     all_rows: tuple[float, float] | None = None
+    at_limit: list[AtLimit] = field(default_factory=list)
 
     @property
     def refused(self) -> list[Judged]:

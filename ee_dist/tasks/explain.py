@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ee_dist.basics.names import listed
 from ee_dist.discrepancy.accounts.account import MEND, Account
 from ee_dist.discrepancy.accounts.of_explain import explain_account
+from ee_dist.discrepancy.at_limit import often_at_limit
 from ee_dist.discrepancy.confidence import confidence
 from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation, explain
 from ee_dist.discrepancy.measured_trial import reading_s
@@ -78,6 +79,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
             # As noisy and as seldom read as these: what a simulation reads is exact, and read in every row.
             robot, every_s = with_known_noise(measured), reading_s(measured.trials)
             ahead = next(iter(next_trials(robot, tied, evaluator_of(config), every_s=every_s)), None)
+    found = replace(found, at_limit=often_at_limit(problem, found.before))
     share = confidence(problem.way, found)
     also = problem.other_errors(found.before, found.after) if found.best else ()
     also = (*also, *problem.spoiled(found.after), *way.instead(bool(found.left)))

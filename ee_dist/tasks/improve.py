@@ -13,6 +13,7 @@ import yaml
 from ee_dist.basics.files import write_whole
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
+from ee_dist.discrepancy.at_limit import often_at_limit
 from ee_dist.discrepancy.calibrated_away import calibrated_away
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve
@@ -101,6 +102,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     also = (*also, *problem.spoiled(found.terms), *way.instead(bool(found.left)))
     word = None if apart is None else told_of(apart, way, config, found.terms, problem)
     found = weighed_up(found, problem, word)
+    found = replace(found, at_limit=often_at_limit(problem, found.terms))
     first, last = found.ladder[0], found.ladder[-1]
     fell = last.error_heldout < first.error_heldout
     farther = problem.farther_off(first.terms, found.terms, fell) if len(found.ladder) > 1 else ""

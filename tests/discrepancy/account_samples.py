@@ -11,6 +11,7 @@ from ee_dist.discrepancy.accounts.of_explain import explain_account
 from ee_dist.discrepancy.evidence.intervals import ParameterReport
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.explain import EFFECT
+from ee_dist.discrepancy.meters import AtLimit
 from ee_dist.discrepancy.search.candidates import candidate
 from ee_dist.effects.catalogue import Term, term
 from ee_dist.robots.servo_pendulum import servo_pendulum
@@ -38,7 +39,7 @@ def made_up() -> SimpleNamespace:
 def account(
     tied: list[str], explained: float = 1.0, ahead: object = None, planner: str = "", unsure: tuple[str, ...] = (),
     what: Term = DRY, left: tuple[Leftover, ...] = (), parameters: tuple[ParameterReport, ...] = (), label: str = "",
-    problem: SimpleNamespace | None = None,
+    problem: SimpleNamespace | None = None, at_limit: tuple[AtLimit, ...] = (),
 ) -> Account:  # fmt: skip
     best = SimpleNamespace(
         terms=(what,), tied_with=tied, interval=(0.4, 0.6), gain=0.5,
@@ -61,5 +62,6 @@ def account(
         unsure=unsure,
         after=(what,),
         parameters=list(parameters),
+        at_limit=list(at_limit),
     )
     return explain_account(problem or made_up(), found, ahead, planner)  # type: ignore[arg-type]

@@ -6,13 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from account_samples import account
 from test_words_of_compare import compared
 from way_samples import evaluator_for, measured, problem, problem_by, samples
 
+from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.at_limit import NAMED, OFTEN, limit_text, often_at_limit
-from ee_dist.discrepancy.compare import MOVING_SHARE, AtLimit
+from ee_dist.discrepancy.compare import MOVING_SHARE
+from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.improve import improve
+from ee_dist.discrepancy.meters import AtLimit, motions
 from ee_dist.effects.catalogue import apply, term
 from ee_dist.engines.contract import Rollout
+from ee_dist.evaluation.cache import CachedEvaluator
 
 WEAK = (term("torque_limit", "servo", loss=0.9),)
 LOW = AtLimit("knee", 0.78, "N.m", 0.741, True)
@@ -102,3 +108,41 @@ def test_a_limit_that_was_only_assumed_is_told_before_any_number_and_none_where_
     account = compared(9.0, [], at_limit=[stated])
     assert account.warnings == () and account.lines[0] == limit_text([stated])[0]
     assert line not in compared(1.0, [], at_limit=[LOW]).words
+
+
+@pytest.mark.parametrize("way", ["open_loop", "free_run"])
+def test_a_motion_that_was_looked_through_for_limits_is_simulated_no_second_time(way: str) -> None:
+    robot = samples()["pendulum"].robot
+    evaluator = CachedEvaluator(evaluator_for(robot))
+    found = problem_by(way, measured("pendulum"), robot, evaluator)
+    often_at_limit(found, WEAK)
+    before = evaluator.counts.simulated
+    moved = motions(found, WEAK)
+    assert evaluator.counts.simulated == before
+    for log, alone in zip(moved, found.simulated(WEAK), strict=True):
+        assert log is not None and alone is not None and log.sensor_names == alone.sensor_names == robot.sensor_names
+        assert np.array_equal(log.sensors, alone.sensors) and np.array_equal(log.joints, alone.joints)
+
+
+def test_a_search_that_leaves_more_than_noise_tells_of_the_described_robot_unless_what_it_found_does() -> None:
+    low, left = replace(LOW, joint="servo"), (Leftover("a", "position", 9.0, 9.0, False),)
+    (line,) = limit_text([low], "Without what was found, ")
+    assert account([], left=left, at_limit=(low,)).warnings == (line,)
+    stated = account([], left=left, at_limit=(replace(low, assumed=False),))
+    assert stated.warnings == () and stated.lines[0].startswith("Without what was found, servo (0.78 N.m) is at its")
+    assert line not in account([], at_limit=(low,)).words, "with what was found nothing is left: the limit is right"
+    limit = term("torque_limit", "servo", loss=-1.0)
+    assert not any("of the simulated rows" in w for w in account([], left=left, at_limit=(low,), what=limit).words)
+
+
+def test_improve_tells_of_its_last_model_what_its_effects_do_not_say() -> None:
+    found = pendulum()
+    low = replace(found.robot, drives=apply(found.robot, WEAK).drives, assumed=(("servo", "torque_limit"),))
+    problem_low = problem_by("free_run", measured("pendulum"), low)
+    improved = improve(problem_low, [], (), [])
+    improved.at_limit = often_at_limit(problem_low, improved.terms)
+    (line,) = limit_text(improved.at_limit)
+    account_of = improve_account(problem_low, improved)
+    assert account_of.warnings == (line,) and "the description only assumes that limit" in line
+    improved.terms = (term("torque_limit", "servo", loss=0.5),)
+    assert line not in improve_account(problem_low, improved).words

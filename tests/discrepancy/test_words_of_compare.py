@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
-from ee_dist.discrepancy.compare import AtLimit
 from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.meters import AtLimit
 from ee_dist.robots.servo_pendulum import servo_pendulum
 
 

@@ -16,7 +16,7 @@ from ee_dist.discrepancy.accounts.account import (
     slower,
 )
 from ee_dist.discrepancy.assumed import assumed_text
-from ee_dist.discrepancy.at_limit import limit_text
+from ee_dist.discrepancy.at_limit import limit_lines
 from ee_dist.discrepancy.compare import Comparison
 from ee_dist.discrepancy.evidence.left import Leftover
 from ee_dist.discrepancy.problem import TIMES_NOISE, Problem
@@ -73,9 +73,8 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     settled = ratio < CLOSE and not left
     advice = "" if not settled else slower(found.unsure) if found.unsure else CONTENT
     good = settled and not found.unsure
-    # Where the model agrees its limits are those of the robot; one that nobody stated may decide everything.
-    limits = () if settled else tuple(limit_text(found.at_limit))
-    warnings, notes = (limits, ()) if any(a.assumed for a in found.at_limit) else ((), limits)
+    # Where the model agrees its limits are those of the robot.
+    warnings, notes = limit_lines([] if settled else found.at_limit)
     return Account(
         head, error, sure, (*notes, *lines, *problem.notes), good, advised(problem, advice), warnings=warnings
     )

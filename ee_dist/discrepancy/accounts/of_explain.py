@@ -35,12 +35,13 @@ from ee_dist.discrepancy.accounts.account import (
 )
 from ee_dist.discrepancy.accounts.ranges import beyond_a_guess, ranges
 from ee_dist.discrepancy.assumed import GUESS, LABEL, guessed_text
+from ee_dist.discrepancy.at_limit import limit_lines, unsaid
 from ee_dist.discrepancy.confidence import COUNTED_WAY
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, HARDLY, NEUTRAL, NOT_DETERMINED, ParameterReport
 from ee_dist.discrepancy.evidence.judge import Judged, contains
 from ee_dist.discrepancy.evidence.left import SETTLED, Leftover
 from ee_dist.discrepancy.evidence.rule import LUCK
-from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, Explanation
+from ee_dist.discrepancy.explain import EFFECT, NOTHING_MISSING, UNEXPLAINED, Explanation
 from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
@@ -54,6 +55,8 @@ NAMED = 3
 """Terms whose intervals are told in a sentence, and values of a model that moved."""
 MOVED = 0.02
 """Share of its range by which one must have moved for that."""
+WITHOUT = "Without what was found, "
+"""Before what is told of the model that a search began from."""
 
 
 def moved(found: Explanation, robot: Robot) -> str:
@@ -168,15 +171,21 @@ def explain_account(
     sure = f"{sure} {_counted_right(confidence, problem.way)}."
     tied = bool(found.verdict == EFFECT and best is not None and best.tied_with)
     good = (found.verdict == NOTHING_MISSING or (found.verdict == EFFECT and not rest)) and not unsure and not tied
-    good = good and not (word is not None and word.more)
+    more_there = word is not None and word.more
+    good = good and not more_there
+    # Where the model agrees its limits are those of the robot, whatever else was missing.
+    off = bool(rest) or found.verdict == UNEXPLAINED or more_there
+    at_limit = unsaid(robot, found.at_limit if off else [], best.terms if best else ())
+    warnings, notes = limit_lines(at_limit, WITHOUT if best else "")
     return Account(
         head,
         error,
         sure,
-        (*also, *lines, *held_out_notes(problem), *problem.notes),
+        (*also, *notes, *lines, *held_out_notes(problem), *problem.notes),
         good,
         advised(problem, advice),
         planner if tied else "",
+        warnings,
         more=found.verdict == EFFECT and bool(rest),
     )
 

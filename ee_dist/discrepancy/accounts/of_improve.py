@@ -38,6 +38,7 @@ from ee_dist.discrepancy.accounts.ranges import (
     scale_text,
     weight_text,
 )
+from ee_dist.discrepancy.at_limit import limit_lines, unsaid
 from ee_dist.discrepancy.calibrated_away import OddOne
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, ENDED, HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.discrepancy.explain import NOTHING_MISSING
@@ -181,14 +182,15 @@ def improve_account(
     advice = "" if len(found.ladder) > 1 else CONTENT if settled else STUCK
     advice = slower(unsure) if unsure else MEND if wrong else advice
     tied = bool(found.twins) or any(rivals(found, r, robot) for r in steps)
-    warnings = tuple(odd_text(o, robot) for o in found.odd)
+    doubts, notes = limit_lines([] if settled else unsaid(robot, found.at_limit, found.terms))
+    warnings = (*doubts, *(odd_text(o, robot) for o in found.odd))
     nothing = problem.says_nothing(found.terms) if len(found.ladder) > 1 else ""
     if nothing:
         # Nobody should read how much is explained without it.
         warnings = (*warnings, f"{nothing[0].upper()}{nothing[1:]}.")
         also = [line for line in also if nothing[1:] not in line]
     good = settled and not warnings and not unsure and not any(ties.values())
-    more = (*(word.lines if word is not None else ()), *also, *lines, *held_out_notes(problem), *problem.notes)
+    more = (*(word.lines if word is not None else ()), *also, *notes, *lines, *held_out_notes(problem), *problem.notes)
     return Account(head, error, sure, more, good, advised(problem, advice), planner if tied else "", warnings)
 
 

@@ -13,6 +13,7 @@ from ee_dist.discrepancy.compare import Comparison, compare, trial_name
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
+from ee_dist.discrepancy.meters import motions
 from ee_dist.discrepancy.problem import Problem, Series
 from ee_dist.discrepancy.words import placed
 from ee_dist.effects.catalogue import Hypothesis, apply
@@ -54,10 +55,10 @@ def improve_scene(problem: Problem, found: Improvement, account: Account, model:
 
 def said(problem: Problem, label: str, terms: Hypothesis) -> drawn.Account:
     """What a model says of each trial: simulated where the way simulates, else the channels that it compares."""
-    motions = problem.simulated(terms)
+    simulated = motions(problem, terms)
     series = problem.whole.series(terms)
     logs = []
-    for k, (trial, motion) in enumerate(zip(problem.measured, motions, strict=True)):
+    for k, (trial, motion) in enumerate(zip(problem.measured, simulated, strict=True)):
         # Of a trial in windows the first, which is what is simulated.
         own: dict[str, Series] = {}
         for s in series:
@@ -71,8 +72,8 @@ def said(problem: Problem, label: str, terms: Hypothesis) -> drawn.Account:
             if name in names and len(s.predicted) == len(sensors):
                 sensors[:, names.index(name)] = s.predicted
         logs.append(replace(motion, sensors=sensors))
-    simulated = all(m is not None for m in motions)
-    return drawn.Account(label, tuple(logs), apply(problem.robot, terms) if simulated else None)
+    moves = all(m is not None for m in simulated)
+    return drawn.Account(label, tuple(logs), apply(problem.robot, terms) if moves else None)
 
 
 def _of_series(measured: SensorLog, own: dict[str, Series]) -> SensorLog:

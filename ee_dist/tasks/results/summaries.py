@@ -17,6 +17,7 @@ from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.importance import shares
 from ee_dist.discrepancy.ladder import Improvement, Rung
 from ee_dist.discrepancy.last_word import LastWord
+from ee_dist.discrepancy.meters import AtLimit
 from ee_dist.discrepancy.plan import ENOUGH, PlannedTrial
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.search.candidates import Proposal
@@ -65,6 +66,7 @@ def of_comparison(
             for t, e in zip(problem.trials, found.trial_errors, strict=True)
         ],
         "parted_s": found.parted_s,
+        "at_limit": of_at_limit(found.at_limit),
         "left": of_left(left),
     }  # fmt: skip
 
@@ -87,6 +89,7 @@ def of_explanation(
         "refitted_error": found.refitted_error,
         "candidates": [of_judged(problem, c) for c in found.candidates],
         "parameters": of_parameters(found.after, found.parameters),
+        "at_limit": of_at_limit(found.at_limit),
         "left": of_left(found.left),
         "last_word": of_last_word(word),
         "next_trial": {**ahead.excitation.as_dict(), "separation": ahead.separation} if ahead and worth else None,
@@ -133,6 +136,10 @@ def of_judged(problem: Problem, c: Judged) -> dict[str, Any]:
 
 def of_left(left: Sequence[Leftover]) -> list[dict[str, Any]]:
     return [{"trial": g.trial, "channel": g.channel, "deviations": g.z, "slow": g.trend} for g in left]
+
+
+def of_at_limit(found: Sequence[AtLimit]) -> list[dict[str, Any]]:
+    return [{"joint": a.joint, "limit": a.limit, "unit": a.unit, "share": a.share, "assumed": a.assumed} for a in found]
 
 
 def of_rung(problem: Problem, found: Improvement, r: Rung) -> dict[str, Any]:
@@ -207,6 +214,7 @@ def of_improvement(
         ],
         "stopped": found.stopped,
         "not_earned": [of_judged(problem, c) for c in found.refused],
+        "at_limit": of_at_limit(found.at_limit),
         "left": of_left(found.left),
         "calibrated_away": [
             {

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial, reading_s, shown
+from ee_dist.discrepancy.meters import motions
 from ee_dist.discrepancy.problem import EVENT, Index, Problem, Series
 from ee_dist.discrepancy.recorded import means_of, row_by_row
 from ee_dist.discrepancy.ways.open_loop.falls import fallen
@@ -315,7 +316,7 @@ class OpenLoop(Problem):
         return [*self.other_errors(hypothesis), *self.spoiled(hypothesis)]
 
     def spoiled(self, model: Hypothesis) -> list[str]:
-        return fallen(self.robot, self.measured, self.simulated(model)) if self.robot.free_base else []
+        return fallen(self.robot, self.measured, motions(self, model)) if self.robot.free_base else []
 
     def other_errors(self, *models: Hypothesis) -> list[str]:
         """In the units of the channels: root mean squares over all rows, by kind of sensor."""
