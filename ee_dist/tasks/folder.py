@@ -7,6 +7,7 @@ before and are empty.
 from __future__ import annotations
 
 import fcntl
+import math
 import os
 import socket
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,6 +25,7 @@ from ee_dist.tasks.config import ConfigError
 LOCK = ".running"
 """Locked by the run that writes into the folder, and gone at its end; the system unlocks it if the run is killed."""
 SETTINGS = "config"
+EARLIER = "of an earlier run"
 _NAMED, LARGE_MB = 3, 50.0
 
 _SWEEP = "multirun.yaml"
@@ -122,6 +124,12 @@ def claimed(folder: Path, settings: Mapping[str, str], overwrite: bool) -> Itera
         (folder / LOCK).unlink(missing_ok=True)
         os.close(lock)
         remove_made(made)
+
+
+def begun_s(folder: Path) -> float:
+    """When the last run put its settings into the folder, as times of files are told: with overwrite=true what it does not write
+    stays from before. Negative infinity where none did."""
+    return min((p.stat().st_mtime for p in (folder / SETTINGS).glob("*.yaml")), default=-math.inf)
 
 
 def remove_made(folders: Sequence[Path] | None = None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,7 +21,7 @@ from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import percent, phrase, plain, told_all
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.robots.model import Robot
-from ee_dist.tasks.folder import SETTINGS
+from ee_dist.tasks.folder import EARLIER, begun_s
 from ee_dist.tasks.results.labels import IMPROVED, MODEL, excess_share, step_phrase
 from ee_dist.tasks.results.values import kinds_of, within
 
@@ -142,9 +141,9 @@ def show_account(console: Console, account: Account, out: Path) -> None:
     """What speaks for it, the files, and last the finding with how sure it is and the command to type next."""
     for line in account.lines:
         console.print(line, highlight=False, markup=False)
-    begun = _begun(out)
+    begun = begun_s(out)
     for file in sorted(p for p in out.iterdir() if p.is_file() and not p.name.startswith(".")):
-        stale = "  (of an earlier run)" if file.stat().st_mtime < begun else ""
+        stale = f"  ({EARLIER})" if file.stat().st_mtime < begun else ""
         console.print(f"  {os.path.relpath(file)}{stale}", highlight=False, markup=False, soft_wrap=True)
     console.print(account.headline, highlight=False, markup=False, style="bold")
     for line in account.first:
@@ -152,11 +151,6 @@ def show_account(console: Console, account: Account, out: Path) -> None:
         console.print(line, highlight=False, markup=False, soft_wrap=whole)
     for line in account.last:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-
-
-def _begun(out: Path) -> float:
-    """When this run put its settings into the folder: with overwrite=true what it does not write stays from before."""
-    return min((p.stat().st_mtime for p in (out / SETTINGS).glob("*.yaml")), default=-math.inf)
 
 
 def typed(terms: Hypothesis) -> str:

@@ -8,6 +8,7 @@ from urllib.parse import quote
 from nicegui import ui
 
 from ee_dist.export import FORMATS
+from ee_dist.tasks.folder import EARLIER, begun_s
 from ee_dist.workbench.pages.view import View, heading, quiet
 from ee_dist.workbench.session import MODEL_FILE
 
@@ -46,9 +47,12 @@ class KeepView(View):
         )
         self.files.clear()
         with self.files:
-            for path in sorted(_served(session.folder)):
+            for path, earlier in listed(session.folder):
                 name = path.relative_to(session.folder).as_posix()
-                ui.link(name, f"/files/{quote(name)}", new_tab=True)
+                with ui.row().classes("items-center gap-2"):
+                    ui.link(name, f"/files/{quote(name)}", new_tab=True)
+                    if earlier:
+                        quiet(f"({EARLIER})")
         self.commands.clear()
         with self.commands:
             for line in session.commands:
@@ -59,8 +63,11 @@ class KeepView(View):
         self.page.changed("exported")
 
 
-def _served(folder: Path) -> list[Path]:
-    """Files worth a link: models, reports, recordings, exports."""
+def listed(folder: Path) -> list[tuple[Path, bool]]:
+    """Files worth a link (models, reports, recordings, exports), and whether each lay there before this session began: those
+    last, for they tell of another model."""
     wanted = {".yaml", ".html", ".rrd", ".xml", ".urdf", ".py", ".mcap"}
     found = [p for p in folder.rglob("*") if p.is_file() and p.suffix in wanted and "config" not in p.parts]
-    return [p for p in found if p.parent.name != "steps" or p.name == MODEL_FILE]
+    begun = begun_s(folder)
+    own = [(p, p.stat().st_mtime < begun) for p in found if p.parent.name != "steps" or p.name == MODEL_FILE]
+    return sorted(own, key=lambda f: (f[1], f[0]))
