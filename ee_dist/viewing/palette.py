@@ -30,6 +30,8 @@ SERIES: tuple[Rgb, ...] = (
 """For lists of things of one kind: motors, actions."""
 PASSES: tuple[Rgb, ...] = ((196, 206, 214), (112, 126, 140))
 """For passes of the search, by turns: their order tells which is which, and blue, orange and violet mean something."""
+ZERO_LINE: Rgb = (255, 255, 255)
+"""White: where bars of both signs begin."""
 
 MEASURED_NAME, PREDICTED_NAME, HINDSIGHT_NAME = "measured", "predicted", "predicted_after"
 """Places among the entities; the viewer draws lines in their order, and thin ones must lie upon the thick measured one."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,6 +19,7 @@ from ee_dist.recording.records import (
     PREDICTION,
     REPAIR,
     STAGES,
+    GenerationRecord,
     HypothesisRecord,
     RunRecord,
     TrialRecord,
@@ -46,14 +48,20 @@ def guide(robot: System, hindsight: bool) -> str:
     return " ".join([*said, "Press play: the trials run one after another."])
 
 
+def below_zero(records: Sequence[GenerationRecord]) -> bool:
+    """Whether any bar stands below zero."""
+    return any(math.isfinite(r.best) and r.best < 0 for r in records)
+
+
 def bars_guide(run: RunRecord) -> list[str]:
     """How to read the bars of the search; nothing where there are none."""
     phases = {g.phase for g in run.generations if g.best}
     if not phases.intersection((REPAIR, DIAGNOSIS)):
         return []
     believed = "; **violet**: the error of what was believed" if DIAGNOSIS in phases and beliefs(run) else ""
+    line = "; a **white line** is at 0" if below_zero(run.generations) else ""
     return [
-        f"**Grey bars**: the best of each generation, from 0; light and dark take turns, pass by pass{believed}.",
+        f"**Grey bars**: the best of each generation, from 0; light and dark take turns, pass by pass{believed}{line}.",
         "",
     ]
 

@@ -223,6 +223,27 @@ def test_bars_have_colours_that_mean_nothing_else_and_the_text_says_which(run: R
     assert "**Grey bars**: the best of each generation, from 0" in text and "**violet**: the error of what was" in text
 
 
+def test_a_line_at_zero_tells_bars_below_it_from_bars_above(run: RunRecord, rrd: Path, tmp_path: Path) -> None:
+    """Gaits that go backwards at first. The line is a bar of next to no height, from the first generation to the last."""
+    shown = rows_of(rrd, "texts/result", "TextDocument:text")[1][0][0]
+    assert not any("search/distance/zero" in line for line in contents_of(rrd)) and "white line" not in shown
+    back = [replace(g, best=g.best - 1.0) if g.phase == "repair" else g for g in run.generations]
+    write_rrd(replace(run, generations=back), tmp_path / "back.rrd")
+    best = [g.best for g in back if g.phase == "repair"]
+    assert min(best) < 0
+    height, across, begins = (
+        rows_of(tmp_path / "back.rrd", "search/distance/zero", f"BarChart:{part}")[1][0][0]
+        for part in ("values", "widths", "abscissa")
+    )
+    assert 0 < height["buffer"][0] < 0.05 * (max(0.0, *best) - min(best)) and begins["buffer"] == [0.0]
+    ends = [
+        rows_of(tmp_path / "back.rrd", f"search/distance/repair_{p}", "BarChart:abscissa")[1][0][0] for p in (1, 2, 3)
+    ]
+    assert across == max(e["buffer"][-1] for e in ends) + 1
+    assert not any("search/error/zero" in line for line in contents_of(tmp_path / "back.rrd"))
+    assert "a **white line** is at 0" in rows_of(tmp_path / "back.rrd", "texts/result", "TextDocument:text")[1][0][0]
+
+
 def test_the_first_lines_tell_what_was_found_how_sure_and_what_next(run: RunRecord, rrd: Path) -> None:
     text = rows_of(rrd, "texts/result", "TextDocument:text")[1][0][0]
     first = [line for line in text.splitlines() if line][1:5]
