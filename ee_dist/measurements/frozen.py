@@ -21,7 +21,13 @@ LONG_S, LONG = 0.25, 20
 FAST = 0.1
 """Share of its highest speed from which a joint is in motion: a speed has an offset, too."""
 BEFORE = 3
-"""Rows before it by which that is told where no speed was measured."""
+"""Rows before it by which that is told where no speed was measured, and rows either side that a jump is held against."""
+CLEARLY = 1.5
+"""Counts of its encoder in a row from which a joint is too quick for it to stand: one that creeps goes by one, and may stick at
+the next."""
+JUMP = 3.0
+"""Times as far as in any row beside it that a joint goes in the first row after: it went on while nothing was written. One that
+stuck goes on from where it stood, no faster than in the rows that follow."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +67,9 @@ def frozen(mapping: Mapping, own: Clocked, table: str, robot: Robot) -> list[Fro
         own.table.numbers(c.column, gaps=True) for g, _, c in mapping.columns() if g == "commands" and c.table == table
     ]
     found = []
+    ends = [b for _, b in long if b + 1 < len(own.times_s)]
     for a, b in long:
-        if why := _goes_on(robot, a, b, own.times_s, read["position"], read["velocity"], asked):
+        if why := _goes_on(robot, a, b, own.times_s, read["position"], read["velocity"], asked, ends):
             first = a + 1 if a else 0
             found.append(Frozen(slice(first, b + 1), float(own.times_s[b] - own.times_s[a]), why))
     return found
@@ -70,15 +77,18 @@ def frozen(mapping: Mapping, own: Clocked, table: str, robot: Robot) -> list[Fro
 
 def _goes_on(
     robot: Robot, a: int, b: int, times_s: Array, positions: AnyMapping[str, Array], speeds: AnyMapping[str, Array],
-    asked: Sequence[Array],
+    asked: Sequence[Array], ends: Sequence[int],
 ) -> str:  # fmt: skip
     """Why a joint whose readings stand from row ``a`` to ``b`` was in motion; empty where nothing says so. It was too quick for
-    its encoder to stand for a row: of a coarse one, or a speed that is held till the next step of one, nothing is told."""
+    its encoder to stand for a row: of a coarse one, or a speed that is held till the next step of one, nothing is told. Where no
+    speed was measured a joint must jump at the end, too, if the log goes on: friction holds one that turns.
+    ``ends``: last rows of all such stretches; what follows them is no pace of a joint."""
     joints = [j for j in positions if not speeds or j in speeds]
     if not joints:
         return ""
     lively = signals.lively(np.stack([positions[j] for j in joints], axis=1))
     row_s = float(np.median(np.diff(times_s)))
+    comes_back = b + 1 >= len(times_s) or any(_jumps(positions[joints[k]], a, b) for k in lively)
     for joint in (joints[k] for k in lively):
         steps = np.abs(np.diff(positions[joint]))
         finest = float(steps[steps > 0].min())
@@ -86,12 +96,19 @@ def _goes_on(
         if speeds:
             speed, most = abs(float(speeds[joint][a])), float(np.nanmax(np.abs(speeds[joint])))
             why = f"while {joint} says that it goes at {speed:.3g} {unit}"
-        elif a >= BEFORE and any(np.ptp(c[a : b + 1]) > FAST * np.ptp(c) for c in asked):
+        elif comes_back and a >= BEFORE and any(np.ptp(c[a : b + 1]) > FAST * np.ptp(c) for c in asked):
             # A joint that is braked takes some rows to stand.
-            speed, most = float(steps[a - BEFORE : a].min()) / row_s, float(steps.max()) / row_s
+            speed, most = float(steps[a - BEFORE : a].min()) / row_s, float(np.delete(steps, ends).max()) / row_s
             why = f"to which {joint} went at {speed:.3g} {unit}, and commands go on"
         else:
             continue
-        if speed > FAST * most and speed * row_s > finest:
+        if speed > FAST * most and speed * row_s > CLEARLY * finest:
             return why
     return ""
+
+
+def _jumps(position: Array, a: int, b: int) -> bool:
+    """Whether a position (T,) that stands from row ``a`` to ``b`` goes on elsewhere than where it stood."""
+    steps = np.abs(np.diff(position))
+    beside = np.concatenate([steps[max(a - BEFORE, 0) : a], steps[b + 1 : b + 1 + BEFORE]])
+    return bool(steps[b] > JUMP * beside.max(initial=0.0))

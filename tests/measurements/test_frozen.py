@@ -91,3 +91,25 @@ def test_a_speed_that_is_held_till_the_next_step_of_a_coarse_encoder_is_no_motio
     log = stood(frame(pos=np.round(m["q"] / 0.1) * 0.1, vel=m["w"], goal=m["g"]), ROWS["in the middle"], "pv")
     _, report = read(tmp_path, log)
     assert not any("one reading" in s for s in (*report.done, *report.suspicious))
+
+
+@pytest.mark.parametrize("pace", [1, 3])
+def test_a_joint_that_sticks_and_goes_on_from_there_was_read(tmp_path: Path, pace: int) -> None:
+    """Its command is a triangle, and friction holds it where that turns: it came by so many counts a row, and goes on so."""
+    count, t = 2 * np.pi / 4096, np.arange(samples.ROWS) / 50
+    course = np.cumsum(
+        np.concatenate([np.full(100, pace), np.zeros(50), np.full(100, -pace), np.zeros(50), np.full(100, pace)])
+    )
+    goal = count * pace * np.interp(np.arange(samples.ROWS), [0, 125, 275, 399], [25, 150, 0, 124])
+    still = np.zeros(samples.ROWS)
+    log = pd.DataFrame(
+        {"time": t, "pos_shoulder": count * course, "pos_elbow": still, "goal_shoulder": goal, "goal_elbow": still}
+    )
+    _, report = read(tmp_path, log.round(6))
+    assert not any("one reading" in s for s in (*report.done, *report.suspicious))
+
+
+def test_without_speeds_a_jump_tells_that_it_moved(tmp_path: Path) -> None:
+    log, report = read(tmp_path, stood(moving(speeds=False), ROWS["in the middle"], "p"))
+    assert log.filled is not None and log.filled.sum() == 60
+    assert any("60 rows" in s and "and commands go on: nothing there is compared" in s for s in report.suspicious)
