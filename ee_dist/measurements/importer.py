@@ -16,7 +16,7 @@ from ee_dist.basics.quoted import quoted
 from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.engines.drivers import Commands
 from ee_dist.measurements.errors import MeasurementError, nearest
-from ee_dist.measurements.led import Led
+from ee_dist.measurements.led import Lag, Led, goes_on
 from ee_dist.measurements.looking import Looked, repeats, units_shown
 from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.not_recorded import Stood, with_those_that_stood
@@ -53,14 +53,8 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
         paces |= {k: v for k, v in each.on.paces().items() if k not in paces}
     several = len(begun) > 1
     shown = {unit for each in begun for unit in each.sensors(paces)}
-    found = [each.run(shown, several) for each in begun]
-    if any(each.led.goes_on for each in begun):
-        # One controller leads all trials: of a slow one only others tell how it goes from point to point.
-        for i, each in enumerate(begun):
-            if not each.led.goes_on:
-                again = _Import(each.recorded, mapping, robot, i, each.stood, goes_on=True)
-                again.sensors(paces)
-                found[i] = again.run(shown, several)
+    lines = goes_on([each.lags() for each in begun])
+    found = [each.run(shown, several, lines) for each in begun]
     names = [report.trial for _, report in found]
     for i, setting in enumerate(mapping.settings):
         for wanted in setting.trials:
@@ -72,11 +66,8 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
 
 
 class _Import:
-    def __init__(
-        self, recorded: Recorded, mapping: Mapping, robot: Robot, index: int, stood: Stood, goes_on: bool = False
-    ) -> None:
-        """``stood``: the joints that were not recorded; ``goes_on``: commands go on by lines from row to row, as in other
-        trials. Raises MeasurementError."""
+    def __init__(self, recorded: Recorded, mapping: Mapping, robot: Robot, index: int, stood: Stood) -> None:
+        """``stood``: the joints that were not recorded. Raises MeasurementError."""
         self.recorded, self.mapping, self.robot, self.index, self.stood = recorded, mapping, robot, index, stood
         self.where = str(mapping.source)
         self.header = {k: v for t in reversed(recorded.tables) for k, v in t.header.items()}
@@ -85,7 +76,7 @@ class _Import:
             self.report.done += list(table.notes)
         self.report.done += [stood.line] * bool(stood.line)
         self.on = OnGrid(recorded, mapping, robot, self.report)
-        self.led = Led(self.on, mapping, robot, goes_on)
+        self.led = Led(self.on, mapping, robot)
 
     def sensors(self, paces: AnyMapping[str, float]) -> set[str]:
         """Reads the sensors, and returns the units of positions that they show. ``paces``: seconds between readings by table, of
@@ -96,13 +87,18 @@ class _Import:
         self.positions = self._sensors()
         return units_shown(self.robot, self.mapping, self.channels)
 
-    def run(self, shown: Container[str], several: bool) -> tuple[TrialRecord, Report]:
+    def lags(self) -> list[Lag]:
+        """How late joints are after their commands, once the sensors are read. Raises MeasurementError."""
+        return self.led.lags(self.positions)
+
+    def run(self, shown: Container[str], several: bool, lines: bool) -> tuple[TrialRecord, Report]:
         """The rest, once the sensors are read. ``shown``: the units of positions that some trial shows; ``several``: whether
-        there are others, so that a refusal names this one. Raises MeasurementError."""
+        there are others, so that a refusal names this one; ``lines``: whether commands go on by lines from row to row. Raises
+        MeasurementError."""
         positions = self.positions
         self.report.suspicious += repeats(self.robot, self.mapping, self.on.clocks, self.on.paces())
         torques = self.led.torques()
-        commands = self.led.commands(torques, positions)
+        commands = self.led.commands(torques, lines)
         self._tell_of_rest(commands, positions)
         self.report.suspicious = in_one_line(self.report.suspicious)
         self.led.on_one_turn(commands, self.channels)

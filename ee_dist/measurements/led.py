@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping as AnyMapping
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from ee_dist.measurements.mapping import LINES, Column, Mapping
 from ee_dist.measurements.on_grid import HELD, OnGrid
 from ee_dist.measurements.report import COMMAND, TORQUE
 from ee_dist.measurements.robot_channels import command_kind, command_kinds, command_units, torque_units
-from ee_dist.measurements.signals import lag
+from ee_dist.measurements.signals import lags
 from ee_dist.measurements.units import TURN
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
@@ -26,14 +28,41 @@ SELDOM_S = 0.05
 AT_ONCE = 0.3
 """Of a row of commands: joints that are not even so much later than a line through them are not led by what is held from one row
 to the next, which is half a row later."""
+AGREE = 1.0
+"""Rows by which the lags of joints that one controller leads may differ: of more than half of them, or nothing is told."""
+
+
+@dataclass(frozen=True)
+class Lag:
+    """How many rows of its commands a joint is later than lines through them in a trial, and how far they sent it in all."""
+
+    joint: str
+    rows: float
+    path: float
+
+
+def goes_on(trials: Sequence[Sequence[Lag]]) -> bool:
+    """Whether the joints of all trials follow lines between commands so closely that these cannot have been held. One controller
+    leads all trials: each joint counts in each by how far it was sent there, beside the trial that sent it farthest. A trial in
+    which three joints hardly move, one of them 90 ms ahead and another as late, tells nothing."""
+    every = [lag for trial in trials for lag in trial]
+    if not every:
+        return False
+    farthest: dict[str, float] = {}
+    for lag in every:
+        farthest[lag.joint] = max(farthest.get(lag.joint, 0.0), lag.path)
+    every.sort(key=lambda lag: lag.rows)
+    rows, weights = (np.array(v) for v in zip(*((g.rows, g.path / farthest[g.joint]) for g in every), strict=True))
+    middle = float(np.interp(0.5 * weights.sum(), np.cumsum(weights) - 0.5 * weights, rows))  # the weighted median
+    agreed = weights[np.abs(rows - middle) < AGREE].sum() > 0.5 * weights.sum()
+    return bool(agreed and -1.0 < middle < AT_ONCE)
 
 
 class Led:
-    """The drives of a robot, as the mapping tells of them. ``goes_on``: whether commands go on by lines from row to row."""
+    """The drives of a robot, as the mapping tells of them."""
 
-    def __init__(self, on: OnGrid, mapping: Mapping, robot: Robot, goes_on: bool = False) -> None:
+    def __init__(self, on: OnGrid, mapping: Mapping, robot: Robot) -> None:
         self.on, self.mapping, self.robot, self.report = on, mapping, robot, on.report
-        self.goes_on = goes_on or mapping.commands_between == LINES
 
     def _commands(self, torques: Array | None, lines: bool) -> Array:
         """What the drives were told, (T, M). Without any: the torques where the drives obey torques, else NaN; of joints that
@@ -53,14 +82,13 @@ class Led:
         self.report.done.append("no commands were recorded: only a balance of forces can compare this log")
         return np.full(torques.shape, math.nan)
 
-    def commands(self, torques: Array | None, positions: AnyMapping[str, Array]) -> Array:
-        """Commands (T, M), held from one row to the next; or, where joints are ahead of them so, on lines between the rows: what
-        was logged are points on the way of a controller, as clients of industrial arms have them. ``positions`` (T,) by joint."""
-        found = None if self.goes_on else self._on_lines(torques, positions)
-        self.goes_on = self.goes_on or found is not None
-        found = self._commands(torques, self.goes_on) if found is None else found
-        self.report.between = LINES if self.goes_on else self.mapping.commands_between or ""
-        if self.goes_on:
+    def commands(self, torques: Array | None, lines: bool) -> Array:
+        """Commands (T, M), held from one row to the next; or, where joints are ahead of them so (``lines``), on lines between the
+        rows: what was logged are points on the way of a controller, as clients of industrial arms have them."""
+        lines = lines or self.mapping.commands_between == LINES
+        found = self._commands(torques, lines)
+        self.report.between = LINES if lines else self.mapping.commands_between or ""
+        if lines:
             self.report.done = [line.replace(HELD, "") for line in self.report.done]
             self.report.done.append(
                 f"commands: {WHY_LINES}they are taken as points between which the controller went on, by straight lines"
@@ -89,23 +117,22 @@ class Led:
                 "('commands_between: lines' takes them so)"
             )
 
-    def _on_lines(self, torques: Array | None, positions: AnyMapping[str, Array]) -> Array | None:
-        """The commands on lines, where the joints follow these so closely that they cannot have been held."""
+    def lags(self, positions: AnyMapping[str, Array]) -> list[Lag]:
+        """Those of the joints by which it shows, where nobody says how commands go on. ``positions`` (T,) by joint."""
         asked = {
             d.joint: self.mapping.commands.get(d.joint) for d in self.robot.drives if command_kind(d) == "position"
         }
         led = {j: c.table for j, c in asked.items() if isinstance(c, Column) and j in positions}
         if self.mapping.commands_between is not None or self.on.as_is or len({*led.values()}) != 1:
-            return None
-        before = list(self.report.done), list(self.report.suspicious)
-        lines = self._commands(torques, True)
-        asked_of = lines[:, [self.robot.motor_names.index(j) for j in led]]
-        row_s = self.on.clocks[next(iter(led.values()))].timing.median_s
-        late = lag(asked_of, np.stack([positions[j] for j in led], axis=1), self.on.step_s)
-        if late is not None and -row_s < late < AT_ONCE * row_s:
-            return lines
-        self.report.done, self.report.suspicious = before
-        return None
+            return []
+        before = list(self.report.done), list(self.report.suspicious), dict(self.report.ranges)
+        names, commands = list(led), self._commands(None, True)
+        self.report.done, self.report.suspicious, self.report.ranges = before
+        commands = commands[:, [self.robot.motor_names.index(j) for j in names]]
+        row_s = self.on.clocks[led[names[0]]].timing.median_s
+        found = lags(commands, np.stack([positions[j] for j in names], axis=1), self.on.step_s)
+        paths = np.abs(np.diff(commands, axis=0)).sum(axis=0)
+        return [Lag(names[k], late / row_s, float(paths[k])) for k, late in found.items()]
 
     def on_one_turn(self, commands: Array, channels: AnyMapping[str, Array]) -> None:
         """Brings unwrapped commands to the turn of their positions: at 178 and -178 degrees the two may begin next to one

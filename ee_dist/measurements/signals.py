@@ -152,17 +152,17 @@ def lead(a: Array, b: Array, step_s: float, asked: bool = False) -> Lead:
     return other if better and not at_end else found
 
 
-def lag(asked: Array, seen: Array, step_s: float) -> float | None:
-    """Seconds by which what was ``seen`` (T, J) is later than what was ``asked`` (T, J), finer than a step: where the two go
-    together best, over shifts of half a second either way, in the middle of the joints. It is the same of goals that stay for
-    many rows as of smooth ones. None where no shift is the best, or nothing moves."""
+def lags(asked: Array, seen: Array, step_s: float) -> dict[int, float]:
+    """Seconds by which what was ``seen`` (T, J) is later than what was ``asked`` (T, J), finer than a step, by joint: where the
+    two go together best, over shifts of half a second either way. It is the same of goals that stay for many rows as of smooth
+    ones. Joints of which no shift is the best, or that hardly move, are left out."""
     most = min(round(LONGEST_LAG_S / step_s), len(asked) // 4)
     columns = lively(asked, seen)
     if most < 1 or not columns:
-        return None
+        return {}
     fits = _correlations(asked[:, columns], seen[:, columns], most)
-    found = [p for p in (_peak(f) for f in fits.T) if p is not None]
-    return float(np.median(found) - most) * step_s if found else None
+    found = zip(columns, (_peak(f) for f in fits.T), strict=True)
+    return {k: (p - most) * step_s for k, p in found if p is not None}
 
 
 def _correlations(x: Array, y: Array, most: int) -> Array:

@@ -97,6 +97,38 @@ def test_what_one_trial_shows_goes_for_all(tmp_path: Path) -> None:
     assert all(any("points between which" in d for d in report.done) for _, report in found)
 
 
+JOINTS_OF_THREE = ("pan", "lift", "elbow")
+
+
+def three(folder: Path, name: str, late_s: tuple[float, ...], most: float) -> Path:
+    """Three joints, each so late after a command that goes there and back once, or for as long as the trial takes."""
+    t = np.arange(0, 8, 0.02)
+    way = lambda s: most * (np.sin(2.3 * s) if most > 0.1 else np.exp(-((s - 4) ** 2)))  # noqa: E731
+    positions = np.stack([way(t - s) for s in late_s], axis=1)
+    file = folder / f"{name}.csv"
+    logs.frame_of(t, positions, np.stack([way(t)] * 3, axis=1), joints=JOINTS_OF_THREE).to_csv(file, index=False)
+    return file
+
+
+@pytest.mark.parametrize("with_others", [True, False])
+def test_a_trial_in_which_joints_hardly_move_and_disagree_decides_nothing(tmp_path: Path, with_others: bool) -> None:
+    """The middle of 0, 90 ms late and as early is no lag of all."""
+    files = [three(tmp_path, f"late_{k}", (0.11, 0.12, 0.1), 0.5) for k in range(2)]
+    files.append(three(tmp_path, "still", (0.0, -0.09, 0.09), 0.05))
+    robot, proposal = logs.proposed(tmp_path, files[0], joints=JOINTS_OF_THREE)
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(tmp_path / "chain.yaml"), "log"))
+    found = import_files(files if with_others else files[-1:], read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert not any("points between which" in d for _, report in found for d in report.done)
+
+
+def test_most_of_the_motion_decides_for_all_trials(tmp_path: Path) -> None:
+    files = [three(tmp_path, "quick", (0.001, 0.002, 0.001), 0.5), three(tmp_path, "still", (0.11, 0.12, 0.1), 0.05)]
+    robot, proposal = logs.proposed(tmp_path, files[0], joints=JOINTS_OF_THREE)
+    (tmp_path / "mapping.yaml").write_text(as_yaml(proposal, str(tmp_path / "chain.yaml"), "log"))
+    found = import_files(files, read_mapping(tmp_path / "mapping.yaml"), robot)
+    assert all(any("points between which" in d for d in report.done) for _, report in found)
+
+
 @pytest.mark.parametrize(("said", "late_s"), [("held", 0.001), ("lines", 0.03)])
 def test_a_person_may_say_what_commands_do_between_rows(tmp_path: Path, said: str, late_s: float) -> None:
     file = led(tmp_path, late_s)
