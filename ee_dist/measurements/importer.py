@@ -53,8 +53,8 @@ def import_files(files: Sequence[Path], mapping: Mapping, robot: Robot) -> list[
         paces |= {k: v for k, v in each.on.paces().items() if k not in paces}
     several = len(begun) > 1
     shown = {unit for each in begun for unit in each.sensors(paces)}
-    lines = goes_on([each.lags() for each in begun])
-    found = [each.run(shown, several, lines) for each in begun]
+    why = goes_on([each.lags() for each in begun])
+    found = [each.run(shown, several, why) for each in begun]
     names = [report.trial for _, report in found]
     for i, setting in enumerate(mapping.settings):
         for wanted in setting.trials:
@@ -89,16 +89,16 @@ class _Import:
 
     def lags(self) -> list[Lag]:
         """How late joints are after their commands, once the sensors are read. Raises MeasurementError."""
-        return self.led.lags(self.positions)
+        return self.led.lags(self.positions, self._speeds())
 
-    def run(self, shown: Container[str], several: bool, lines: bool) -> tuple[TrialRecord, Report]:
+    def run(self, shown: Container[str], several: bool, why: str) -> tuple[TrialRecord, Report]:
         """The rest, once the sensors are read. ``shown``: the units of positions that some trial shows; ``several``: whether
-        there are others, so that a refusal names this one; ``lines``: whether commands go on by lines from row to row. Raises
+        there are others, so that a refusal names this one; ``why`` commands go on by lines from row to row, if they do. Raises
         MeasurementError."""
         positions = self.positions
         self.report.suspicious += repeats(self.robot, self.mapping, self.on.clocks, self.on.paces())
         torques = self.led.torques()
-        commands = self.led.commands(torques, lines)
+        commands = self.led.commands(torques, why)
         self._tell_of_rest(commands, positions)
         self.report.suspicious = in_one_line(self.report.suspicious)
         self.led.on_one_turn(commands, self.channels)
@@ -173,6 +173,14 @@ class _Import:
             for low_pass, of in alike.items()
         ]
         return positions
+
+    def _speeds(self) -> dict[str, Array]:
+        """Speeds that were read, by joint: one that is estimated from positions says no more than these."""
+        return {
+            s.target: self.channels[s.name]
+            for s in self.robot.sensors
+            if s.kind == "velocity" and isinstance(self.mapping.sensors.get(s.name), Column)
+        }
 
     def _tell_of_rest(self, commands: Array, positions: AnyMapping[str, Array]) -> None:
         """One line on all joints that nobody moved in this trial, in place of two suspicious ones on each."""

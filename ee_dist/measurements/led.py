@@ -13,6 +13,7 @@ import numpy as np
 from ee_dist.basics.names import listed
 from ee_dist.basics.quoted import quoted
 from ee_dist.measurements.errors import MeasurementError
+from ee_dist.measurements.evenly_led import SOON, evenly_led
 from ee_dist.measurements.mapping import LINES, Column, Mapping
 from ee_dist.measurements.on_grid import HELD, OnGrid
 from ee_dist.measurements.report import COMMAND, TORQUE
@@ -22,7 +23,11 @@ from ee_dist.measurements.units import TURN
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
-WHY_LINES = "joints are ahead of what is held from row to row, as none can be ('commands_between: held' if they were): "
+OR_HELD = "('commands_between: held' if they were): "
+WHY_LINES = f"joints are ahead of what is held from row to row, as none can be {OR_HELD}"
+WHY_EVEN = (
+    f"they change evenly, and joints follow within a row at even speeds, as by no stiff drive that holds them {OR_HELD}"
+)
 SELDOM_S = 0.05
 """Rows so far apart, of commands that change from each to the next, may have others in between."""
 AT_ONCE = 0.3
@@ -34,20 +39,23 @@ AGREE = 1.0
 
 @dataclass(frozen=True)
 class Lag:
-    """How many rows of its commands a joint is later than lines through them in a trial, and how far they sent it in all."""
+    """How many rows of its commands a joint is later than lines through them in a trial, how far they sent it in all, and whether
+    it was led evenly (see evenly_led.py)."""
 
     joint: str
     rows: float
     path: float
+    even: bool = False
 
 
-def goes_on(trials: Sequence[Sequence[Lag]]) -> bool:
-    """Whether the joints of all trials follow lines between commands so closely that these cannot have been held. One controller
-    leads all trials: each joint counts in each by how far it was sent there, beside the trial that sent it farthest. A trial in
-    which three joints hardly move, one of them 90 ms ahead and another as late, tells nothing."""
+def goes_on(trials: Sequence[Sequence[Lag]]) -> str:
+    """Why commands go on by lines from row to row, if they do: the joints of all trials follow these so closely that none can
+    have been held, or as closely as a row, and evenly. One controller leads all trials: each joint counts in each by how far it
+    was sent there, beside the trial that sent it farthest. A trial in which three joints hardly move, one of them 90 ms ahead
+    and another as late, tells nothing."""
     every = [lag for trial in trials for lag in trial]
     if not every:
-        return False
+        return ""
     farthest: dict[str, float] = {}
     for lag in every:
         farthest[lag.joint] = max(farthest.get(lag.joint, 0.0), lag.path)
@@ -55,7 +63,10 @@ def goes_on(trials: Sequence[Sequence[Lag]]) -> bool:
     rows, weights = (np.array(v) for v in zip(*((g.rows, g.path / farthest[g.joint]) for g in every), strict=True))
     middle = float(np.interp(0.5 * weights.sum(), np.cumsum(weights) - 0.5 * weights, rows))  # the weighted median
     agreed = weights[np.abs(rows - middle) < AGREE].sum() > 0.5 * weights.sum()
-    return bool(agreed and -1.0 < middle < AT_ONCE)
+    even = weights[[g.even for g in every]].sum() > 0.5 * weights.sum()
+    if not agreed or middle <= -1.0:
+        return ""
+    return WHY_LINES if middle < AT_ONCE else WHY_EVEN if middle < SOON and even else ""
 
 
 class Led:
@@ -82,16 +93,16 @@ class Led:
         self.report.done.append("no commands were recorded: only a balance of forces can compare this log")
         return np.full(torques.shape, math.nan)
 
-    def commands(self, torques: Array | None, lines: bool) -> Array:
-        """Commands (T, M), held from one row to the next; or, where joints are ahead of them so (``lines``), on lines between the
-        rows: what was logged are points on the way of a controller, as clients of industrial arms have them."""
-        lines = lines or self.mapping.commands_between == LINES
+    def commands(self, torques: Array | None, why: str) -> Array:
+        """Commands (T, M), held from one row to the next; or, where they go on (``why``), on lines between the rows: what was
+        logged are points on the way of a controller, as clients of industrial arms have them."""
+        lines = bool(why) or self.mapping.commands_between == LINES
         found = self._commands(torques, lines)
         self.report.between = LINES if lines else self.mapping.commands_between or ""
         if lines:
             self.report.done = [line.replace(HELD, "") for line in self.report.done]
             self.report.done.append(
-                f"commands: {WHY_LINES}they are taken as points between which the controller went on, by straight lines"
+                f"commands: {why}they are taken as points between which the controller went on, by straight lines"
                 if self.mapping.commands_between is None
                 else "commands: by straight lines from one row to the next, as the mapping says"
             )
@@ -117,8 +128,9 @@ class Led:
                 "('commands_between: lines' takes them so)"
             )
 
-    def lags(self, positions: AnyMapping[str, Array]) -> list[Lag]:
-        """Those of the joints by which it shows, where nobody says how commands go on. ``positions`` (T,) by joint."""
+    def lags(self, positions: AnyMapping[str, Array], speeds: AnyMapping[str, Array]) -> list[Lag]:
+        """Those of the joints by which it shows, where nobody says how commands go on. ``positions``, and ``speeds`` that were
+        read (T,), by joint."""
         asked = {
             d.joint: self.mapping.commands.get(d.joint) for d in self.robot.drives if command_kind(d) == "position"
         }
@@ -130,9 +142,14 @@ class Led:
         self.report.done, self.report.suspicious, self.report.ranges = before
         commands = commands[:, [self.robot.motor_names.index(j) for j in names]]
         row_s = self.on.clocks[led[names[0]]].timing.median_s
-        found = lags(commands, np.stack([positions[j] for j in names], axis=1), self.on.step_s)
+        seen = np.stack([positions[j] for j in names], axis=1)
         paths = np.abs(np.diff(commands, axis=0)).sum(axis=0)
-        return [Lag(names[k], late / row_s, float(paths[k])) for k, late in found.items()]
+        found = []
+        for k, late in lags(commands, seen, self.on.step_s).items():
+            read = speeds.get(names[k])
+            even = read is not None and evenly_led(commands[:, k], seen[:, k], read, self.on.step_s, row_s)
+            found.append(Lag(names[k], late / row_s, float(paths[k]), even))
+        return found
 
     def on_one_turn(self, commands: Array, channels: AnyMapping[str, Array]) -> None:
         """Brings unwrapped commands to the turn of their positions: at 178 and -178 degrees the two may begin next to one

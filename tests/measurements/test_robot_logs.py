@@ -74,6 +74,27 @@ def test_points_between_which_a_controller_goes_on_are_not_held(tmp_path: Path, 
     assert report.between == ("lines" if lines else "")
 
 
+@pytest.mark.parametrize("stiff", [False, True])
+def test_joints_that_follow_soon_at_even_speeds_are_led_evenly(tmp_path: Path, stiff: bool) -> None:
+    """Joints a row late may be led by a drive that goes on between the rows, or jump to what a stiff one holds: speeds tell."""
+    fine, row = np.arange(0, 4, 0.001), 20
+    way = np.stack([0.5 * np.sin(1.7 * fine) + 0.2 * np.sin(4.1 * fine), 0.4 * np.cos(2.3 * fine)], axis=1)
+    if stiff:
+        held, seen = np.repeat(way[::row], row, axis=0), [way[0]]
+        for asked in held[:-1]:
+            seen.append(seen[-1] + (asked - seen[-1]) * 0.001 / 0.006)
+        at = np.array(seen)
+    else:
+        late = np.maximum(fine - 0.018, 0.0)
+        at = np.stack([np.interp(late, fine, c) for c in way.T], axis=1)
+    frame = logs.frame_of(fine[::row], at[::row], way[::row])
+    speeds = np.gradient(at, fine, axis=0)[::row]
+    frame = frame.assign(**{f"{j}_vel_rad_s": speeds[:, k] for k, j in enumerate(logs.samples.JOINTS)})
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, frame))
+    assert report.between == ("" if stiff else "lines")
+    assert any("follow within a row at even speeds" in d for d in report.done) != stiff
+
+
 def test_goals_that_stay_for_many_rows_are_held(tmp_path: Path) -> None:
     """Stairs have a rate nowhere but at their edges: joints that come to each a fifth of a second late are not ahead of them."""
     t, rng = np.arange(0, 10, 0.05), np.random.default_rng(0)
