@@ -93,6 +93,8 @@ def improve(
 
     def climb(rung: Rung) -> None:
         rung.terms = as_far_as_there_is(problem.robot, rung.terms)
+        if rung.reached is not None:
+            rung.reached = as_far_as_there_is(problem.robot, rung.reached)
         ladder.append(rung)
         if climbed is not None:
             climbed(rung)
@@ -183,6 +185,10 @@ def improve(
             rung.alternatives = [(j.proposal, j.own) for j in last.tied[1:] if j.earned]
             cut = best.outcome.cut
             current, rung.dropped = without_useless(search, current, own, len(best.proposal.parts), cut, len(pool))
+            if rung.dropped:
+                # What is left was fitted anew: who keeps the model of this step, or reads its values, gets those.
+                rung.reached = (*search.fixed, *current.hypothesis)
+                rung.added = current.hypothesis[len(current.parts) - len(best.proposal.parts) :]
             _as_it_stands(search, current, cut, rung)
             no_better = rung.held_out == ladder[-1].held_out and rung.error_heldout >= ladder[-1].error_heldout
             # Beside a model that only goes along it was worth its place, and not where all values may follow the motions that

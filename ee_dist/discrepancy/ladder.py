@@ -22,7 +22,8 @@ UNFITTED = "nothing was fitted"
 @dataclass(eq=False)
 class Rung:
     """A step of the ladder: the model with ``added`` (and without ``dropped``). ``held`` (segments,) is the held-out energy,
-    ``held_out`` what was held out."""
+    ``held_out`` what was held out. ``terms``: the model in which ``added`` came, what is ``dropped`` for it still there;
+    ``reached``: the one that the search goes on with, where it is another."""
 
     name: str
     added: Hypothesis
@@ -36,6 +37,12 @@ class Rung:
     dropped: tuple[str, ...] = ()
     alternatives: list[tuple[Proposal, Array]] = field(default_factory=list)
     """What was tied with it, and the values that suited then."""
+    reached: Hypothesis | None = None
+
+    @property
+    def model(self) -> Hypothesis:
+        """The model after this step: with what was ``added``, without what was ``dropped``. The errors are of it."""
+        return self.terms if self.reached is None else self.reached
 
 
 @dataclass(frozen=True)

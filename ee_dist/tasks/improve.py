@@ -142,7 +142,7 @@ def telling(problem: Problem, progress: SearchProgress, measured: Measurements) 
         told = f"{step_phrase(rung, problem)}: {problem.told(rung.error_heldout)} on data held out"
         notes = ("Not the end of the search: more may come, and what came first may go again. Its last step:", told)
         # First kept, then told: who stops a search because of what it says finds that.
-        keep_so_far(lambda path: write_model(path, measured.source, measured.folder, rung.terms, notes))
+        keep_so_far(lambda path: write_model(path, measured.source, measured.folder, rung.model, notes))
         progress.note(told)
 
     return climbed
