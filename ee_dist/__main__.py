@@ -55,7 +55,7 @@ from ee_dist.tasks.folder import (
 )
 from ee_dist.tasks.help import answer
 from ee_dist.tasks.sweep import Jobs
-from ee_dist.tasks.unfinished import FOLDER, SO_FAR, finished, goes_on, unfinished
+from ee_dist.tasks.unfinished import finished, goes_on, so_far, unfinished
 
 MISTAKE, DEFECT = 2, 1
 _jobs = Jobs()
@@ -147,8 +147,8 @@ def _how_to_begin_anew(out: Path) -> str:
 def _how_to_go_on(out: Path) -> str:
     if not can_go_on(out):
         return ""
-    so_far, where = out / FOLDER / SO_FAR, f"resume={shown(_whole(out))}"
-    model = f"; the model so far: {shown(so_far)}" if so_far.exists() else ""
+    reached, where = so_far(out), f"resume={shown(_whole(out))}"
+    model = f"; the model so far: {reached}" if reached else ""
     if not goes_on(out):
         return f"; the same command and {where} begins its search anew{model}"
     return f"; go on with the same command and {where}{model}"

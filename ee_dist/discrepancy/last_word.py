@@ -10,6 +10,7 @@ from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.compare import trial_name
 from ee_dist.discrepancy.evidence.left import Leftover, leftovers, settled
 from ee_dist.discrepancy.problem import Problem, error
+from ee_dist.discrepancy.steps_apart import StepApart
 from ee_dist.effects.catalogue import Hypothesis
 
 HELD_APART = "Held out from all of it"
@@ -23,7 +24,8 @@ class LastWord:
     """Errors of the model ``before`` and the one ``after``, of all trials of ``problem`` together and of each by itself, by
     the measure of the search; ``changed``: whether they are two; ``left``: curves in which the second leaves more than noise;
     ``others``: the same errors as this way counts them elsewhere (of positions, say), in lines for people; ``farther``: in
-    which plain numbers the second is the worse one although its error fell, if it is."""
+    which plain numbers the second is the worse one although its error fell, if it is; ``steps``: of each step of the ladder
+    between the two, from the first model on, where there is a ladder."""
 
     problem: Problem
     before: float
@@ -34,6 +36,7 @@ class LastWord:
     changed: bool
     others: tuple[str, ...] = ()
     farther: str = ""
+    steps: tuple[StepApart, ...] = ()
 
     @property
     def more(self) -> bool:

@@ -47,11 +47,11 @@ def worse_trials(problem: Problem, found: Improvement) -> list[Worse]:
     return sorted(worse, key=lambda w: w.before - w.after)
 
 
-def worse_text(problem: Problem, worse: list[Worse]) -> str:
-    """The same, for people."""
+def worse_text(problem: Problem, worse: list[Worse], on: str) -> str:
+    """The same, for people; ``on``: what the search held out, in their words."""
     told = "; ".join(f"{w.trial} {problem.told(w.before)} -> {problem.told(w.after)}" for w in worse[:3])
     more = f" and {len(worse) - 3} more" if len(worse) > 3 else ""
     return (
-        f"Worse than before on motions that were held out: {told}{more}. The motions contradict one another: a load or a setting "
+        f"Worse than before on {on}: {told}{more}. The motions contradict one another: a load or a setting "
         "that is not the same in all of them, or an effect that is another."
     )

@@ -15,6 +15,7 @@ from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.at_limit import often_at_limit
 from ee_dist.discrepancy.calibrated_away import calibrated_away
+from ee_dist.discrepancy.evidence.holdout import in_turn
 from ee_dist.discrepancy.explain import explain, gained_untouched
 from ee_dist.discrepancy.improve import MOST, improve
 from ee_dist.discrepancy.ladder import Improvement, Rung
@@ -28,7 +29,7 @@ from ee_dist.discrepancy.weighed_up import weighed_up
 from ee_dist.effects.model_file import write_model
 from ee_dist.robots.model import Robot
 from ee_dist.tasks.config import AUTO, Config, ConfigError
-from ee_dist.tasks.held_apart import told_of
+from ee_dist.tasks.held_apart import HeldApart
 from ee_dist.tasks.measurements import Measurements, load, load_held_out, of_held_out
 from ee_dist.tasks.pool import check, chosen
 from ee_dist.tasks.progress_line import SearchProgress
@@ -66,7 +67,7 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     """Write model.yaml, summary.json, report.html and improve.rrd into ``out``; ``told`` hears of the progress. Raises
     ConfigError, EffectError, LogError."""
     console, watch, measured = terminal(), Stopwatch(), load(config)
-    apart = load_held_out(config)
+    held_out = load_held_out(config)
     wanted = effects_of(config.effect, measured.robot)
     for key in ("without", "only"):
         if wanted is not None and getattr(options, key) and not options.calibrate:
@@ -89,18 +90,20 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
         if problem.doubts:
             # It may decide everything, and a search takes minutes.
             progress.note(f"Before anything is believed: {problem.doubts}")
+        # What it tells goes to people alone: the search is given the problem, which has none of these trials.
+        apart = None if held_out is None else HeldApart(held_out, way, config, problem)
         pool = chosen(problem, options.without, options.only)
         calibration = None
         if options.calibrate:
             found, calibration = calibrated(measured, config, pool, wanted, options.most, progress)
         else:
-            climbed = telling(problem, progress, measured)
+            climbed = telling(problem, progress, measured, apart)
             found = improve(
                 problem, pool, measured.model, wanted, most=options.most, progress=progress, climbed=climbed
             )
     also = problem.other_errors(found.ladder[0].terms, found.terms) if len(found.ladder) > 1 else ()
     also = (*also, *problem.spoiled(found.terms), *way.instead(bool(found.left)))
-    word = None if apart is None else told_of(apart, way, config, found.terms, problem)
+    word = None if apart is None else apart.word(found.terms, found.ladder)
     found = weighed_up(found, problem, word)
     found = replace(found, at_limit=often_at_limit(problem, found.terms))
     first, last = found.ladder[0], found.ladder[-1]
@@ -126,23 +129,27 @@ def run(config: Config, options: Options, out: Path, told: Progress = quiet) -> 
     story = links(out, measured.files, config.model)
     write_page(improve_page(problem, measured, found, account, story, word), out / "report.html")
     if options.rerun:
-        improve_scene(problem, found, account, measured.model, out / "improve.rrd")
-    show_ladder(console, problem, found)
+        improve_scene(problem, found, account, measured.model, out / "improve.rrd", word)
+    show_ladder(console, problem, found, word)
     show_last_word(console, word)
     show_candidates(console, problem, found.refused, refused_heading(problem, found))
     show_account(console, account, out)
     return problem, found, account
 
 
-def telling(problem: Problem, progress: SearchProgress, measured: Measurements) -> Callable[[Rung], None]:
+def telling(
+    problem: Problem, progress: SearchProgress, measured: Measurements, apart: HeldApart | None = None
+) -> Callable[[Rung], None]:
     """Says every step of the ladder when it is taken, as the table at the end will, and keeps its model where a run keeps what
-    it would go on from."""
+    it would go on from. The search gets no answer: what is said of trials held ``apart`` decides nothing in it."""
 
     def climbed(rung: Rung) -> None:
-        told = f"{step_phrase(rung, problem)}: {problem.told(rung.error_heldout)} on data held out"
+        on = "data held out" if apart is None else in_turn(rung.held_out)
+        there = "" if apart is None else apart.told(rung.model)
+        told = f"{step_phrase(rung, problem)}: {problem.told(rung.error_heldout)} on {on}{there and f'; {there}'}"
         notes = ("Not the end of the search: more may come, and what came first may go again. Its last step:", told)
         # First kept, then told: who stops a search because of what it says finds that.
-        keep_so_far(lambda path: write_model(path, measured.source, measured.folder, rung.model, notes))
+        keep_so_far(lambda path: write_model(path, measured.source, measured.folder, rung.model, notes), there)
         progress.note(told)
 
     return climbed

@@ -180,6 +180,8 @@ class _Remembered:
 
 
 _current: Unfinished | None = None
+_off: dict[Path, str] = {}
+"""By folder, how far the model that was reached there is from trials that took no part: of runs of this process alone."""
 
 
 @contextmanager
@@ -228,12 +230,24 @@ def note_in(evaluator: Evaluator) -> None:
         inner = getattr(inner, "inner", None)
 
 
-def keep_so_far(write: Callable[[Path], None]) -> None:
-    """Have ``write`` put the model that the search under way has reached where its run would go on from. A search that simulates
-    nothing keeps nothing else; what has no end to reach keeps nothing at all."""
+def keep_so_far(write: Callable[[Path], None], off: str = "") -> None:
+    """Have ``write`` put the model that the search under way has reached where its run would go on from; ``off``: how far it is
+    from trials that took no part, in words. A search that simulates nothing keeps nothing else; what has no end to reach keeps
+    nothing at all."""
     if _current is not None:
         _current.begin()
         write(_current.folder / SO_FAR)
+        _off[_current.folder.resolve()] = off
+
+
+def so_far(out: Path) -> str:
+    """The model that the search in a folder had reached when it was stopped, and how far off that is where this process knows;
+    empty: none was kept."""
+    path = out / FOLDER / SO_FAR
+    if not path.exists():
+        return ""
+    off = _off.get(path.parent.resolve(), "")
+    return f"{shown(path)}{off and f' ({off})'}"
 
 
 def finished(out: Path, config: Config, options: Any) -> bool:

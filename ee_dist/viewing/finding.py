@@ -66,6 +66,8 @@ class Rung:
     error_fit: float | None = None
     held_out: str = ""
     """What was held out."""
+    error_apart: float | None = None
+    """On trials that were held out from all of it, where there are such."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,13 +86,19 @@ def ladder_table(found: Finding) -> list[str]:
     largest = max(r.error_heldout for r in found.ladder)
     # The model as it was given was fitted to nothing; of one kind of data that was held out a line says which.
     cuts = list(dict.fromkeys(r.held_out for r in found.ladder[1:]))
-    lines = [f"| # | error held out{_unit(found)} | from 0 | in the fit | model |", "|---|---|---|---|---|"]
+    apart = any(r.error_apart is not None for r in found.ladder)
+    all_of_it, rule, none = (" held out from all of it |", "---|", " |") if apart else ("", "", "")
+    lines = [
+        f"| # | error held out{_unit(found)} | from 0 | in the fit |{all_of_it} model |",
+        f"|---|---|---|---|{rule}---|",
+    ]
     for k, rung in enumerate(found.ladder):
         fit = "" if rung.error_fit is None else f"{rung.error_fit:.3g}"
         on = f" (held out: {rung.held_out})" if len(cuts) > 1 and rung.held_out else ""
+        own = f" {rung.error_apart:.3g} |" if rung.error_apart is not None else none
         lines.append(
-            f"| {k} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} | {rung.label}{on} |"
+            f"| {k} | {rung.error_heldout:.3g} | {bar(rung.error_heldout, largest)} | {fit} |{own} {rung.label}{on} |"
         )
     if found.floor is not None:
-        lines.append(f"| | {found.floor:.3g} | {bar(found.floor, largest)} | | *noise alone* |")
+        lines.append(f"| | {found.floor:.3g} | {bar(found.floor, largest)} | |{none} *noise alone* |")
     return [*lines, "", f"Held out: {cuts[0]}."] if len(cuts) == 1 and cuts[0] else lines

@@ -196,10 +196,13 @@ def ladder(
     held_out: Sequence[str],
     floor: float,
     label: str = "error (standard deviations)",
+    apart: Sequence[float] | None = None,
 ) -> go.Figure:
     """Error of each model from the first to the last, and the noise floor. ``held_out``: what was held out of each; a line
-    joins neighbours of which that was the same, and the model that was taken as it is."""
-    figure, top = go.Figure(), 1.25 * max(max(heldout), floor)
+    joins neighbours of which that was the same, and the model that was taken as it is. ``apart``: of each the error on trials
+    that were held out from all of it, where there are such; one that is not finite leaves a gap."""
+    known = [e for e in apart or () if np.isfinite(e)]
+    figure, top = go.Figure(), 1.25 * max(*heldout, *known, floor)
     width = min(NAME, max(SHORT, LETTERS // len(names)))
     places = [wrapped(n, width) for n in names]
     # The model as it is was fitted to nothing, so that it goes with whatever comes next.
@@ -226,6 +229,15 @@ def ladder(
         x=places, y=list(fit), name="fitted", mode="lines+markers", legendrank=1,
         line={"color": PREDICTED, "dash": "dot"}, marker={"size": 5},
     )  # fmt: skip
+    if apart is not None:
+        figure.add_scatter(
+            x=places,
+            y=[e if np.isfinite(e) else None for e in apart],
+            name="held out from all of it",
+            mode="lines+markers",
+            line={"color": MARK, "width": 2},
+            marker={"size": 8, "symbol": "diamond"},
+        )
     # Below a line that is near the axis its words would lie on the numbers there.
     figure.add_hline(y=floor, line={"color": FLOOR, "width": 2}, annotation_text=f"noise floor {floor:.3g}",
                      annotation_position="bottom left" if floor > LOW * top else "top left")  # fmt: skip

@@ -16,6 +16,7 @@ from ee_dist.discrepancy.accounts.of_compare import PARTS, compare_account
 from ee_dist.discrepancy.accounts.of_improve import improve_account
 from ee_dist.discrepancy.accounts.ranges import ranges, rest_text
 from ee_dist.discrepancy.compare import RegimeReport, compare, of_all_regimes, trial_name
+from ee_dist.discrepancy.evidence.holdout import in_turn
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, NEUTRAL, ParameterReport
 from ee_dist.discrepancy.evidence.left import leftovers
 from ee_dist.discrepancy.explain import explain
@@ -64,7 +65,7 @@ def test_an_error_beside_that_of_trials_apart_says_what_it_is_of(found) -> None:
     problem, improvement = found
     apart = Linear((WEAK,), seed=7)
     word = last_word([apart, apart], [(), improvement.terms], apart.channels)
-    of = improvement.ladder[-1].held_out
+    of = in_turn(improvement.ladder[-1].held_out)
     assert f"on {of}: model " in improve_account(problem, improvement, word=word).error
 
 

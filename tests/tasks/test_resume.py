@@ -174,13 +174,31 @@ def test_the_model_that_a_stopped_search_had_reached_can_be_used(cli, tmp_path, 
     ask = ("task=improve", "effect=auto", "task.only=[coulomb_friction,viscous_friction]", *same)
     so_far = run / "unfinished" / "model.yaml"
     stopping(when=so_far.exists)
-    assert cli(*ask, f"hydra.run.dir={run}").status == 1
+    outcome = cli(*ask, f"hydra.run.dir={run}")
+    assert outcome.status == 1 and "held out from all of it" not in outcome.out
     text = so_far.read_text()
     assert text.startswith("# Not the end of the search") and "effect: coulomb_friction" in text
     stopping()
     assert cli("task=compare", *same, f"model={so_far}", f"hydra.run.dir={tmp_path}/compare").status == 0
     assert cli(*ask, f"resume={run}").status == 0
     assert not so_far.parent.exists() and (run / "model.yaml").exists()
+
+
+def test_a_stopped_search_says_how_far_its_model_is_from_what_was_held_out_from_all_of_it(cli, tmp_path, stopping):
+    log, run = tmp_path / "log", tmp_path / "run"
+    assert cli(
+        "task=trial", "robot=servo_pendulum", "+hidden=coulomb_friction@servo", "engine=mujoco", "seed=1",
+        "task.excitations=['multisine:seconds=1,seed=1','slow_sines:seconds=1,seed=2']", f"hydra.run.dir={log}",
+    ).status == 0  # fmt: skip
+    same = (f"measured={log}", "engine=mujoco", "evaluator=serial", "task.by=open_loop", "task.rerun=false")
+    ask = ("task=improve", "effect=auto", "task.only=[coulomb_friction,viscous_friction]", "held_out=[2]", *same)
+    so_far = run / "unfinished" / "model.yaml"
+    stopping(when=so_far.exists)
+    outcome = cli(*ask, f"hydra.run.dir={run}")
+    assert outcome.status == 1
+    (line,) = (x for x in outcome.out.splitlines() if x.endswith(" on trials that were held out from all of it"))
+    off = line.rpartition("; ")[2]
+    assert f"{so_far} ({off})" in _what_is_kept(run) and f"held out in turn; {off}" in so_far.read_text()
 
 
 def test_a_search_that_simulates_nothing_keeps_its_model_too(cli, tmp_path, monkeypatch):

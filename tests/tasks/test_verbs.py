@@ -160,7 +160,15 @@ def test_what_is_held_out_from_all_of_it_decides_nothing_and_has_the_last_word(c
 
     word = improved["last_word"]
     assert [t["name"] for t in word["trials"]] == ["run2"] and word["error_after"] < 0.5 * word["error_before"]
+    # Each step tells what it is to these trials too, in the line that is said when it is taken, table, page and scene.
+    first, last = word["steps"]
+    assert first["error"] == word["error_before"] and last["error"] == pytest.approx(word["error_after"], rel=0.3)
+    (line,) = (line for line in said.out.splitlines() if line.endswith(" on trials that were held out from all of it"))
+    assert "windows of the fitted motions, held out in turn; " in line and "on data held out" not in said.out
+    off = line.rpartition("; ")[2].removesuffix(" on trials that were held out from all of it")
+    assert "held out in turn" in " ".join(said.out.split()) and said.out.count(off) > 1
     page = (found / "report.html").read_text(encoding="utf-8")
+    assert "told at each step, and no step was chosen by it" in page
     elsewhere = [line for line in improved["words"] if line.startswith("Held out from all of it: ")]
     assert bool(elsewhere) is (by != "force_balance") and all(line in html.unescape(page) for line in elsewhere)
     assert "Held out from all of it" in page and "Held out from all of it (2. run2): model " in improved["words"][1]

@@ -10,9 +10,13 @@ from rich.console import Console
 
 from ee_dist.discrepancy.evidence.holdout import MOTIONS, WINDOWS
 from ee_dist.discrepancy.ladder import UNFITTED, Improvement, Rung
+from ee_dist.discrepancy.last_word import LastWord
+from ee_dist.discrepancy.steps_apart import StepApart
 from ee_dist.robots.servo_pendulum import servo_pendulum
 from ee_dist.tasks.results.labels import step_name, step_tick
 from ee_dist.tasks.results.tables import show_ladder
+from ee_dist.viewing.finding import Rung as Drawn
+from ee_dist.viewing.finding_text import ladder_table
 from ee_dist.viewing.report_figures import ladder
 
 
@@ -48,6 +52,26 @@ def test_a_line_joins_what_was_judged_on_the_same(held_out: tuple[str, ...], lin
     figure = ladder([f"step {k}" for k in range(count)], [1.0] * count, [2.0] * count, held_out, 0.5)
     assert [len(t.x) for t in figure.data if t.name == "held out"] == lines
     assert sum(bool(t.showlegend) for t in figure.data if t.name == "held out") == 1
+
+
+def test_trials_held_out_from_all_of_it_have_a_column_and_a_line_of_their_own() -> None:
+    found = improved(MOTIONS, MOTIONS)
+    problem = SimpleNamespace(natural_name="error", robot=servo_pendulum(), told=lambda e: f"{e:.3g}")
+    steps = tuple(StepApart(e, np.zeros((1, 1)), np.zeros(1)) for e in (7.25, 3.42, 3.6))
+    word = LastWord(problem, 7.25, 3.6, 0.8, (), (), True, steps=steps)  # type: ignore[arg-type]
+    console = Console(width=80, record=True)
+    show_ladder(console, problem, found, word)  # type: ignore[arg-type]
+    said = " ".join(console.export_text().split())
+    assert "; fitted motions held out in turn" in said and "from all" in said and MOTIONS not in said
+    assert all(f" {e} " in said for e in ("7.25", "3.42", "3.6", "0.8"))
+    assert "from all" not in shown(found)
+    figure = ladder(["a", "b", "c"], [3.0, 2.0, 1.0], [3.1, 2.1, 1.1], [MOTIONS] * 3, 0.5, apart=[7.25, np.inf, 3.6])
+    (line,) = (t for t in figure.data if t.name == "held out from all of it")
+    assert list(line.y) == [7.25, None, 3.6] and figure.layout.yaxis.range[1] > 7.25
+    rungs = tuple(Drawn("m", e, e, MOTIONS, s.error) for e, s in zip((3.1, 2.1, 1.1), steps, strict=True))
+    table = ladder_table(SimpleNamespace(ladder=rungs, floor=0.5, unit="mrad"))  # type: ignore[arg-type]
+    assert "held out from all of it" in table[0] and " 7.25 |" in table[2]
+    assert len({line.count("|") for line in table[:6]}) == 1, "as many cells in each row"
 
 
 @pytest.mark.parametrize(("floor", "below"), [(0.05, False), (0.25, False), (1.5, True)])

@@ -40,6 +40,7 @@ from ee_dist.discrepancy.accounts.ranges import (
 )
 from ee_dist.discrepancy.at_limit import limit_lines, unsaid
 from ee_dist.discrepancy.calibrated_away import OddOne
+from ee_dist.discrepancy.evidence.holdout import MOTIONS, in_turn
 from ee_dist.discrepancy.evidence.intervals import ALL_OF_IT, ENDED, HARDLY, NEUTRAL, NOT_DETERMINED
 from ee_dist.discrepancy.explain import NOTHING_MISSING
 from ee_dist.discrepancy.finished import EXPLAINED
@@ -52,6 +53,7 @@ from ee_dist.discrepancy.torque_scale import torques_compared
 from ee_dist.discrepancy.uneven import worse_text, worse_trials
 from ee_dist.discrepancy.weighed_up import ALL_ROWS
 from ee_dist.discrepancy.words import by_effect, much, percent, phrase, placed, plain, without_values
+from ee_dist.discrepancy.worse_steps import worse_step_lines
 from ee_dist.effects.catalogue import CATALOGUE, Term
 from ee_dist.effects.groups import members_of
 from ee_dist.robots.model import Robot
@@ -101,8 +103,8 @@ def improve_account(
     steps = [r for r in found.ladder if r.added]
     lines = []
     if len(steps) > 1:
-        in_turn = "; ".join(without_values(text) for r in steps for text, _ in by_effect(r.added, robot))
-        lines.append(f"Added, in this order: {in_turn}.")
+        order = "; ".join(without_values(text) for r in steps for text, _ in by_effect(r.added, robot))
+        lines.append(f"Added, in this order: {order}.")
     # Which way a joint counts is mended in a file, not carried along in a model.
     wrong = [t for t in found.terms if CATALOGUE[t.effect].mistake]
     lines += [f"{plain(placed(t.name)).capitalize()}: {CATALOGUE[t.effect].physics}" for t in wrong]
@@ -145,7 +147,7 @@ def improve_account(
     lines += rest_text(found.terms, found.parameters)
     worse = worse_trials(problem, found)
     if worse:
-        lines.append(worse_text(problem, worse))
+        lines.append(worse_text(problem, worse, "motions that were held out" if word is None else in_turn(MOTIONS)))
     more_there = word is not None and word.more
     settled = found.verdict in (EXPLAINED, NOTHING_MISSING) and not more_there
     unsure = found.unsure if settled else []
@@ -154,7 +156,7 @@ def improve_account(
         lines.append(left_text(found.left, bool(steps)))
     if word is not None:
         lines.append(apart_text(word))
-    on = "" if word is None else last.held_out
+    on, judged_on = ("", found.judged_on) if word is None else map(in_turn, (last.held_out, found.judged_on))
     error = before_and_after(problem, first.error_heldout, last.error_heldout, found.noise_floor, on)
     share = f"{percent(max(0.0, min(found.explained, 1.0)))} of the error above the noise is explained"
     if len(found.ladder) == 1:
@@ -167,10 +169,10 @@ def improve_account(
     else:
         what = _listed(found, parts) if parts else "nothing; the model's own values were fitted anew"
         head = f"Added: {what}."
-        where = "" if found.left or settled else f" on {TRIALS_APART if more_there else found.judged_on}"
+        where = "" if found.left or settled else f" on {TRIALS_APART if more_there else judged_on}"
         nothing = BEYOND if unsure else nothing_else(found.explained)
         head += f" {nothing}" if settled else f" More than noise is left{where}: {share}."
-        sure = f"How sure: {share}, judged on {found.judged_on}{unexplained_rest(found.explained, settled)}"
+        sure = f"How sure: {share}, judged on {judged_on}{unexplained_rest(found.explained, settled)}"
         one_each = [s.terms[0] for s in parts[:NAMED] if len(s.terms) == 1]
         sure += f"{ranges(found.terms, found.parameters, one_each, robot, len(added(found)) > 1)}{_told_from(ties)}"
         sure += f"{unsure_of(unsure)}."
@@ -183,7 +185,7 @@ def improve_account(
     advice = slower(unsure) if unsure else MEND if wrong else advice
     tied = bool(found.twins) or any(rivals(found, r, robot) for r in steps)
     doubts, notes = limit_lines([] if settled else unsaid(robot, found.at_limit, found.terms))
-    warnings = (*doubts, *(odd_text(o, robot) for o in found.odd))
+    warnings = (*doubts, *(odd_text(o, robot) for o in found.odd), *worse_step_lines(word, found.ladder))
     nothing = problem.says_nothing(found.terms) if len(found.ladder) > 1 else ""
     if nothing:
         # Nobody should read how much is explained without it.

@@ -32,6 +32,12 @@ WINDOWS, MOTIONS, SETTINGS = (
     "motions that were not fitted",
     "settings that were not fitted",
 )
+IN_TURN = {
+    WINDOWS: "windows of the fitted motions, held out in turn",
+    MOTIONS: "fitted motions held out in turn",
+    SETTINGS: "fitted settings held out in turn",
+}
+"""The same beside trials that were held out from all of it, which take no turn."""
 ONE_BY_ONE = 4
 """Up to so many motions or settings each is held out by itself; more are held out in two groups."""
 SAME_MOTION = 0.02
@@ -99,6 +105,11 @@ class HeldOut:
     @property
     def energy(self) -> float:
         return float(self.residual @ self.residual)
+
+
+def in_turn(held_out: str) -> str:
+    """What was held out (the ``name`` of a cut) in words that tell it from trials that were held out from all of it."""
+    return IN_TURN.get(held_out, held_out)
 
 
 def windows(problem: Problem) -> Cut:

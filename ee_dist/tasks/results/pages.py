@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from ee_dist.basics.names import listed
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.compare import Comparison, compare
+from ee_dist.discrepancy.evidence.holdout import in_turn
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.importance import added
 from ee_dist.discrepancy.ladder import Improvement
-from ee_dist.discrepancy.last_word import TRIALS_APART, LastWord
+from ee_dist.discrepancy.last_word import HELD_APART, TRIALS_APART, LastWord
 from ee_dist.discrepancy.problem import Problem
 from ee_dist.discrepancy.words import phrase, plain
 from ee_dist.tasks.measurements import Measurements
@@ -99,10 +100,11 @@ def improve_page(
 ) -> Page:
     """The page of improve; ``word`` is on trials that took no part in it."""
     first, last, changed = found.ladder[0], found.ladder[-1], len(found.ladder) > 1
+    held = last.held_out if word is None else in_turn(last.held_out)
     page = _page(problem, measured, "Improve", account, links)
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name}, {MODEL}"),
-        *([(problem.told(last.error_heldout), f"{IMPROVED}, on {last.held_out}")] if changed else []),
+        *([(problem.told(last.error_heldout), f"{IMPROVED}, on {held}")] if changed else []),
         *_word_tile(word),
         (problem.told(found.noise_floor), "noise floor"),
         (str(len(found.terms)), "effects in the model"),
@@ -117,11 +119,15 @@ def improve_page(
             steps,
             [drawn(problem, r.error_fit) for r in found.ladder],
             [drawn(problem, r.error_heldout) for r in found.ladder],
-            [r.held_out for r in found.ladder],
+            [r.held_out if word is None else in_turn(r.held_out) for r in found.ladder],
             drawn(problem, found.noise_floor),
             axis_of(problem),
+            None if word is None else [drawn(word.problem, s.error) for s in word.steps],
         )
-        caption = f"Error of each model on {', then on '.join(found.cuts)}. Everything is fitted anew at each step."
+        cuts = found.cuts if word is None else list(map(in_turn, found.cuts))
+        caption = f"Error of each model on {', then on '.join(cuts)}. Everything is fitted anew at each step."
+        if word is not None:
+            caption += f" {HELD_APART}: told at each step, and no step was chosen by it."
         if len(found.cuts) > 1:
             caption += " A line joins what was judged on the same: from one to the next errors cannot be compared."
         page.sections.append(Section("The ladder", caption, figure))

@@ -10,9 +10,11 @@ import numpy as np
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import shown_gain
 from ee_dist.discrepancy.compare import Comparison, compare, trial_name
+from ee_dist.discrepancy.evidence.holdout import in_turn
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
 from ee_dist.discrepancy.ladder import Improvement
+from ee_dist.discrepancy.last_word import LastWord
 from ee_dist.discrepancy.meters import motions
 from ee_dist.discrepancy.problem import Problem, Series
 from ee_dist.discrepancy.words import placed
@@ -42,12 +44,21 @@ def explain_scene(problem: Problem, found: Explanation, account: Account, path: 
     write_explain_rrd(replace(finding, candidates=candidates), path)
 
 
-def improve_scene(problem: Problem, found: Improvement, account: Account, model: Hypothesis, path: Path) -> None:
-    """Before, after, and the ladder between them."""
+def improve_scene(
+    problem: Problem, found: Improvement, account: Account, model: Hypothesis, path: Path, word: LastWord | None = None
+) -> None:
+    """Before, after, and the ladder between them; ``word`` is on trials that took no part in it."""
     finding = _finding(problem, compare(problem, found.base), account, model)
+    apart = [None] * len(found.ladder) if word is None else [in_unit(word.problem, s.error) for s in word.steps]
     ladder = tuple(
-        drawn.Rung(step_name(r), in_unit(problem, r.error_heldout), in_unit(problem, r.error_fit), r.held_out)
-        for r in found.ladder
+        drawn.Rung(
+            step_name(r),
+            in_unit(problem, r.error_heldout),
+            in_unit(problem, r.error_fit),
+            r.held_out if word is None else in_turn(r.held_out),
+            off,
+        )
+        for r, off in zip(found.ladder, apart, strict=True)
     )
     better = said(problem, IMPROVED, found.terms)
     write_improve_rrd(replace(finding, ladder=ladder, better=better), path)

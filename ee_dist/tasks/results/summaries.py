@@ -91,7 +91,7 @@ def of_explanation(
         "parameters": of_parameters(found.after, found.parameters),
         "at_limit": of_at_limit(found.at_limit),
         "left": of_left(found.left),
-        "last_word": of_last_word(word),
+        "last_word": None if word is None else of_last_word(word),
         "next_trial": {**ahead.excitation.as_dict(), "separation": ahead.separation} if ahead and worth else None,
     }
 
@@ -171,10 +171,8 @@ def _place(name: str) -> dict[str, str]:
     return {"effect": effect, "target": target}
 
 
-def of_last_word(word: LastWord | None) -> dict[str, Any] | None:
-    """How far the models are from trials that took no part; None where none were held out from all of it."""
-    if word is None:
-        return None
+def of_last_word(word: LastWord) -> dict[str, Any]:
+    """How far the models are from trials that were held out from all of it."""
     problem = word.problem
     return {
         "error_before": word.before,
@@ -191,6 +189,14 @@ def of_last_word(word: LastWord | None) -> dict[str, Any] | None:
     }
 
 
+def of_steps(word: LastWord, found: Improvement) -> list[dict[str, Any]]:
+    """Each step of the ladder on these trials, which no step was chosen by."""
+    return [
+        {"name": r.name, "error": s.error, "error_natural": word.problem.natural(s.error)}
+        for r, s in zip(found.ladder, word.steps, strict=True)
+    ]
+
+
 def of_improvement(
     problem: Problem, found: Improvement, account: Account, path: str, word: LastWord | None = None
 ) -> dict[str, Any]:
@@ -202,7 +208,7 @@ def of_improvement(
         "all_rows": found.all_rows and {"error_before": found.all_rows[0], "error_after": found.all_rows[1]},
         "ladder": [of_rung(problem, found, r) for r in found.ladder],
         "model": path,
-        "last_word": of_last_word(word),
+        "last_word": None if word is None else {**of_last_word(word), "steps": of_steps(word, found)},
         "parameters": of_parameters(found.terms, found.parameters),
         "worth": [
             {"words": s.text, "terms": hypothesis_list(s.terms), "share": s.worth, "doubted": s.doubted}

@@ -12,6 +12,7 @@ from rich.table import Table
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_explain import told_gain
 from ee_dist.discrepancy.compare import Comparison, of_all_regimes
+from ee_dist.discrepancy.evidence.holdout import in_turn
 from ee_dist.discrepancy.evidence.intervals import ParameterReport, called
 from ee_dist.discrepancy.evidence.judge import Judged
 from ee_dist.discrepancy.explain import Explanation
@@ -93,20 +94,31 @@ def kind_of(c: Judged, best: Judged) -> str:
     return "best" if c is best and c.earned else "earned" if c.earned else "not"
 
 
-def show_ladder(console: Console, problem: Problem, found: Improvement) -> None:
+def show_ladder(console: Console, problem: Problem, found: Improvement, word: LastWord | None = None) -> None:
     # Errors on motions that were not fitted are no continuation of those on other windows of the same ones.
-    several = len(found.cuts) > 1
+    several, named = len(found.cuts) > 1, str if word is None else in_turn
+    apart = [] if word is None else [[word.problem.told(s.error)] for s in word.steps]
     rows = [
-        (step_phrase(r, problem), problem.told(r.error_fit), problem.told(r.error_heldout), *([r.held_out] * several))
-        for r in found.ladder
-    ]
+        (step_phrase(r, problem), problem.told(r.error_fit), problem.told(r.error_heldout), *beside,
+         *([named(r.held_out)] * several))
+        for r, beside in zip(found.ladder, apart or [[]] * len(found.ladder), strict=True)
+    ]  # fmt: skip
     # What comes later changes the values of what came first.
     step = "step, with its values then" if sum(bool(r.added) for r in found.ladder) > 1 else "step"
-    columns = ((step, False), ("fitted", True), ("held out", True), *([("what was held out", False)] * several))
-    of = f"; held out: {found.cuts[0]}" if len(found.cuts) == 1 else ""
+    held = ["held out"] if not apart else ["held out\nin turn", "held out\nfrom all"]
+    more = [("what was held out", False)] * several
+    columns = ((step, False), ("fitted", True), *((name, True) for name in held), *more)
+    of = (
+        ""
+        if len(found.cuts) != 1
+        else f"; held out: {found.cuts[0]}"
+        if word is None
+        else f"; {in_turn(found.cuts[0])}"
+    )
     table = _table(f"The ladder: {problem.natural_name}{of}", columns, rows)
     table.add_section()
-    table.add_row("noise floor", "", problem.told(found.noise_floor))
+    floors = [problem.told(found.noise_floor), *([] if word is None or not apart else [word.problem.told(word.floor)])]
+    table.add_row("noise floor", "", *floors)
     console.print(table)
     _show_values(console, found.terms, found.parameters, problem.robot)
 
