@@ -137,6 +137,8 @@ class Problem(ABC):
     """Whether effects without a parameter (a part that is lost) can be told in this way of comparing."""
     gained: float = 0.0
     """Energy that the most promising effect took off an untouched robot (from calibration)."""
+    shared_by_trials: str = ""
+    """Why a trial has another error by itself than beside these others, for people; empty: it has the same."""
     unjudged: tuple[str, ...] = ()
     """Joints that move, but at which nothing is compared: what several joints share is looked for at the others."""
     calibrated: bool = False

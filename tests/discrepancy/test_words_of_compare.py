@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
+
+from rich.console import Console
+from way_samples import measured, problem_by, samples
 
 from ee_dist.discrepancy.accounts.account import Account
 from ee_dist.discrepancy.accounts.of_compare import compare_account
+from ee_dist.discrepancy.compare import compare
 from ee_dist.discrepancy.evidence.left import Leftover
+from ee_dist.discrepancy.last_word import last_word
 from ee_dist.discrepancy.meters import AtLimit
+from ee_dist.discrepancy.ways.force_balance.problem import OF_ALL_TRIALS as FORCE_OF_ALL
+from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
+from ee_dist.discrepancy.ways.open_loop.problem import OF_ALL_TRIALS as CHANNELS_OF_ALL
 from ee_dist.robots.servo_pendulum import servo_pendulum
+from ee_dist.tasks.results.sections import last_word_section, trials_section
+from ee_dist.tasks.results.tables import show_last_word
 
 
 def compared(
@@ -27,6 +38,7 @@ def compared(
         unsure=[], at_limit=list(at_limit),
     )  # fmt: skip
     problem = SimpleNamespace(
+        shared_by_trials="",
         robot=servo_pendulum(),
         told=str,
         natural=lambda e: e**2,
@@ -82,3 +94,28 @@ def test_of_many_trials_those_that_part_soonest_are_told() -> None:
 
     assert "noise: 1. t0 at 9.00 s; 2. t1 at 8.00 s; 3. t2 at 7.00 s." in said(3)
     assert "in 8 trials, soonest in 8. t7 at 2.00 s; 7. t6 at 3.00 s; 6. t5 at 4.00 s (all in summary.json" in said(8)
+
+
+def test_a_trial_that_has_another_error_by_itself_says_why() -> None:
+    """Of a share of the force of all trials a gentle one has little."""
+    slow, robot = measured("arm")[0], samples()["arm"].robot
+    assert slow.log.torques is not None
+    lively = replace(slow, name="lively", log=replace(slow.log, torques=5.0 * slow.log.torques))
+    both, alone = ForceBalance((slow, lively), robot), ForceBalance((slow,), robot)
+    first = [p.natural(compare(p, p.residuals([()])[0]).trial_errors[0]) for p in (both, alone)]
+    assert first[0] < 0.5 * first[1]
+    for problem, told in ((both, True), (alone, False)):
+        found = compare(problem, problem.residuals([()])[0])
+        assert (FORCE_OF_ALL in compare_account(problem, found, []).lines) is told
+        assert trials_section(problem, found).caption == (FORCE_OF_ALL if told else "")
+        word = last_word([problem, problem], [(), ()], problem.compared)
+        assert (FORCE_OF_ALL in last_word_section(word).caption) is told
+        console = Console(width=500, record=True)
+        show_last_word(console, word)
+        assert (FORCE_OF_ALL in console.export_text()) is told
+
+
+def test_trials_by_commands_are_weighed_by_the_channels_of_all_of_them() -> None:
+    trials, robot = measured("arm"), samples()["arm"].robot
+    assert problem_by("open_loop", trials, robot).shared_by_trials == CHANNELS_OF_ALL
+    assert problem_by("open_loop", trials[:1], robot).shared_by_trials == ""

@@ -34,6 +34,7 @@ def compare_account(problem: Problem, found: Comparison, left: Sequence[Leftover
     ratio = found.error / found.noise_floor if found.noise_floor else float("inf")
     off = problem.told(found.error)
     lines = [f"Error: {found.definition}. Noise floor: {found.floor_source}.", *assumed_text(problem.robot)]
+    lines += [problem.shared_by_trials] * bool(problem.shared_by_trials)
     lines += beside_floor(found.error, found.noise_floor, bool(left))
     first = zip(problem.numbers, problem.trials, found.parted_s.values(), strict=False)
     lines.append(f"{PARTS}: {_parted([(s, f'{k}. {t} at {s:.2f} s') for k, t, s in first if s is not None])}.")

@@ -263,13 +263,14 @@ def trials_section(problem: Problem, found: Comparison) -> Section:
         drawn(problem, found.noise_floor),
     )
     table = Table(["trial", problem.natural_name], rows, (1,))
-    return Section("By trial", "", figure, table, legend=[(MODEL, figures.PREDICTED)])
+    return Section("By trial", problem.shared_by_trials, figure, table, legend=[(MODEL, figures.PREDICTED)])
 
 
 def last_word_section(word: LastWord) -> Section:
     """The models on trials that took no part in the search."""
     head, rows = last_word_rows(word)
     caption = f"Nothing was fitted to these, nor chosen by them. Noise floor: {word.problem.told(word.floor)}."
+    caption = " ".join(t for t in (caption, word.problem.shared_by_trials) if t)
     return Section(HELD_APART, caption, table=Table(head, rows, tuple(range(1, len(head)))))
 
 

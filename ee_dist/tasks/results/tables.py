@@ -108,14 +108,8 @@ def show_ladder(console: Console, problem: Problem, found: Improvement, word: La
     held = ["held out"] if not apart else ["held out\nin turn", "held out\nfrom all"]
     more = [("what was held out", False)] * several
     columns = ((step, False), ("fitted", True), *((name, True) for name in held), *more)
-    of = (
-        ""
-        if len(found.cuts) != 1
-        else f"; held out: {found.cuts[0]}"
-        if word is None
-        else f"; {in_turn(found.cuts[0])}"
-    )
-    table = _table(f"The ladder: {problem.natural_name}{of}", columns, rows)
+    of = [f"held out: {cut}" if word is None else in_turn(cut) for cut in found.cuts] if len(found.cuts) == 1 else []
+    table = _table("; ".join([f"The ladder: {problem.natural_name}", *of]), columns, rows)
     table.add_section()
     floors = [problem.told(found.noise_floor), *([] if word is None or not apart else [word.problem.told(word.floor)])]
     table.add_row("noise floor", "", *floors)
@@ -137,7 +131,10 @@ def show_last_word(console: Console, word: LastWord | None) -> None:
         return
     head, rows = last_word_rows(word)
     numeric = [False, *(True for _ in head[1:])]
-    console.print(_table(f"{HELD_APART}: {word.problem.natural_name}", list(zip(head, numeric, strict=True)), rows))
+    table = _table(f"{HELD_APART}: {word.problem.natural_name}", list(zip(head, numeric, strict=True)), rows)
+    console.print(table)
+    if word.problem.shared_by_trials:
+        console.print(word.problem.shared_by_trials, highlight=False, markup=False)
 
 
 def last_word_rows(word: LastWord) -> tuple[list[str], list[list[str]]]:

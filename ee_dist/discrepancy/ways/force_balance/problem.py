@@ -38,6 +38,10 @@ LOADED = 0.1
 """Share of a drive's torque that its load must be in some motion, for friction by load to be looked for."""
 BY_LOAD = (*LOADS, "stribeck_load_speed")
 """Fields of a drive that are friction by load."""
+OF_ALL_TRIALS = (
+    "Each trial's error is a share of the force that was measured in all of these trials; by itself, or beside others, the same "
+    "trial has another."
+)
 LEAST_NOISE = 0.002
 """Share of the force below which no difference counts, noise or not."""
 
@@ -96,6 +100,7 @@ class ForceBalance(Problem):
         self.sure_noise = np.sqrt(np.maximum(told.sure, LEAST_NOISE**2)) / self.noise_share
         """(J,): the same of what is noise beyond doubt; the rest may be a force that changes quickly."""
         self.scale = self.size * self.noise_share
+        self.shared_by_trials = OF_ALL_TRIALS if len(trials) > 1 else ""
         self._lay_out(forces)
         p, smooth = self.processing, self.processing.filter_for(pace_s)
         self.error_definition = (

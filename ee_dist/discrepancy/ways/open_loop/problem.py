@@ -70,6 +70,12 @@ AT_ONCE = 16
 """Values that a contact or a reversal is in."""
 
 
+OF_ALL_TRIALS = (
+    "Each trial's error is weighed by the noise and the spans of the channels in all of these trials; by itself, or beside "
+    "others, the same trial may have another."
+)
+
+
 class OpenLoop(Problem):
     """Open loop: the model gets the recorded commands and nothing else.
 
@@ -110,6 +116,7 @@ class OpenLoop(Problem):
         self.window = max(1, window // self.block) * self.block
         block, window = self.block, self.window
         self._members, self._before = members, before
+        self.shared_by_trials = OF_ALL_TRIALS if len(self.measured) > 1 else ""
         self._set_ups = SetUps()
         self.scale = scale or channel_scale(robot, self.measured)
         self._unmodelled, self.gained, self.calibrated = unmodelled or {}, gained, unmodelled is not None
