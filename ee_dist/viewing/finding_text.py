@@ -89,7 +89,7 @@ def ladder_table(found: Finding) -> list[str]:
     apart = any(r.error_apart is not None for r in found.ladder)
     all_of_it, rule, none = (" held out from all of it |", "---|", " |") if apart else ("", "", "")
     lines = [
-        f"| # | error held out{_unit(found)} | from 0 | in the fit |{all_of_it} model |",
+        f"| # | error held out{' in turn' if apart else ''}{_unit(found)} | from 0 | in the fit |{all_of_it} model |",
         f"|---|---|---|---|{rule}---|",
     ]
     for k, rung in enumerate(found.ladder):

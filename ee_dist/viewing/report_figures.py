@@ -214,7 +214,7 @@ def ladder(
         figure.add_scatter(
             x=places[part],
             y=list(heldout[part]),
-            name="held out",
+            name="held out" if apart is None else "held out in turn",
             legendgroup="held out",
             showlegend=part.start == 0,
             mode="lines+markers+text",

@@ -67,10 +67,11 @@ def test_trials_held_out_from_all_of_it_have_a_column_and_a_line_of_their_own() 
     assert "from all" not in shown(found)
     figure = ladder(["a", "b", "c"], [3.0, 2.0, 1.0], [3.1, 2.1, 1.1], [MOTIONS] * 3, 0.5, apart=[7.25, np.inf, 3.6])
     (line,) = (t for t in figure.data if t.name == "held out from all of it")
+    assert "held out in turn" in {t.name for t in figure.data} and "held out" not in {t.name for t in figure.data}
     assert list(line.y) == [7.25, None, 3.6] and figure.layout.yaxis.range[1] > 7.25
     rungs = tuple(Drawn("m", e, e, MOTIONS, s.error) for e, s in zip((3.1, 2.1, 1.1), steps, strict=True))
     table = ladder_table(SimpleNamespace(ladder=rungs, floor=0.5, unit="mrad"))  # type: ignore[arg-type]
-    assert "held out from all of it" in table[0] and " 7.25 |" in table[2]
+    assert "error held out in turn" in table[0] and "held out from all of it" in table[0] and " 7.25 |" in table[2]
     assert len({line.count("|") for line in table[:6]}) == 1, "as many cells in each row"
 
 
