@@ -101,6 +101,27 @@ def test_torques_with_a_sign_are_kept(tmp_path: Path) -> None:
     assert [c for c in proposal.choices if c.group == "torques"]
 
 
+def test_sizes_are_told_of_joints_that_rest_most_of_the_time(tmp_path: Path) -> None:
+    """They go there in half a second, and back after twelve: what the motion needs is of both signs only while it goes on."""
+    files = write(tmp_path / "run")
+    t = np.arange(ROWS) * STEP_S
+    place = 0.3 * (np.tanh(6 * (t - 3)) - np.tanh(6 * (t - 15)))
+    for name, late_s in (("control", 0.0), ("state_motor", 0.05)):
+        file = tmp_path / "run" / f"{name}.csv"
+        table = pd.read_csv(file)
+        q = np.interp(t - late_s, t, place)[:, None] * np.array([1, -1, 1, -1])  # the last link hangs straight down
+        w = np.gradient(q, t, axis=0)
+        table["positions"] = [json.dumps(row) for row in q.round(5).tolist()]
+        if name == "state_motor":
+            torque = np.abs(0.05 * np.gradient(w, t, axis=0) + 0.2 * np.tanh(10 * w))
+            table["velocities"] = [json.dumps(row) for row in w.round(5).tolist()]
+            table["torques"] = [json.dumps(row) for row in torque.round(5).tolist()]
+        table.to_csv(file, index=False)
+    proposal, _ = proposed(tmp_path, files)
+    assert not [c for c in proposal.choices if c.group == "torques"]
+    assert any("never change sign" in n for n in proposal.notes)
+
+
 @pytest.mark.parametrize(
     ("other", "same"),
     [

@@ -16,14 +16,15 @@ from ee_dist.measurements.proposal.torque_shares import FAR, led
 from ee_dist.measurements.proposal.view import Scored, View
 from ee_dist.measurements.proposal.words import CURRENT, TORQUE
 from ee_dist.robots.instruments import MOTOR_TORQUE
+from ee_dist.trials.log import Array
 
 ROUGHER = 1.15
 """What was measured is rougher than what was asked for, by this factor or more."""
 CLEARLY, WELL = 0.3, 0.3
 """Another order of the joints is asked for if it leaves less than this share of what the robot's leaves, and of all."""
 BOTH_WAYS, OFTEN = 0.1, 0.05
-"""A motion needs torques of both signs where this share of the largest is passed, either way, in this share of the time."""
-
+"""A motion needs torques of both signs where this share of the largest is passed, either way, in this share of the time that
+the joint moves; it moves both ways from this share of its highest speed on. While it rests its weight alone is seen."""
 GOES, HALF = 0.8, 0.5
 """Correlation with what the motion needs from which numbers without a name go with it, if it leaves less than this share of what
 the positions leave unexplained."""
@@ -161,10 +162,16 @@ def _unsigned(v: View, block: Block) -> bool:
     if v.needed is None:
         # What stands on a floor needs nobody knows what, but not one sign at all of many joints that move to and fro.
         return int(sum(signals.moves(c) for c in values.T)) >= MANY and float(np.abs(values).min()) == 0.0
-    needed = v.needed[0]
-    strong = np.abs(needed) > BOTH_WAYS * np.abs(needed).max(axis=0)
-    moved = [k for k in range(len(v.joints)) if signals.moves(values[:, k])]
-    return any(min((strong & (sign * needed > 0))[:, k].mean() for sign in (1, -1)) > OFTEN for k in moved)
+    given = (k for k in range(len(v.joints)) if signals.moves(values[:, k]))
+    return any(_both_signs(*(x[:, k] for x in v.needed)) for k in given)
+
+
+def _both_signs(needed: Array, speed: Array) -> bool:
+    """Whether a joint that moves both ways needs torques (T,) of both signs for it; its friction does in any case."""
+    going = np.abs(speed) > BOTH_WAYS * np.abs(speed).max()
+    strong = needed[going] / max(float(np.abs(needed).max()), 1e-30)
+    ways = (speed[going] > 0).any() and (speed[going] < 0).any()
+    return bool(ways and min((sign * strong > BOTH_WAYS).mean() for sign in (1, -1)) > OFTEN)
 
 
 def _as_torques(v: View, block: Block) -> tuple[float, list[str]]:
