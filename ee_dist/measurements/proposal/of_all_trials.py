@@ -15,7 +15,7 @@ from ee_dist.measurements import signals
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.mapping_file import mapping_of
 from ee_dist.measurements.not_recorded import COMPARED, recorded_in
-from ee_dist.measurements.proposal.model import UNKNOWN, Choice, Proposal
+from ee_dist.measurements.proposal.model import SURE, UNKNOWN, Choice, Proposal
 from ee_dist.measurements.table import Recorded
 from ee_dist.measurements.trials import trials_of
 from ee_dist.robots.model import Robot
@@ -32,13 +32,14 @@ def tell_of_all_trials(proposal: Proposal, files: Sequence[Path], places: Mappin
     if not asked:
         return
     trials = _trials(proposal, files)
+    _leave_out_zeros(proposal, trials, robot)
     told = {c.name: c for c in proposal.choices if c.group == "commands" and _obeys(c.name, robot) == "position"}
     said = []
     for c in proposal.choices:
         if _column(c) in places:
             said.append(_not_everywhere(c, told.get(_position_of(c, robot)), trials, places, robot))
         else:
-            said.append(_moving(c, trials) if c.still else c)
+            said.append(_moving(c, trials) if c.still and c.entry else c)
     proposal.choices = said
     held = [c for c in proposal.choices if c.entry and "held" in c.entry and _position_of(c, robot)]
     pushed = [
@@ -59,6 +60,31 @@ def tell_of_all_trials(proposal: Proposal, files: Sequence[Path], places: Mappin
     left = [_column(c) for c in asked if _column(c) in places and c.group not in HELD]
     if left:
         proposal.notes.append(f"left out, since not all trials have them: {listed(left)}")
+
+
+def _leave_out_zeros(proposal: Proposal, trials: Sequence[Recorded], robot: Robot) -> None:
+    """Leaves out torques that are 0 in every row of all trials: a message has a place for each joint, also for those without a
+    sensor. Of a drive that obeys torques it may be what was asked."""
+    zeros = {
+        c.name: _column(c)
+        for c in proposal.choices
+        if c.group == "torques" and c.still and _obeys(c.name, robot) != "torque" and _is_zero(c, trials)
+    }
+    if not zeros:
+        return
+    every = "every row" if len(trials) == 1 else f"every row of all {len(trials)} trials"
+    why = f"0 in {every}, and so left out"
+    proposal.choices = [
+        replace(c, entry=None, sure=SURE, why=why) if c.group == "torques" and c.name in zeros else c
+        for c in proposal.choices
+    ]
+    proposal.notes.append(f"left out, as it is 0 in {every}, and no torque was measured: {listed(zeros.values())}")
+
+
+def _is_zero(choice: Choice, trials: Sequence[Recorded]) -> bool:
+    """Whether a column holds numbers, and all are 0."""
+    every = [values for t in trials if (values := _numbers(choice, t)) is not None and len(values)]
+    return bool(every) and not any(values.any() for values in every)
 
 
 def _trials(proposal: Proposal, files: Sequence[Path]) -> list[Recorded]:

@@ -101,7 +101,8 @@ def torque_units(v: View, block: Block) -> UnitChoice:
         return UnitChoice((), UNKNOWN, "a current whose gain cannot be estimated")
     if current:
         v.gained.append(block.name)
-    entries, turned, unclear, checked = [], [], [], 0
+    entries, checked = [], 0
+    own: dict[int, str] = {}
     shares: dict[int, Share] = {}
     # What a joint that hardly moves is given is friction alone.
     telling = signals.lively(v.position.block.values)
@@ -125,7 +126,7 @@ def torque_units(v: View, block: Block) -> UnitChoice:
             # Turned only where the size, too, is what the motion needs: a model far off can run against any torque.
             if fit < -0.9 and 0.5 < size < 2:
                 entry["sign"] = -1
-                turned.append(v.joints[k].name)
+                own[k] = "sign turned: it was against what the motion needs"
                 shares = {i: Share(size, s.fit) if i == k else s for i, s in shares.items()}
             elif fit < -0.7 and 0.5 < size < 2:
                 v.out.ask(
@@ -133,7 +134,10 @@ def torque_units(v: View, block: Block) -> UnitChoice:
                     f"(correlation {fit:.2f}); if it does, add 'sign: -1' to it in the mapping"
                 )
             else:
-                unclear.append(v.joints[k].name)
+                own[k] = (
+                    "sign not clear, kept as it is: the model needs the other, but not this much (or the joint turns the other "
+                    "way than described, which explain asks for)"
+                )
         entries.append(entry)
     tell_shares(v, block, shares, current)
     # A unit is that of all joints: at one alone friction may be many times what a slow motion needs.
@@ -155,11 +159,6 @@ def torque_units(v: View, block: Block) -> UnitChoice:
     unlike = relations is not None and fit_nowhere([relations[k] for k in telling])
     usual = ", the usual unit; " + ("they go with what the motion needs at no joint" if unlike else "not checked")
     why = said if current else entries[0]["unit"] + (", as large as the motion needs" if checked else usual)
-    if turned:
-        why += f"; sign turned at {', '.join(turned)}: it was against what the motion needs"
-    if unclear:
-        why += f"; sign at {', '.join(unclear)} not clear, kept as it is: the model needs the other, but not this much"
-        why += " (or the joint turns the other way than described, which explain asks for)"
     stated_all = all(u in ("N.m", "mN.m", "N", "mN") for u in block.units) if block.units else False
     stated_all = stated_all or (current and v.hints.gains != FIT)
-    return UnitChoice(tuple(entries), SURE if stated_all and not turned and not unclear else LIKELY, why)
+    return UnitChoice(tuple(entries), SURE if stated_all and not own else LIKELY, why, own)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -38,11 +38,13 @@ CALIBRATED = (
 
 @dataclass(frozen=True)
 class UnitChoice:
-    """Entries for the mapping (unit, scale, offset), one a joint; how sure, and why; None where a person must say."""
+    """Entries for the mapping (unit, scale, offset), one a joint; how sure, and why; None where a person must say. ``own``: what
+    is said of single joints besides, by their places."""
 
     entries: tuple[dict[str, Any], ...]
     sure: str
     why: str
+    own: Mapping[int, str] = field(default_factory=dict)
 
 
 def position_units(block: Block, joints: Sequence[Joint], hints: Hints) -> UnitChoice:

@@ -220,8 +220,9 @@ class View:
             how = "the last value holds" if group == "commands" else "filled by straight lines"
             filled = f"; {empty} of {len(block.table)} cells are empty, {how}" if empty else ""
             anew = f"; begins anew after {block.rounds[k]:g}" if block.rounds and block.rounds[k] else ""
+            own = f"; {units.own[k]}" if k in units.own else ""
             self.out.choices.append(
-                Choice(group, name, self.entry(block, k, more) | which, level, text + anew + filled, still)
+                Choice(group, name, self.entry(block, k, more) | which, level, text + own + anew + filled, still)
             )
 
     def sensor_names(self, kind: str) -> list[str]:
