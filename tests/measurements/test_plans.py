@@ -106,7 +106,15 @@ def test_letters_in_pairs_only() -> None:
 
 @pytest.mark.parametrize(
     ("name", "kind", "command"),
-    [("qdes1", POSITION, True), ("cmdpos_2", POSITION, True), ("posact3", POSITION, False), ("torque", "torque", None)],
+    [
+        ("qdes1", POSITION, True),
+        ("cmdpos_2", POSITION, True),
+        ("posact3", POSITION, False),
+        ("torque", "torque", None),
+        ("jointacttorque_1", "torque", False),
+        ("motorcurrent2", "current", None),
+        ("jointstate", None, None),
+    ],
 )
 def test_words_that_are_glued_together(name: str, kind: str, command: bool | None) -> None:
     assert (read_name(name).kind, read_name(name).command) == (kind, command)

@@ -172,10 +172,18 @@ def quantity_of(word: str) -> str | None:
     return kind if kind in (POSITION, SPEED, TORQUE, CURRENT) else None
 
 
+_OF = ("joint", "jnt", "motor", "axis")
+"""What a name may say that a quantity is of, in one word with it."""
+
+
 def _unglued(word: str) -> tuple[str, ...]:
-    """qdes is q and des; cmdpos is cmd and pos; other words are one."""
+    """qdes is q and des; cmdpos is cmd and pos; jointacttorque is joint, act and torque; other words are one."""
     if word in _KIND or word in _ROLES:
         return (word,)
+    for owner in _OF:
+        rest = word.removeprefix(owner)
+        if rest not in ("", word) and (quantity_of(rest) or len(_unglued(rest)) > 1):
+            return owner, *_unglued(rest)
     for k in range(1, len(word)):
         first, second = word[:k], word[k:]
         if any(quantity_of(a) and b in _ROLES for a, b in ((first, second), (second, first))):
