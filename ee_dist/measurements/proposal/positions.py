@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from ee_dist.measurements.proposal.units import counts
 from ee_dist.measurements.proposal.view import TIED, Scored, View, can_be
 from ee_dist.measurements.proposal.words import POSITION, SPEED, TIME, read_name, tokens
 
+ITS_RATE = 0.95
+"""Correlation with the change of others from which numbers are their rate, and so no positions."""
 MORE = 2
 """Columns of a quantity beside those of the joints that may be called as these are."""
 
@@ -22,6 +25,7 @@ MORE = 2
 def ranked_positions(v: View) -> list[Scored]:
     """Blocks that could be the positions, the best first."""
     found = []
+    rate_of: dict[tuple[str, ...], Block] = {}
     for b in v.blocks:
         r = b.reading
         if (r.kind not in (POSITION, None) and not r.weak) or not v.moves(b):
@@ -44,9 +48,20 @@ def ranked_positions(v: View) -> list[Scored]:
         rates = [(v.derivative(b, s).correlation, s) for s in v.blocks if s is not b and can_be(s, SPEED)]
         best = max(rates, key=lambda x: x[0] if x[1].reading.command is not True else 0.0, default=(0.0, b))
         if best[0] > 0.9:
+            rate_of[_key(b)] = best[1]
             score, why = score + 2 + best[0], [*why, f"its change is {best[1].name} (correlation {best[0]:.3f})"]
         found.append(Scored(b, score, why))
-    return _told_by_lead(v, sorted(found, key=lambda s: -s.score))
+    found = [s for s in found if not _is_a_rate(v, s.block)] or found
+    return _told_by_lead(v, sorted(found, key=lambda s: -s.score), rate_of)
+
+
+def _is_a_rate(v: View, block: Block) -> bool:
+    """Whether numbers that nobody calls positions are the change of others, in whatever unit: of a position, its plan and their
+    rates, in columns without names, the last go with one another as the first do."""
+    if block.how == BY_SENSOR or (block.reading.kind == POSITION and not block.reading.weak):
+        return False
+    of = (b for b in v.blocks if b is not block and can_be(b, POSITION) and v.moves(b))
+    return any(v.derivative(b, block).correlation > ITS_RATE for b in of)
 
 
 def _called_by_joints(block: Block) -> bool:
@@ -56,9 +71,10 @@ def _called_by_joints(block: Block) -> bool:
     return silent and all(read_name(name).kind in (POSITION, TIME, None) for name in names)
 
 
-def _told_by_lead(v: View, found: list[Scored]) -> list[Scored]:
+def _told_by_lead(v: View, found: list[Scored], rate_of: Mapping[tuple[str, ...], Block]) -> list[Scored]:
     """Of two that could both be the positions, the one that follows the other was measured, and the one with noise where the
-    other has none. Where these say opposite things neither is clearly the better, and a person is asked."""
+    other has none, or whose rate (``rate_of`` a table's columns) has it where that of the other has none: a fine encoder shows it
+    there. Where these say opposite things neither is clearly the better, and a person is asked."""
     for one in found[:4]:
         for other in found[:4]:
             if one is other or one.block.reading.command is not None:
@@ -67,7 +83,9 @@ def _told_by_lead(v: View, found: list[Scored]) -> list[Scored]:
             if ahead.correlation <= 0.9:
                 continue
             # However much else speaks for a plan, that its change was logged, too, makes no measurement of it.
-            noisy = other.block.reading.command is None and v.planned_beside(other.block, one.block)
+            noisy = other.block.reading.command is None and any(
+                v.planned_beside(plan, measured) for plan, measured in _with_rates(other.block, one.block, rate_of)
+            )
             near = noisy or abs(one.score - other.score) < TIED + 1
             if noisy:
                 one.score += 1.5
@@ -76,6 +94,17 @@ def _told_by_lead(v: View, found: list[Scored]) -> list[Scored]:
                 one.score += 1.5
                 one.why.append(f"follows {other.block.name} by {1e3 * ahead.lead_s:.0f} ms")
     return sorted(found, key=lambda s: -s.score)
+
+
+def _key(block: Block) -> tuple[str, ...]:
+    return (block.table.name, *block.columns)
+
+
+def _with_rates(a: Block, b: Block, rate_of: Mapping[tuple[str, ...], Block]) -> list[tuple[Block, Block]]:
+    """Two blocks, and the rates of the two where each has one of its own."""
+    rates = rate_of.get(_key(a)), rate_of.get(_key(b))
+    own = rates[0] is not None and rates[1] is not None and rates[0] is not rates[1]
+    return [(a, b), *([(rates[0], rates[1])] if own else [])]  # type: ignore[list-item]
 
 
 def ask_for_positions(v: View) -> None:

@@ -71,11 +71,21 @@ def add_speeds(v: View) -> None:
 
 
 def _measured(v: View, found: list[Scored]) -> list[Scored]:
-    """Those that are not the rate of what was asked for, where another is there that is not."""
+    """Those that are not the rate of what was asked for, where another is there that is not; else those with noise, where it is
+    told of the others that they have none."""
     good = [s for s in found if s.score >= 3]
     asked = [s for s in good if was_asked_for(v, s.block)] if len(good) > 1 else []
-    if not asked or len(asked) == len(good):
+    if len(asked) == len(good):
         return found
+    if not asked:
+        silent = [s for s in good if s.block.reading.command is None]
+        smooth = [s for s in silent if any(v.planned_beside(s.block, o.block) for o in good if o is not s)]
+        for s in good:
+            if smooth and s not in smooth:
+                s.why.append(
+                    f"carries noise, which {' and '.join(o.block.name for o in smooth)} does not: planned or smoothed"
+                )
+        return [s for s in found if s not in smooth]
     for s in good:
         if s not in asked:
             names = " and ".join(a.block.name for a in asked)
