@@ -22,10 +22,10 @@ from ee_dist.measurements.mapping import Column, Estimated, Given, Mapping
 from ee_dist.measurements.not_recorded import Stood, with_those_that_stood
 from ee_dist.measurements.on_grid import OnGrid
 from ee_dist.measurements.reading import holes_told, told_of
-from ee_dist.measurements.report import COMMAND, Report, in_one_line, without_rest
-from ee_dist.measurements.robot_channels import check_names
+from ee_dist.measurements.report import COMMAND, ENDS, Report, in_one_line, without_ends, without_rest
+from ee_dist.measurements.robot_channels import check_names, command_kind
 from ee_dist.measurements.sampling import LowPass
-from ee_dist.measurements.standing import told_to_rest
+from ee_dist.measurements.standing import dwells, told_to_rest
 from ee_dist.measurements.table import LARGEST, Recorded
 from ee_dist.measurements.trials import trials_of
 from ee_dist.recording.records import HARDWARE, TrialRecord
@@ -100,6 +100,7 @@ class _Import:
         torques = self.led.torques()
         commands = self.led.commands(torques, why)
         self._tell_of_rest(commands, positions)
+        self._clear_who_dwells(commands)
         self.report.suspicious = in_one_line(self.report.suspicious)
         self.led.on_one_turn(commands, self.channels)
         supply = None
@@ -189,6 +190,18 @@ class _Import:
         self.report.suspicious = without_rest(self.report.suspicious, [*still, *(f"{COMMAND} {j}" for j in rest)])
         if read := [j for j in rest if j not in self.stood.joints]:
             self.report.done.append(f"not moved in this trial, as told: {listed(read)}")
+
+    def _clear_who_dwells(self, commands: Array) -> None:
+        """No position is told to be clipped that rests where its command goes no farther."""
+        told = {d.joint: k for k, d in enumerate(self.robot.drives) if command_kind(d) == "position"}
+        for s in self.robot.sensors:
+            column = self.mapping.sensors.get(s.name)
+            if s.kind != "position" or s.target not in told or not isinstance(column, Column):
+                continue
+            turned = column.sign * column.scale < 0  # the lines are on the numbers of the file
+            for end, highest in zip(ENDS, (not turned, turned), strict=True):
+                if dwells(commands[:, told[s.target]], self.channels[s.name], highest):
+                    self.report.suspicious = without_ends(self.report.suspicious, s.name, end)
 
     def _settings(self) -> Hypothesis:
         found = []

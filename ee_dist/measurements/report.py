@@ -10,6 +10,8 @@ TORQUE = "torque of"
 """How the report names what a drive gave, before its joint."""
 COMMAND, STUCK_AT, MANY = "command of", ": stuck at ", 3
 """How it names commands, what it says of a channel that never changes, and of how many of them in one line."""
+CLIPPED, ENDS = ": clipped? ", ("highest", "lowest")
+"""What it says of a channel that is long at an end of its readings, and what it calls the two."""
 ROUNDING = 1e-12
 """Share of the larger end of a range below which the other end is what rounding left."""
 
@@ -50,6 +52,11 @@ def in_one_line(suspicious: Sequence[str]) -> list[str]:
 def without_rest(suspicious: Sequence[str], channels: Collection[str]) -> list[str]:
     """The lines, without those on ``channels`` that never change because nobody moved them."""
     return [s for s in suspicious if STUCK_AT not in s or not s.startswith(tuple(f"{c} (" for c in channels))]
+
+
+def without_ends(suspicious: Sequence[str], channel: str, end: str) -> list[str]:
+    """The lines, without that on a channel that is long at an ``end`` of its readings."""
+    return [s for s in suspicious if not (s.startswith(f"{channel} (") and CLIPPED in s and f"the {end} value" in s)]
 
 
 def describe(reports: Sequence[Report]) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ee_dist.basics.runs import runs
 from ee_dist.measurements.units import TURNS_ON
 from ee_dist.robots.model import Joint, Robot
 from ee_dist.trials.log import Array
@@ -22,6 +23,9 @@ ASKED = 0.01
 """and goes through more than this share of it."""
 ROUNDING = 1e-9
 """Share of the largest reading below which two that differ are one."""
+GOES_ON, MOSTLY = 0.05, 0.5
+"""Share of its command's way by which that goes on after a joint came to an end of its readings, if these are cut off, and of the
+rows at that end in which it does not, if the joint rests there."""
 
 
 def stands_still(asked: Array, seen: Array, reach: float) -> bool:
@@ -45,6 +49,19 @@ def reach_of(joint: Joint) -> float:
     """How far from zero a joint gets; of one that turns without an end, by a few turns."""
     reach = max(abs(joint.lower), abs(joint.upper))
     return reach if reach > 0 and math.isfinite(reach) else TURNS_ON if joint.kind == "hinge" else math.inf
+
+
+def dwells(asked: Array, seen: Array, highest: bool) -> bool:
+    """Whether a joint rests at the highest (or lowest) of its readings (T,) because its command (T,) goes no farther: it stays
+    there, or turns, and friction holds the joint. Of a signal that is cut off the command goes on."""
+    way = float(np.nanmax(asked) - np.nanmin(asked)) if np.isfinite(asked).any() else 0.0
+    stays = runs(seen == (seen.max() if highest else seen.min()))
+    resting = 0
+    for first, last in stays:
+        told = (1.0 if highest else -1.0) * asked[first:last][np.isfinite(asked[first:last])]
+        if len(told) and told.max() - told[0] < GOES_ON * way:
+            resting += last - first
+    return resting > MOSTLY * sum(last - first for first, last in stays)
 
 
 def told_to_rest(robot: Robot, commands: Array, position_of: Mapping[str, Array]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ee_dist.basics.quoted import quoted
 from ee_dist.basics.runs import runs
 from ee_dist.measurements import signals
-from ee_dist.measurements.report import STUCK_AT
+from ee_dist.measurements.report import CLIPPED, STUCK_AT
 from ee_dist.measurements.units import TURN, TURNS_ON, UNITS
 from ee_dist.trials.log import Array
 
@@ -72,7 +72,7 @@ def suspicions(name: str, values: Array, turn: float = TURN, asked: bool = False
         at = values == edge
         share = float(np.mean(at))
         if share > CLIPPED_SHARE and len(np.unique(values)) > 20 and _cut_off(values, at, spread):
-            found.append(f"{name}: clipped? {100 * share:.0f} % of the rows are at the {what} value, {edge:.6g}")
+            found.append(f"{name}{CLIPPED}{100 * share:.0f} % of the rows are at the {what} value, {edge:.6g}")
     jump = float(np.max(np.abs(np.diff(values))))
     for bits in COUNTERS:
         size = float(2**bits)

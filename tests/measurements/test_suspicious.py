@@ -105,6 +105,22 @@ def test_goals_that_rest_where_they_go_are_not_clipped(tmp_path: Path, way_s: fl
     assert [s.split(" (")[0] for s in report.suspicious if "clipped" in s] == ["position_elbow", "position_elbow"]
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("stays", [0.5, 0.497])
+def test_a_joint_that_dwells_where_its_command_ends_is_not_clipped(tmp_path: Path, sign: int, stays: float) -> None:
+    """Its encoder is coarse, so that all readings there are one, though its command turns slowly; the elbow's are cut off
+    while its command goes on."""
+    times = [0, 2, 4, 4.5, 5.5, 6, 8, 10, 12, 14]
+    goal = sign * np.interp(T[:1400], times, [0, 0.5, stays, -0.2, -0.2, 0.5, stays, 0, 0.5, 0.5])
+    follows = np.round(signal.lfilter([0.1], [1, -0.9], goal) / 0.01) * 0.01
+    other = np.clip(np.sin(T[:1400]), -0.8, 0.8)
+    positions = np.stack([follows, other], axis=1)
+    assert any("clipped" in s for s in suspicions("x", follows)), "by itself it may be"
+    frame = logs.frame_of(T[:1400], positions, np.stack([goal, np.sin(T[:1400])], axis=1))
+    _, report = logs.imported(tmp_path, logs.written(tmp_path, frame))
+    assert {s.split(" (")[0] for s in report.suspicious if "clipped" in s} == {"position_elbow"}
+
+
 def test_units_and_signs() -> None:
     assert "ms" in str(time_suspicion(5.0, 30000, "s"))
     assert time_suspicion(0.55, 5.0, "s") is None, "nobody keeps 5 ms of a motion"
