@@ -106,6 +106,23 @@ def test_gains_are_not_applied_where_a_name_says_newton_metres(tmp_path: Path) -
     assert any("applied to nothing" in n for n in found.notes)
 
 
+def test_currents_whose_gains_cannot_all_be_estimated_are_not_said_to_be_unknown(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, SENSORS)
+    frame = log(robot, current=5.0)
+    frame["current2"] = np.random.default_rng(2).normal(size=len(frame))
+    found = proposed(tmp_path, robot, frame, gains=FIT)
+    (asked,) = (q for q in found.questions if "gains" in q)
+    assert "the gains of elbow cannot be estimated" in asked and "estimated of the others: 0.2" in asked
+    assert not any("applied to nothing" in n for n in found.notes)
+
+
+def test_gains_beside_torques_that_were_measured_name_the_currents(tmp_path: Path) -> None:
+    robot = robot_of(tmp_path, SENSORS)
+    found = proposed(tmp_path, robot, log(robot, torque=1.0, current=5.0), gains=FIT)
+    (told,) = (n for n in found.notes if "applied to nothing" in n)
+    assert "torque1, torque2 are torques themselves; to have current1, current2 instead" in told
+
+
 def test_a_robot_that_is_led_by_its_commands_is_told_of_torques_of_another_scale(tmp_path: Path) -> None:
     robot = robot_of(tmp_path)
     found = proposed(tmp_path, robot, log(robot, tau=0.1))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from ee_dist.basics.names import listed
 from ee_dist.measurements.errors import MeasurementError, SeveralColumnsError, nearest
 from ee_dist.measurements.proposal.asked_for import plans_of
 from ee_dist.measurements.proposal.blocks import unreadable
@@ -19,6 +20,7 @@ from ee_dist.measurements.proposal.time import once_each_moment, time_flaw, time
 from ee_dist.measurements.proposal.torques import add_torques
 from ee_dist.measurements.proposal.units import position_units
 from ee_dist.measurements.proposal.view import View
+from ee_dist.measurements.proposal.words import CURRENT
 from ee_dist.measurements.robot_channels import command_units
 from ee_dist.measurements.table import DROP, Recorded
 from ee_dist.robots.model import Robot
@@ -58,18 +60,34 @@ def propose(recorded: Recorded, robot: Robot, hints: Hints) -> Proposal:
     add_speeds(v)
     add_torques(v)
     add_commands(v)
-    if v.hints.gains is not None and not v.gained:
-        v.out.notes.append(
-            "task.gains: applied to nothing, as no columns can be told to be the motors' currents; write them into the mapping "
-            "as torques, with the gain as their scale"
-            if v.units.entries
-            else "task.gains: not applied yet, for what the motion needs is not known before the unit of the positions is"
-        )
+    _tell_of_gains(v)
     add_rest(v)
     add_switches(v)
     _ask_the_rest(v)
     _tell_flaws(v, flaws)
     return v.out
+
+
+def _tell_of_gains(v: View) -> None:
+    """Why gains that were said were applied to nothing, unless a question on currents says it."""
+    if v.hints.gains is None or v.gained:
+        return
+    if not v.units.entries:
+        v.out.notes.append(
+            "task.gains: not applied yet, for what the motion needs is not known before the unit of the positions is"
+        )
+        return
+    torques = {str((c.entry or {}).get("column")) for c in v.out.choices if c.group == "torques"}
+    taken = next((b for b in v.blocks if torques & {*b.columns}), None)
+    if taken is not None and taken.reading.kind == CURRENT:
+        return
+    currents = [
+        b.name for b in v.blocks if b.reading.kind == CURRENT and not b.reading.weak and v.moves(b) and not b.used
+    ]
+    why = "no columns can be told to be the motors' currents; write them into the mapping as torques"
+    if taken is not None and currents:
+        why = f"{taken.name} are torques themselves; to have {listed(currents)} instead, write them into the mapping as torques"
+    v.out.notes.append(f"task.gains: applied to nothing, as {why}, with the gain as their scale")
 
 
 def _without_time(v: View, flaws: list[MeasurementError]) -> Proposal:
