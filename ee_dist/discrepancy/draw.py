@@ -6,6 +6,7 @@ import numpy as np
 
 from ee_dist.discrepancy.search.candidates import Candidate, candidate, possible
 from ee_dist.effects.catalogue import CATALOGUE, Term
+from ee_dist.effects.torque_readings import TORQUES_READ_LATE
 from ee_dist.robots.model import Robot
 
 LEAST, MOST = 0.1, 0.9
@@ -14,8 +15,10 @@ LEAST, MOST = 0.1, 0.9
 
 def draw(robot: Robot, rng: np.random.Generator) -> tuple[Candidate, Term]:
     """An effect, then a target, then its values; every effect of the catalogue that the robot has room for, and may catch, is as
-    likely as any other. What is only proposed where commands and positions show it depends on a motion that is not drawn yet."""
-    entries = [e for e in CATALOGUE.values() if e.proposed(robot) and not e.mistake and e.seen_at is None]
+    likely as any other. What is only proposed where commands and positions show it depends on a motion that is not drawn yet, and
+    when torques are read is of a log and not of the robot."""
+    of_robot = (e for e in CATALOGUE.values() if not e.mistake and e.seen_at is None and e.name != TORQUES_READ_LATE)
+    entries = [e for e in of_robot if e.proposed(robot)]
     entry = entries[int(rng.integers(len(entries)))]
     targets = entry.proposed(robot)
     chosen = candidate(robot, entry, targets[int(rng.integers(len(targets)))])

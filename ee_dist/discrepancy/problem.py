@@ -22,6 +22,7 @@ from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.recorded import bridged, not_compared
 from ee_dist.effects.catalogue import Hypothesis
 from ee_dist.effects.effect import FAMILIES, Beside
+from ee_dist.effects.torque_readings import TORQUES_READ_LATE
 from ee_dist.robots.model import Robot, Sensor
 from ee_dist.trials.log import Array, SensorLog, late
 
@@ -204,8 +205,9 @@ class Problem(ABC):
 
     def shows(self, effect: str, target: str) -> bool:
         """Whether an effect of one of ``families`` can show at a place in these very data. A supply that was measured sags as it
-        was measured to: what would take more off it stands in for something else."""
-        return effect != "supply_sag" or not self.supply_known
+        was measured to: what would take more off it stands in for something else. When the torques of a log were read shows only
+        where they are compared: a balance of forces says so itself, and sensors of torque have delays of their own."""
+        return effect != TORQUES_READ_LATE and (effect != "supply_sag" or not self.supply_known)
 
     @cached_property
     def supply_known(self) -> bool:

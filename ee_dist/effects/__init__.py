@@ -35,6 +35,9 @@ from ee_dist.effects import integral  # noqa: F401
 # isort: split
 from ee_dist.effects import duration  # noqa: F401
 
+# isort: split
+from ee_dist.effects import torque_readings  # noqa: F401
+
 __all__ = [
     "CATALOGUE",
     "Effect",

@@ -14,7 +14,8 @@ import numpy as np
 
 from ee_dist.engines.delay import Delay
 from ee_dist.engines.per_robot import per_robot
-from ee_dist.robots.model import Sensor
+from ee_dist.robots.instruments import torque_delays
+from ee_dist.robots.model import Robot, Sensor
 from ee_dist.robots.system import System
 from ee_dist.trials.log import Array
 
@@ -28,11 +29,13 @@ class SensingPath:
         names = [f.name for f in fields(Sensor) if isinstance(f.default, float)]
         rows = per_robot(robots, lambda r: np.array([[getattr(s, n) for n in names] for s in r.sensors], dtype=float))
         table = np.array(rows).reshape(len(robots), len(robots[0].sensors), len(names))
+        shape = table.shape[:2]
         self.p = {n: np.ascontiguousarray(table[:, :, i]) for i, n in enumerate(names)}
         neutral = {f.name: f.default for f in fields(Sensor)}
+        late = per_robot(robots, lambda r: torque_delays(r) if isinstance(r, Robot) else (0.0,) * len(r.sensors))
+        self.p["delay_s"] = self.p["delay_s"] + np.array(late).reshape(shape)
         self.uses = {n: bool(np.any(self.p[n] != neutral[n])) for n in names}
         self.plain = not any(self.uses.values())
-        shape = table.shape[:2]
         self.kinds = [s.kind for s in robots[0].sensors]
         self.touch = np.array([k == "touch" for k in self.kinds])
         if self.uses["missed_touch"]:

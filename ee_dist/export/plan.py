@@ -19,7 +19,7 @@ from ee_dist.robots.model import DRIVE_NUMBERS, Drive, Robot, Sensor
 NATIVE, SHIM, NOT = "native", "shim", "not expressible"
 ACTUATOR = frozenset({"kp", "kd", "torque_limit", "speed_limit", "strength", "command_gain", "zero_offset", "back_emf"})
 """Of a drive, what an actuator of MuJoCo has: gains, limits, a damping, a bias."""
-READING = frozenset({"current_gain"})
+READING = frozenset({"current_gain", "torque_read_late_s"})
 """Of a drive, what no motion depends on."""
 JOINT = frozenset({"rotor_inertia", "viscous", "coulomb", "brake", "spring", "spring_rest", "offset_torque"})
 NATIVE_DRIVE: Mapping[str, frozenset[str]] = {

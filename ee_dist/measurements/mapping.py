@@ -28,7 +28,8 @@ class Column:
     ``table`` is the table it stands in, where a trial has several. ``signed_bits``: an unsigned counter of that width that
     holds a signed number. ``unwrap``: an angle that jumps by whole turns; ``rolls_over``: the numbers after which
     a reading begins anew, where these are no turn. ``gaps: interpolate`` fills empty cells from
-    their neighbours, or with the last command. ``lead_s``: how long before its time stamp a command took effect.
+    their neighbours, or with the last command. ``lead_s``: how long before its time stamp a command took effect,
+    or a torque or another reading was what it tells.
     ``smooth_s``: centred mean over that time. ``sure``: the unit is right although the numbers look as if it were not.
     ``held``: the value (in ``unit``) of a channel that stood still in trials that have no such column, or an empty one.
     """

@@ -174,7 +174,9 @@ class OnGrid:
                 # Between readings a state goes on: it does not stand still and jump.
                 read = values[np.minimum(rows + (late or 0), len(values) - 1)]
                 values = linear(own.times_s - own.times_s[0], own.times_s[rows], read)
-        if not self._same_rows(own):
+        if column.lead_s or not self._same_rows(own):
+            # A torque that was read late is no step: what lies between two rows is between their values.
+            lines = lines or (bool(column.lead_s) and name.startswith(TORQUE))
             # The grid begins where the main table does.
             at_s = self._rows_s() + (self.main.times_s[0] - own.times_s[0])
             if step_like and (own.table.planned or lines):
@@ -182,7 +184,7 @@ class OnGrid:
             elif step_like:
                 values = held(at_s, own.times_s, values, column.lead_s)
             else:
-                values = linear(at_s, own.times_s, values)
+                values = linear(at_s + column.lead_s, own.times_s, values)
         if column.smooth_s > 0:
             values = smoothed(values, self.step_s, column.smooth_s)
             self.report.done.append(f"{name}: mean over {column.smooth_s:g} s")

@@ -25,6 +25,13 @@ def _slides(robot: Robot, joint: str) -> bool:
     return bool(robot.joint(joint).kind == "slide")
 
 
+def torque_delays(robot: Robot) -> tuple[float, ...]:
+    """s, by sensor: how old its reading is beyond its own delay, since its motor's torque is read late. A simulation reads
+    nothing ahead of time: where it is the positions that are late (below zero), which no torque tells, all is read at once."""
+    late = {d.joint: max(d.torque_read_late_s, 0.0) for d in robot.drives}
+    return tuple(late[s.target] if s.kind == MOTOR_TORQUE else 0.0 for s in robot.sensors)
+
+
 def measures_torques(robot: Robot) -> bool:
     """Whether some sensor of the robot says how large a torque is, a joint's or a motor's."""
     return any(s.kind in ("torque", MOTOR_TORQUE) for s in robot.sensors)

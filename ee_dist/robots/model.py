@@ -172,6 +172,7 @@ class Drive:
     spring_rest: float = 0.0
     brake: float = 0.0  # N.m of dry friction of a brake
     feed_forward: float = 0.0  # of a controller of positions: share of the commanded speed that kd leaves undamped
+    torque_read_late_s: float = 0.0  # age of what is read of its torque beside what is read of its position; signed
 
     def __post_init__(self) -> None:
         # Descriptions from when there was one speed for both keep their meaning.

@@ -37,6 +37,7 @@ DRIVE: dict[str, Bounds] = dict.fromkeys(DRIVE_NUMBERS, AT_LEAST_0) | {
     "offset_torque": ANY,
     "spring_rest": ANY,
     "feed_forward": (0.0, 10.0),
+    "torque_read_late_s": (-2.0, 2.0),
 }
 SENSOR: dict[str, Bounds] = {
     "gain": (-1e6, 1e6),

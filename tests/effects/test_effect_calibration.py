@@ -53,6 +53,21 @@ def test_current_gain_changes_what_is_read_and_not_what_moves(bench: Bench) -> N
     assert other.channel("motor_torque_joint") == pytest.approx(read / 1.25)
 
 
+@pytest.mark.parametrize(("late_s", "rows"), [(0.025, 25), (-0.025, 0)])
+def test_torque_reading_delay_makes_what_is_read_older_and_not_what_moves(
+    bench: Bench, late_s: float, rows: int
+) -> None:
+    """Nothing is read ahead of time: where it is positions that are late, a simulation reads both at once."""
+    robot = with_motor_torques(slider(kp=100.0, torque_limit=10.0))
+    plain, other = (
+        bench.run(robot, term("torque_reading_delay", "joint", delay_s=s), steps=200, command=0.3)
+        for s in (0.0, late_s)
+    )
+    read, later = (log.channel("motor_torque_joint") for log in (plain, other))
+    assert np.array_equal(plain.channel("position"), other.channel("position"))
+    assert later[rows:] == pytest.approx(read[: len(read) - rows])
+
+
 def test_back_emf_lowers_the_speed_without_load(bench: Bench) -> None:
     robot = slider(kp=1e4, torque_limit=10.0, speed_limit=1.0)
     log = bench.run(robot, term("back_emf", "joint", change=1.0), command=9.0, steps=2000)

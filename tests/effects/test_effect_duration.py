@@ -120,8 +120,8 @@ def test_it_adds_to_what_is_described_and_takes_off_no_more() -> None:
     assert apply(robot, [taking(0.0)]) == robot
 
 
-def test_it_is_of_controllers_of_positions_and_the_last_of_the_catalogue() -> None:
+def test_it_is_of_controllers_of_positions_and_behind_what_was_there_before() -> None:
     entry = CATALOGUE["command_duration"]
-    assert list(CATALOGUE)[-1] == entry.name
+    assert list(CATALOGUE)[-2:] == [entry.name, "torque_reading_delay"], "what came later goes behind"
     assert entry.targets(slider(command="torque")) == () == entry.targets(slider(command="speed", kp=1.0))
     assert entry.proposed(quadruped()) == (), "of a robot whose controllers are known nobody set them otherwise"

@@ -12,6 +12,7 @@ from ee_dist.effects.laws import SPEED_LAWS, LawContext, find_law
 from ee_dist.engines.friction import DRY, LOADED, SIDED, Friction
 from ee_dist.measurements.sampling import decimated
 from ee_dist.robots.inertia import felt_inertia
+from ee_dist.robots.instruments import MOTOR_TORQUE
 from ee_dist.robots.inverse_dynamics import geometry, gravity, parameters
 from ee_dist.robots.model import DRIVE_NUMBERS, Drive, Robot
 from ee_dist.trials.log import Array
@@ -30,9 +31,11 @@ SEEN = (
     "stribeck_load_speed",
     "rotor_inertia",
     "torque_limit",
+    "torque_read_late_s",
     *RUBBING,
 )
-"""Fields of a drive that a balance of forces sees: neither the controller nor what lies between motor and joint."""
+"""Fields of a drive that a balance of forces sees, and when its torque was read: neither the controller nor what lies between
+motor and joint."""
 BEYOND = "torque_limit"
 """Of these, the one that only says up to which load friction by load is believed: it tells no two models apart."""
 NUDGE = 1e-4
@@ -59,9 +62,10 @@ class Balance:
         where a model leaves the finite numbers."""
         asked, needed = self.motion.needed(robot)
         inertia = felt_inertia(robot)
+        late = self.motion.readings.late_s(robot).tolist()
         laws = {d.joint: tuple(law for law in robot.laws if law.joint == d.joint) for d in robot.drives}
         keys = [
-            (k, asked, tuple(getattr(d, n) for n in SEEN), laws[d.joint], inertia[k] if _rubs(d) else 0.0)
+            (k, asked, late[k], tuple(getattr(d, n) for n in SEEN), laws[d.joint], inertia[k] if _rubs(d) else 0.0)
             for k, d in ((k, robot.drives[k]) for k in self.motion.judged)
         ]
         missing = [i for i, key in enumerate(keys) if key not in self._kept]
@@ -91,15 +95,19 @@ def told_by(robot: Robot, judged: Sequence[int]) -> tuple[object, ...]:
     drives = tuple(tuple(getattr(d, n) for n in SEEN if n != BEYOND) for d in own)
     laws = tuple(law for law in robot.laws if law.name not in SPEED_LAWS and law.joint in names)
     # Another joint needs no force of these for what it carries, but where they carry it too.
-    return geometry(robot), gravity(robot).tobytes(), parameters(robot, names).tobytes(), drives, laws
+    late = tuple(s.delay_s for s in robot.sensors if s.kind == MOTOR_TORQUE and s.target in names)
+    return geometry(robot), gravity(robot).tobytes(), parameters(robot, names).tobytes(), drives, laws, late
 
 
 def left_over(robot: Robot, motion: Motion, needed: Array, joints: Sequence[int]) -> tuple[Array, Array]:
     """(T, J) at some joints: what the drives gave, less what the motion needed (T, M), in terms of the measured force; and the
-    same without friction at what rests (the very same array where that makes no difference)."""
+    same without friction at what rests (the very same array where that makes no difference). By rows of the motion:
+    torques that were read late are taken from the rows in which they stand."""
     drives = [replace(robot.drives[k], back_emf=0.0) for k in joints]
-    q, qd, qdd, given = (
-        np.ascontiguousarray(a[:, joints]) for a in (motion.position, motion.speed, motion.acceleration, motion.torque)
+    q, qd, qdd = (np.ascontiguousarray(a[:, joints]) for a in (motion.position, motion.speed, motion.acceleration))
+    late_s = motion.readings.late_s(robot)[joints]
+    given = np.ascontiguousarray(
+        motion.readings.of_motion(joints, late_s) if late_s.any() else motion.torque[:, joints]
     )
     needed = needed[:, joints] + np.array([d.rotor_inertia for d in drives]) * qdd
     if motion.external is not None:

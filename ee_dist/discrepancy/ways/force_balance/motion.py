@@ -11,6 +11,7 @@ import scipy
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Mask
+from ee_dist.discrepancy.ways.force_balance.readings import Readings
 from ee_dist.discrepancy.ways.open_loop.prediction import roughness
 from ee_dist.measurements.errors import MeasurementError
 from ee_dist.measurements.sampling import LowPass
@@ -80,10 +81,14 @@ class Processing:
         """Rows that a log needs so that ``kept`` are kept of it."""
         return 2 * self.drop_rows + kept * self.keep_every
 
+    def filtered(self, series: Array, step_s: float) -> Array:
+        """(T, M) of readings (T, M): ends that have not settled too."""
+        low_pass = self.filter_for(step_s)
+        return np.stack([low_pass(column, step_s) for column in series.T], axis=1)
+
     def smooth(self, series: Array, step_s: float) -> Array:
         """(T - 2 drop_rows, M) of readings (T, M)."""
-        low_pass = self.filter_for(step_s)
-        return self.settled(np.stack([low_pass(column, step_s) for column in series.T], axis=1))
+        return self.settled(self.filtered(series, step_s))
 
     def differentiated(self, joints: Array, step_s: float) -> tuple[Array, Array, Array]:
         """Positions, speeds and accelerations, (T - 2 drop_rows, M) each, of readings (T, M)."""
@@ -121,7 +126,7 @@ class Moved:
 class Motion:
     """A measured motion (T, M): positions, speeds, accelerations; ``torque`` that the drives gave, NaN but at the ``judged``
     (J,) drives; ``rest``: where a joint did not move, as far as its readings tell; ``external``: known torques that are not the
-    drives', if there are any."""
+    drives', if there are any; ``readings``: the torques before the ends of the record were dropped."""
 
     position: Array
     speed: Array
@@ -129,6 +134,7 @@ class Motion:
     torque: Array
     rest: Mask
     judged: tuple[int, ...]
+    readings: Readings
     external: Array | None = None
     known: dict[tuple[object, ...], Moved] = field(default_factory=dict)
     once: dict[tuple[object, ...], tuple[bytes, Array]] = field(default_factory=dict)
@@ -198,14 +204,15 @@ def motion_of(
     dt = float(np.median(np.diff(log.times_s)))
     judged = torques_known(torques) if judged is None else judged
     rest = processing.settled(at_rest(joints, dt, processing, give(robot)))
-    given = np.full(rest.shape, math.nan)
+    whole = np.full(torques.shape, math.nan)
     # Forces go the way of the positions: what a filter takes from the motion, and not from them, would look like a missing force.
-    given[:, judged] = processing.smooth(np.take(torques, judged, axis=1), dt)
+    whole[:, judged] = processing.filtered(np.take(torques, judged, axis=1), dt)
     return Motion(
         *processing.differentiated(joints, dt),
-        given,
+        processing.settled(whole),
         rest,
         tuple(judged),
+        Readings(whole, processing.drop_rows, dt, by_sensors=log.torques is None),
         None if log.external is None else processing.smooth(log.external, dt),
     )
 

@@ -3,7 +3,8 @@
 For a robot on a fixed base whose joint positions and drive torques were measured. Nothing is simulated: positions are
 low-passed and differentiated, the torque that this motion needs comes from inverse dynamics, friction and springs from
 the drive path's own laws at each instant, and what is left over is the residual. It is linear in most parameters, never
-chaotic, and takes milliseconds a model; what it cannot see are the controller (a delay, a gain) and the sensors.
+chaotic, and takes milliseconds a model; what it cannot see are the controller (a delay, a gain) and the sensors, but for
+when torques were read beside positions.
 
 For one joint, and with the settings below, this is the published definition of the relative force error on EMPS (Janot,
 Gautier, Brunot 2019; Gautier, Janot, Vandanjon 2013): regressor and force both decimated, signs taken before.
@@ -26,6 +27,7 @@ from ee_dist.discrepancy.ways.force_balance.cancel import CANCELLED, left_to_giv
 from ee_dist.discrepancy.ways.force_balance.floor import floor_of
 from ee_dist.discrepancy.ways.force_balance.motion import Processing, judged_in
 from ee_dist.discrepancy.ways.force_balance.noise import RESOLVED, prepared, resting, torque_steps, with_energy
+from ee_dist.discrepancy.ways.force_balance.readings import at_readings
 from ee_dist.discrepancy.ways.force_balance.ripple import Remains, describe, remains
 from ee_dist.discrepancy.ways.force_balance.weight import weightless
 from ee_dist.effects.catalogue import Hypothesis, apply, find, term
@@ -177,8 +179,11 @@ class ForceBalance(Problem):
         left = self.raw(self.residuals([hypothesis])[0])
         out = []
         for k, motion in enumerate(self.motions):
+            (model,) = self.measured[k].models(self.robot, [hypothesis])
             force = decimated(motion.of_judged(motion.torque), self.processing.keep_every)
-            rest = left[self.slices[k]].reshape(force.shape)
+            # What is left stands at the rows of the motion, and a curve of torques at those in which they were read.
+            late_s = motion.readings.late_s(model)[list(self.judged)]
+            rest = at_readings(left[self.slices[k]].reshape(force.shape), self.times_s[k], late_s)
             for c, unit in enumerate(self.layout.units):
                 out.append(Series(k, c, unit, self.times_s[k], force[:, c], (force - rest)[:, c]))
         return out
