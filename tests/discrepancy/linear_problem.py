@@ -8,12 +8,14 @@ import numpy as np
 
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.problem import Layout, Problem, Series
-from ee_dist.effects.catalogue import Hypothesis
+from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.robots.quadruped_lab import quadruped_lab
 from ee_dist.trials.log import Array, SensorLog
 
 ROBOT = quadruped_lab()
 SEGMENTS, PER = 20, 40
+WEAK, JAM, GAIN = "motor_weak@knee_front_left", "joint_jam@hip_rear_left", "command_gain@hip_front_left"
+HIDDEN = (term("motor_weak", "knee_front_left", loss=0.4), term("joint_jam", "hip_rear_left", loss=0.3))
 
 
 def idle_log(rows: int, seed: int = 0) -> SensorLog:
@@ -79,3 +81,15 @@ class Linear(Problem):
                 own = (self.trial_of == k) & (self.channel_of == c)
                 out.append(Series(k, c, unit, self.layout.time_s[own], self.data[own], shift[own]))
         return out
+
+
+class StandIn(Linear):
+    """A gain stands in for a weak motor at a knee and for a jam at a hip, but for a little: it comes first, and goes."""
+
+    def shift(self, hypothesis: Hypothesis) -> Array:
+        total = super().shift(tuple(t for t in hypothesis if t.effect != "command_gain"))
+        for t in hypothesis:
+            if t.effect == "command_gain":
+                own = super().shift((Term(t.effect, t.target, (("change", 0.3),)),))
+                total = total + t.values[0][1] / 0.3 * (super().shift(HIDDEN) + own)
+        return total

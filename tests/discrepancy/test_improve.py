@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from linear_problem import ROBOT, Linear
+from linear_problem import GAIN, HIDDEN, JAM, ROBOT, WEAK, Linear, StandIn
 
 import ee_dist.discrepancy.improve as improving
 from ee_dist.discrepancy.accounts.of_improve import improve_account
@@ -22,9 +22,7 @@ from ee_dist.discrepancy.search.search import Search
 from ee_dist.effects.catalogue import Hypothesis, Term, term
 from ee_dist.trials.log import Array
 
-WEAK, JAM, GAIN = "motor_weak@knee_front_left", "joint_jam@hip_rear_left", "command_gain@hip_front_left"
 POOL = [parse(ROBOT, name) for name in (WEAK, JAM, GAIN)]
-HIDDEN = (term("motor_weak", "knee_front_left", loss=0.4), term("joint_jam", "hip_rear_left", loss=0.3))
 
 
 class Twins(Linear):
@@ -112,16 +110,6 @@ def test_an_effect_that_is_worse_beyond_doubt_is_not_tied() -> None:
 
 
 def test_a_step_that_a_later_one_makes_useless_is_dropped() -> None:
-    # A gain that stands in for a weak motor at a knee and for a jam at a hip, but for a little.
-    class StandIn(Linear):
-        def shift(self, hypothesis: Hypothesis) -> Array:
-            total = super().shift(tuple(t for t in hypothesis if t.effect != "command_gain"))
-            for t in hypothesis:
-                if t.effect == "command_gain":
-                    own = super().shift((Term(t.effect, t.target, (("change", 0.3),)),))
-                    total = total + t.values[0][1] / 0.3 * (super().shift(HIDDEN) + own)
-            return total
-
     found = improve(StandIn(HIDDEN), POOL)
     assert found.ladder[1].name == GAIN, "it explains most at once"
     assert {t.name for t in found.terms} == {WEAK, JAM}

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from linear_problem import ROBOT, Linear
+from linear_problem import GAIN, HIDDEN, JAM, ROBOT, WEAK, Linear, StandIn
 
 import ee_dist.tasks.improve as task
 from ee_dist.discrepancy.accounts.of_improve import improve_account
@@ -18,26 +18,12 @@ from ee_dist.discrepancy.last_word import TRIALS_APART, last_word
 from ee_dist.discrepancy.search.candidates import parse
 from ee_dist.discrepancy.steps_apart import step_apart
 from ee_dist.discrepancy.worse_steps import worse_steps
-from ee_dist.effects.catalogue import Hypothesis, Term, term
+from ee_dist.effects.catalogue import Hypothesis, term
 from ee_dist.effects.model_file import read_model
 from ee_dist.trials.log import Array
 
-WEAK, JAM, GAIN = "motor_weak@knee_front_left", "joint_jam@hip_rear_left", "command_gain@hip_front_left"
 POOL = [parse(ROBOT, name) for name in (WEAK, JAM, GAIN)]
-HIDDEN = (term("motor_weak", "knee_front_left", loss=0.4), term("joint_jam", "hip_rear_left", loss=0.3))
 MEASURED = SimpleNamespace(source="quadruped_lab", folder=Path())
-
-
-class StandIn(Linear):
-    """A gain stands in for a weak motor at a knee and for a jam at a hip, but for a little: it comes first, and goes."""
-
-    def shift(self, hypothesis: Hypothesis) -> Array:
-        total = super().shift(tuple(t for t in hypothesis if t.effect != "command_gain"))
-        for t in hypothesis:
-            if t.effect == "command_gain":
-                own = super().shift((Term(t.effect, t.target, (("change", 0.3),)),))
-                total = total + t.values[0][1] / 0.3 * (super().shift(HIDDEN) + own)
-        return total
 
 
 class Noted:

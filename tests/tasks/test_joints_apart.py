@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from imported_logs import imported_logs
 
 from ee_dist.discrepancy.accounts.of_compare import compare_account
 from ee_dist.discrepancy.compare import compare
 from ee_dist.recording.reader import read_run
 from ee_dist.recording.writer import RunWriter
-from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig, RobotConfig
-from ee_dist.tasks.import_ import Options, run
+from ee_dist.tasks.config import Config
 from ee_dist.tasks.measurements import load
 from ee_dist.tasks.results import scenes
 from ee_dist.tasks.results.sections import heat_section
@@ -47,14 +47,7 @@ def config(tmp_path: Path) -> Config:
         seen = np.interp(t - 0.04, t, asked) + np.random.default_rng(k).normal(0, 1e-3, len(t))
         files.append(tmp_path / f"{joint}.csv")
         pd.DataFrame({"t_s": t, "cmd_rad": asked, "pos_rad": seen}).to_csv(files[-1], index=False)
-    found = Config(
-        robot=RobotConfig(name="urdf", drives=str(tmp_path / "chain.yaml")),
-        engine=EngineConfig("mujoco", 1),
-        evaluator=EvaluatorConfig("serial"),
-        measured=[str(f) for f in files],
-    )
-    run(found, Options(), tmp_path / "out")
-    return replace(found, measured=str(tmp_path / "out" / "measured.mcap"))
+    return imported_logs(tmp_path / "chain.yaml", files, tmp_path / "out")
 
 
 def test_the_recording_says_which_joint_nobody_recorded(config: Config) -> None:

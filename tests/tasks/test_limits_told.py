@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from rerun.chunk import RrdReader
+from imported_logs import imported_logs
+from scene_texts import text_of
 from schemas import validated
 
 from ee_dist.engines.contract import Rollout
@@ -18,8 +19,7 @@ from ee_dist.engines.drivers import Commands
 from ee_dist.engines.mujoco.engine import MuJoCoEngine
 from ee_dist.robots.describe import load_robot
 from ee_dist.tasks import compare, explain, improve
-from ee_dist.tasks.config import Config, EngineConfig, EvaluatorConfig, RobotConfig
-from ee_dist.tasks.import_ import Options, run
+from ee_dist.tasks.config import Config
 
 ARM = """<robot name="arm"><link name="base"/>
   <link name="upper"><inertial><mass value="0.5"/><origin xyz="0.1 0 0"/>
@@ -47,24 +47,7 @@ def config(tmp_path: Path) -> Config:
         seen = log.joints[:, 0] + np.random.default_rng(k).normal(0, 1e-3, len(t))
         files.append(tmp_path / f"run{k}.csv")
         pd.DataFrame({"t_s": t, "hip_cmd_rad": asked, "hip_pos_rad": seen}).to_csv(files[-1], index=False)
-    found = Config(
-        robot=RobotConfig(name="urdf", drives=str(tmp_path / "arm.yaml")),
-        engine=EngineConfig("mujoco", 1),
-        evaluator=EvaluatorConfig("serial"),
-        measured=[str(f) for f in files],
-    )
-    run(found, Options(), tmp_path / "measured")
-    return replace(found, measured=str(tmp_path / "measured" / "measured.mcap"))
-
-
-def scene_text(scene: Path) -> str:
-    found = []
-    for chunk in RrdReader(scene).stream():
-        batch = chunk.to_record_batch()
-        for name in batch.schema.names:
-            if "TextDocument:text" in name:
-                found += [t for cell in batch.column(name).to_pylist() for t in cell or []]
-    return " ".join(" ".join(found).split())
+    return imported_logs(tmp_path / "arm.yaml", files, tmp_path / "measured")
 
 
 @pytest.mark.parametrize("verb", ["compare", "explain", "improve"])
@@ -85,5 +68,6 @@ def test_a_limit_that_was_guessed_too_low_is_told_in_all_that_a_verb_writes(
     (line,) = (w for w in summary["words"] if "at its torque limit" in w)
     assert summary["words"].index(line) == 1, "before any number"
     page = html.unescape((out / "report.html").read_text(encoding="utf-8"))
-    for text in (" ".join(capsys.readouterr().out.split()), page, scene_text(out / f"{verb}.rrd")):
+    scene = " ".join(" ".join(text_of(out / f"{verb}.rrd")).split())
+    for text in (" ".join(capsys.readouterr().out.split()), page, scene):
         assert line in text

@@ -164,12 +164,17 @@ def test_explain_and_improve_go_on_where_they_stopped(cli, tmp_path, stopping, v
     assert not (tmp_path / "run" / "unfinished").exists()
 
 
-def test_the_model_that_a_stopped_search_had_reached_can_be_used(cli, tmp_path, stopping):
-    log, run = tmp_path / "log", tmp_path / "run"
+def rubbing(cli, log, *more):
+    """Two trials of a pendulum with friction that nobody described."""
     assert cli(
-        "task=trial", "robot=servo_pendulum", "+hidden=coulomb_friction@servo", "engine=mujoco", "seed=1",
+        "task=trial", "robot=servo_pendulum", "+hidden=coulomb_friction@servo", "engine=mujoco", "seed=1", *more,
         "task.excitations=['multisine:seconds=1,seed=1','slow_sines:seconds=1,seed=2']", f"hydra.run.dir={log}",
     ).status == 0  # fmt: skip
+
+
+def test_the_model_that_a_stopped_search_had_reached_can_be_used(cli, tmp_path, stopping):
+    log, run = tmp_path / "log", tmp_path / "run"
+    rubbing(cli, log)
     same = (f"measured={log}", "engine=mujoco", "evaluator=serial", "task.by=open_loop", "task.rerun=false")
     ask = ("task=improve", "effect=auto", "task.only=[coulomb_friction,viscous_friction]", *same)
     so_far = run / "unfinished" / "model.yaml"
@@ -186,10 +191,7 @@ def test_the_model_that_a_stopped_search_had_reached_can_be_used(cli, tmp_path, 
 
 def test_a_stopped_search_says_how_far_its_model_is_from_what_was_held_out_from_all_of_it(cli, tmp_path, stopping):
     log, run = tmp_path / "log", tmp_path / "run"
-    assert cli(
-        "task=trial", "robot=servo_pendulum", "+hidden=coulomb_friction@servo", "engine=mujoco", "seed=1",
-        "task.excitations=['multisine:seconds=1,seed=1','slow_sines:seconds=1,seed=2']", f"hydra.run.dir={log}",
-    ).status == 0  # fmt: skip
+    rubbing(cli, log)
     same = (f"measured={log}", "engine=mujoco", "evaluator=serial", "task.by=open_loop", "task.rerun=false")
     ask = ("task=improve", "effect=auto", "task.only=[coulomb_friction,viscous_friction]", "held_out=[2]", *same)
     so_far = run / "unfinished" / "model.yaml"
@@ -203,11 +205,7 @@ def test_a_stopped_search_says_how_far_its_model_is_from_what_was_held_out_from_
 
 def test_a_search_that_simulates_nothing_keeps_its_model_too(cli, tmp_path, monkeypatch):
     log, run = tmp_path / "log", tmp_path / "run"
-    assert cli(
-        "task=trial", "robot=servo_pendulum", "+hidden=coulomb_friction@servo", "engine=mujoco", "seed=1",
-        "task.motor_torque=true", "task.noise=0.0001",
-        "task.excitations=['multisine:seconds=1,seed=1','slow_sines:seconds=1,seed=2']", f"hydra.run.dir={log}",
-    ).status == 0  # fmt: skip
+    rubbing(cli, log, "task.motor_torque=true", "task.noise=0.0001")
     same = (f"measured={log}", "engine=mujoco", "evaluator=serial", "task.by=force_balance", "task.rerun=false")
     ask = ("task=improve", "effect=auto", "task.only=[coulomb_friction,viscous_friction]", *same)
     so_far, real, told = run / "unfinished" / "model.yaml", improving.examine, []

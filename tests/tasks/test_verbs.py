@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from rerun.chunk import RrdReader
+from scene_texts import text_of
 
 from ee_dist.discrepancy.ways.force_balance.problem import ForceBalance
 from ee_dist.effects.catalogue import apply, term
@@ -92,18 +92,6 @@ def told_alike(folder: Path, said) -> list[str]:
     for line in (*first, following.removeprefix("Next: ")):
         assert line in plain and line in page and all(line in text for text in scenes)
     return first
-
-
-def text_of(scene: Path) -> list[str]:
-    """The texts of a scene."""
-    found = []
-    for chunk in RrdReader(scene).stream():
-        batch = chunk.to_record_batch()
-        for name in batch.schema.names:
-            if "TextDocument:text" in name:
-                found += [t for cell in batch.column(name).to_pylist() for t in cell or []]
-    assert found, scene
-    return found
 
 
 @pytest.mark.parametrize("by", WAYS)
