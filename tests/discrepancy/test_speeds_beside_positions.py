@@ -12,6 +12,7 @@ from way_samples import Sample, evaluator_for, measure, sines, two_joint_arm
 from ee_dist.discrepancy.measured_trial import MeasuredTrial
 from ee_dist.discrepancy.ways.open_loop.problem import OpenLoop
 from ee_dist.discrepancy.ways.open_loop.scale import Scale, no_more_than_places
+from ee_dist.discrepancy.ways.open_loop.words import counted_less
 from ee_dist.effects.catalogue import term
 from ee_dist.robots.model import Sensor
 
@@ -71,3 +72,24 @@ def test_of_real_logs_both_are_heard_and_it_is_told() -> None:
     assert np.array_equal(moved.scale.scale, told.scale.scale)  # one measure for all that is held out
     simulated = OpenLoop(late(), BOTH, evaluator_for(BOTH))
     assert simulated.scale.loosened == 1.0 and not any("beside their positions" in line for line in simulated.notes)
+
+
+@pytest.mark.parametrize(("lag", "times"), [([1.0, 1.0, 4.0, 4.0], 4.0), ([1.0, 1.0, 1.5, 1.5], 2.0)])
+def test_one_that_hangs_low_is_off_in_its_positions_and_speeds_still_count_no_more(
+    lag: list[float], times: float
+) -> None:
+    """It says nothing of what is left once that is put right: what comes late does, and the larger of the two is taken."""
+    off = LEAST * ([60.0, 60.0, 20.0, 20.0] if times == 4.0 else [10.0, 10.0, 20.0, 20.0])
+    scale = no_more_than_places(PLAIN, BOTH, off, changing=LEAST * lag)
+    assert (scale.loosened, scale.of_lag) == (pytest.approx(times), times == 4.0)
+    (line,) = counted_less(scale.loosened, scale.of_lag)
+    assert ("what comes late" in line, "as described" in line) == (scale.of_lag, not scale.of_lag)
+
+
+def test_how_quickly_channels_change_is_taken_from_what_was_measured() -> None:
+    in_order = [replace(t, hardware=True) for t in measure(Sample(BOTH, sines(BOTH, 0.6, 4.0), (), ()), ())]
+    scale = OpenLoop(in_order, BOTH, evaluator_for(BOTH)).scale
+    logs = [t.log.sensors for t in in_order]
+    squares = np.mean([np.mean((np.diff(x, axis=0) / BOTH.time_step_s) ** 2, axis=0) for x in logs], axis=0)
+    places, speeds = (squares / scale.least**2).reshape(2, 2).mean(axis=1)
+    assert scale.of_lag and scale.loosened == pytest.approx(np.sqrt(speeds / places), rel=0.05)

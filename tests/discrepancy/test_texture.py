@@ -36,3 +36,10 @@ def test_an_encoder_in_order_repeats_what_its_steps_explain(speed: float, noise:
 @pytest.mark.parametrize("lost", [0.1, 0.3])
 def test_one_that_loses_readings_while_it_moves_shows(lost: float) -> None:
     assert excess(encoder(0.5, 0.025, lost)) == pytest.approx(lost, abs=0.03)
+
+
+def test_one_that_creeps_by_less_than_counts_tells_nothing_of_its_sensor() -> None:
+    """Its last digit says finer steps than the encoder has."""
+    creeping = np.round(np.arange(400) * 0.0004 / 0.003)[:, None] * 0.003 + 1e-7 * np.arange(400)[:, None] % 3e-7
+    assert moving(creeping, WINDOW).all() and not moving(creeping, WINDOW, 0.05).any()
+    assert moving(encoder(0.5, 0.025), WINDOW, 0.05).mean() > 0.9

@@ -45,10 +45,10 @@ from ee_dist.discrepancy.ways.open_loop.stretches import (
     too_long,
     unsettled,
 )
-from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, digest_held, moving
+from ee_dist.discrepancy.ways.open_loop.texture import REPEATING, ROUGH, digest_held, moving
 from ee_dist.discrepancy.ways.open_loop.unmodelled import Unmodelled, of_trial
 from ee_dist.discrepancy.ways.open_loop.views import Views
-from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, Weights, weigh
+from ee_dist.discrepancy.ways.open_loop.weights import FIRM, SOFT, TINY, Weights, weigh
 from ee_dist.discrepancy.ways.open_loop.words import begun_in_motion, counted_less, some_of_it, uncompared
 from ee_dist.effects.catalogue import Hypothesis, applied, apply, find
 from ee_dist.effects.effect import Beside
@@ -130,11 +130,11 @@ class OpenLoop(Problem):
             for t, values in zip(trials, read, strict=True)
         ]
         self._moving = [
-            moving(values, window) if t.commands_held else np.ones_like(d.repeated, dtype=bool)
+            moving(values, window, TINY * self.scale.least) if t.commands_held else np.ones_like(d.repeated, dtype=bool)
             for t, values, d in zip(trials, read, self._data, strict=True)
         ]
         if scale is None and self._touches_nothing:
-            self.scale = no_more_than_places(self.scale, robot, *self._off(robot))
+            self.scale = no_more_than_places(self.scale, robot, *self._off(robot), self._changing())
         self.weights = self._weighed(before)
         imported = [self.measured[p.trial].log.filled is not None for p in self.parts]
         self.layout, self.slices = lay_out(robot, self.parts, imported, self.weights, self.soft)
@@ -224,13 +224,24 @@ class OpenLoop(Problem):
         read = row_by_row(gaps, [p.run.recorded(self.robot) for p in self.parts])
         return np.sqrt(means_of(np.concatenate(gaps) ** 2, read)), np.asarray(read.any(axis=0))
 
+    def _changing(self) -> Array:
+        """(S,) root mean squares of what each channel changes by in a second, from block to block, without its noise."""
+        noise, squares, read = 2.0 * self.scale.noise**2 / self.block, [], []
+        for part, data in zip(self.parts, self._data, strict=True):
+            changes = np.diff(data.means.astype(float), axis=0)
+            lasting = self.block * (reading_s([part.run]) or self.robot.time_step_s)
+            squares.append((changes**2 - noise) / lasting**2)
+            read.append(changes)
+        there = row_by_row(read, [p.run.recorded(self.robot) for p in self.parts])
+        return np.sqrt(np.maximum(means_of(np.concatenate(squares), there), 0.0))
+
     def _weighed(self, before: Hypothesis) -> Weights:
         models = [apply(self.robot, before)]
         models += ensemble(models[0], self._members)
         parts = range(len(self.parts))
         known = [of_trial(self._unmodelled, p.run.name, len(self.robot.sensors)) ** 2 for p in self.parts]
         held = [self._held(models, k) for k in parts]
-        return weigh(self.predictor, self._data, self._moving, self.scale, known, held)
+        return weigh(self.predictor, self._data, self._moving, self.scale, known, held, self._touches_nothing)
 
     @cached_property
     def trust(self) -> tuple[float, ...]:
@@ -242,23 +253,24 @@ class OpenLoop(Problem):
         return tuple(float(1.0 / np.mean(widened[of == k])) for k in range(len(self.measured)))
 
     def shows(self, effect: str, target: str) -> bool:
-        """Where most sensors repeat readings, that one does so too says nothing; a simulation knows when it commands; and a
-        stretch says nothing of what an integral has added up before it."""
+        """Where most sensors repeat readings, or are rough, that one is so too says nothing; a simulation knows when it commands;
+        and a stretch says nothing of what an integral has added up before it."""
         if effect == STAMPED_LATE and not all(t.real for t in self.measured):
             return False
         if effect == INTEGRAL and self._whole is not None:
             return False
-        if effect not in REPEATING:
+        alike = self.weights.repeating if effect in REPEATING else self.weights.rugged if effect == ROUGH else ()
+        if not alike:
             return super().shows(effect, target)
         members = members_of(self.robot, target, self.robot.sensor_names) or (target,)
-        return not any(x.kind in self.weights.repeating for x in self.robot.sensors if x.name in members)
+        return not any(x.kind in alike for x in self.robot.sensors if x.name in members)
 
     @property
     def notes(self) -> list[str]:
-        lines = super().notes + uncompared(self.weights.repeating)
+        lines = super().notes + uncompared(self.weights.repeating, self.weights.rugged)
         if forgets(self.robot, self.measured):
             lines += begun_in_motion([t.name for t in self.measured if unsettled(t, self.robot)])
-        lines += counted_less(self.scale.loosened)
+        lines += counted_less(self.scale.loosened, self.scale.of_lag)
         if self._whole is not None:
             compared = sum(self._rows) * (reading_s(self.measured) or self.robot.time_step_s)
             lasting = sum(float(t.log.times_s[-1] - t.log.times_s[0]) for t in self.measured)

@@ -11,7 +11,7 @@ from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.ways.open_loop.prediction import Digest, predicted_commands
 from ee_dist.discrepancy.ways.open_loop.texture import frozen
 from ee_dist.discrepancy.ways.open_loop.views import command_scale
-from ee_dist.discrepancy.ways.open_loop.weights import Weights, soften
+from ee_dist.discrepancy.ways.open_loop.weights import Weights, grain_of, soften
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -25,9 +25,11 @@ def residual_of(
     if not predicted.finite:
         return np.full((len(measured.means) + 2 * len(measured.rough)) * len(own), np.inf)
     shape = (measured.means.astype(float) - predicted.means) / weights.deviation[part]
-    grain = np.log((measured.rough + weights.tiny) / weights.rough(predicted)) / weights.grain_deviation[part]
+    grain = grain_of(measured, weights.rough(predicted), weights.tiny) / weights.grain_deviation[part]
     compared = np.array([x.kind not in weights.repeating for x in robot.sensors])
-    texture = np.stack([grain, frozen(measured, predicted, weights.window) * compared * moving], axis=1)
+    texture = np.stack(
+        [grain * weights.smooth(robot), frozen(measured, predicted, weights.window) * compared * moving], axis=1
+    )
     return np.concatenate([soften(v[..., own], soft).ravel() for v in (shape, texture)])
 
 

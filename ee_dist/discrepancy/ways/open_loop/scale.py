@@ -19,7 +19,9 @@ from ee_dist.trials.noise import channel_range
 RESOLUTION = 0.002
 """Share of a channel's range below which no difference counts: models are not better than that, noise or not."""
 PLACES = ("position", "angle")
-"""Kinds of sensors that say where a joint is."""
+"""Kinds of sensors that say where a joint is;"""
+SPEED = "velocity"
+"""and that says how fast it goes."""
 TOUCH_SCALE = 0.2
 """A touch channel jumps by 2 when a contact comes a row early: its scale must not make one such row decide everything."""
 
@@ -28,13 +30,14 @@ TOUCH_SCALE = 0.2
 class Scale:
     """``noise`` and ``scale``: (S,) in the units of the channels; ``least`` (S,) is what no model is better than. ``source`` says
     where the noise figures come from. ``loosened``: how many times less than ``least`` asks for counts what joints report beside
-    their positions."""
+    their positions; ``of_lag``: because of what comes late, and not of what the described robot is off by."""
 
     noise: Array
     scale: Array
     least: Array
     source: str
     loosened: float = 1.0
+    of_lag: bool = False
 
 
 def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
@@ -58,14 +61,18 @@ def channel_scale(robot: Robot, trials: Sequence[MeasuredTrial]) -> Scale:
     return Scale(noise, scale, scale, source)
 
 
-def no_more_than_places(scale: Scale, robot: Robot, off: Array, recorded: Array | None = None) -> Scale:
+def no_more_than_places(
+    scale: Scale, robot: Robot, off: Array, recorded: Array | None = None, changing: Array | None = None
+) -> Scale:
     """The scale by which speeds and torques count no more than the positions that are measured beside them. ``off``: (S,) root
     mean squares by which the robot as described misses each channel, in its own unit; ``recorded``: (S,) which were recorded in
-    some trial, if not all.
+    some trial, if not all; ``changing``: (S,) by how much each changes in a second, root mean squares, if that is known.
 
     By shares of their ranges speeds count many times as much: what is late or too soft is quick, and a speed is off by
     it as many times more as it is quick. Then positions, for which people look at a model, decide nothing. Within what no model
-    is better than positions ask for nothing more."""
+    is better than positions ask for nothing more. What the described robot is off by tells that where it is soft; one
+    that hangs too low is off in its positions alone, and what is left of it once that is put right is what comes late: then
+    positions are off by how fast they change, and speeds by how fast these do."""
     kinds = np.array([s.kind for s in robot.sensors])
     there = np.ones(len(kinds), dtype=bool) if recorded is None else recorded
     places = np.isin(kinds, PLACES) & there
@@ -74,10 +81,20 @@ def no_more_than_places(scale: Scale, robot: Robot, off: Array, recorded: Array 
     if not beside.any() or not np.isfinite(off).all():
         return scale
     squares = (off / scale.least) ** 2
-    times = float(np.sqrt(squares[beside].mean() / max(1.0, squares[places].mean())))
+    as_described = float(np.sqrt(squares[beside].mean() / max(1.0, squares[places].mean())))
+    by_lag = 1.0 if changing is None else _by_lag(changing / scale.least, places, beside & (kinds == SPEED))
+    times = max(as_described, by_lag)
     if times <= 1.0:
         return scale
-    return replace(scale, scale=np.where(beside, times * scale.least, scale.least), loosened=times)
+    loosened = np.where(beside, times * scale.least, scale.least)
+    return replace(scale, scale=loosened, loosened=times, of_lag=by_lag > as_described)
+
+
+def _by_lag(changing: Array, places: Array, speeds: Array) -> float:
+    """How many times more speeds are off than places where both come late, from how fast each changes (S,); 1 where nothing
+    moves."""
+    at_places = float((changing[places] ** 2).mean())
+    return float(np.sqrt((changing[speeds] ** 2).mean() / at_places)) if at_places > 0 and speeds.any() else 1.0
 
 
 def _variance(log: SensorLog) -> Array:

@@ -1,8 +1,9 @@
-"""How often channels repeat their last reading: what tells a sensor that drops out from one that is late."""
+"""How often channels repeat their last reading, which tells a sensor that drops out from one that is late; and of which kinds of
+sensors nothing of it tells, for most of them are so."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,8 @@ from ee_dist.trials.log import Array
 
 REPEATING = frozenset({"sensor_dropout", "sensor_quantisation"})
 """Effects that are told from others by how often a channel repeats a reading."""
+ROUGH = "sensor_noise"
+"""That which is told by how rough it is."""
 FINEST, FASTER, ROUNDING = 0.05, 2.0, 1e-9
 """The share of the gaps between what a channel said below which its finest step lies, how many of these it must change by in a
 row, or it may as well repeat a reading, and the share of its range below which a gap is what rounding made."""
@@ -25,11 +28,14 @@ MOST, ENOUGH = 2 / 3, 3
 steps, rows that were filled in) and not what is wrong with one."""
 
 
-def moving(values: Array, window: int) -> Mask:
-    """(R // window, S) whether readings (R, S) change by more than their finest step from one to the next: only there a reading
-    that comes again tells of a sensor. Of an encoder at rest each one does, and no simulation has its steps."""
+def moving(values: Array, window: int, least: Array | float = 0.0) -> Mask:
+    """(R // window, S) whether readings (R, S) change by more than their finest step from one to the next, and within a window by
+    more than is ``least`` to count: only there a reading that comes again tells of a sensor. Of an encoder at rest each one does,
+    of one that creeps many do, and no simulation has its steps."""
     change, finest = _changes(values)
-    return np.asarray(block_sums(change, window) / window > FASTER * finest)
+    rows = len(values) // window
+    far = np.ptp(values[: rows * window].reshape(rows, window, values.shape[1]), axis=1) > least
+    return np.asarray((block_sums(change, window) / window > FASTER * finest) & far)
 
 
 def by_steps(values: Array, window: int) -> Array:
@@ -72,15 +78,21 @@ def repeating(robot: Robot, trials: Iterable[tuple[Digest, Digest, Mask, Mask]],
     """Kinds of sensors most of which repeat readings as the model's do not, from (measured, predicted, where that tells, which
     channels were recorded) of each trial."""
     found = [
-        (np.mean(np.maximum(frozen(m, p, window) * tells, 0.0) ** 2, axis=0), recorded)
+        (np.maximum(frozen(m, p, window) * tells, 0.0) ** 2, recorded)
         for m, p, tells, recorded in trials
         if p.finite and len(p.repeated)
     ]
-    if not found:
+    return most_odd(robot, found)
+
+
+def most_odd(robot: Robot, squares: Sequence[tuple[Array, Mask]]) -> frozenset[str]:
+    """Kinds of sensors most of which are odd, from the squares (windows, S) of the standard deviations that each is off in a
+    trial, and which channels were recorded there."""
+    if not squares:
         return frozenset()
-    squares, own = (np.stack(each) for each in zip(*found, strict=True))
+    means, own = np.stack([s.mean(axis=0) for s, _ in squares]), np.stack([recorded for _, recorded in squares])
     there = own.any(axis=0)
-    odd = (means_of(squares, own) > ODD**2)[there]
+    odd = (means_of(means, own) > ODD**2)[there]
     kinds = np.array([s.kind for s in robot.sensors])[there]
     return frozenset(
         kind

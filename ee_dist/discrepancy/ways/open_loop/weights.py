@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ee_dist.discrepancy.problem import Mask
 from ee_dist.discrepancy.recorded import medians_of, row_by_row
 from ee_dist.discrepancy.ways.open_loop.prediction import Digest, Predictor
 from ee_dist.discrepancy.ways.open_loop.scale import Scale
-from ee_dist.discrepancy.ways.open_loop.texture import repeating
+from ee_dist.discrepancy.ways.open_loop.texture import frozen, most_odd, repeating
 from ee_dist.robots.model import Robot
 from ee_dist.trials.log import Array
 
@@ -44,7 +45,7 @@ class Weights:
     moves block means, ``known`` (2, S) mean squares that calibration left of both.
 
     ``undeclared`` (S,) is the variance of noise that no description declares; most sensors of the kinds in ``repeating``
-    repeat readings more often than the model's.
+    repeat readings more often than the model's, and of those in ``rugged`` it is not compared how rough they are either.
     """
 
     scale: Scale
@@ -56,6 +57,7 @@ class Weights:
     known: tuple[Array, ...]
     undeclared: Array
     repeating: frozenset[str]
+    rugged: frozenset[str]
     own: tuple[Array, ...]
     """Places of the channels that were recorded in each part: nothing is compared of others."""
 
@@ -68,7 +70,11 @@ class Weights:
         """(windows, S) of a prediction, with the noise that no description declares."""
         return _rough(predicted, self.undeclared, self.tiny)
 
-    def floors(self, part: int, soft: float) -> tuple[list[Array], list[Array]]:
+    def smooth(self, robot: Robot) -> Mask:
+        """(S,) channels of which it is compared how rough they are."""
+        return np.array([x.kind not in self.rugged for x in robot.sensors])
+
+    def floors(self, part: int, soft: float, robot: Robot) -> tuple[list[Array], list[Array]]:
         """Mean squares of a part's values under a perfect model, and what of them is no noise: of means (blocks * S,), then of
         texture (windows * 2 * S,)."""
         # How far noise moves the log of roughness beside what is too small to count, as a share of what it does alone.
@@ -80,6 +86,7 @@ class Weights:
         share = (noise / self.block + self.begun[part]) / off + left
         rough = _ROUGH_FLOOR * texture / grain_off
         grain = _ROUGH_FLOOR * noisy * pure / grain_off + rough
+        grain, rough = grain * self.smooth(robot), rough * self.smooth(robot)
         share, left, grain, rough = (values[:, self.own[part]] for values in (share, left, grain, rough))
         floor = [share.ravel() * _SOFT_FLOOR[soft], np.stack([grain, np.zeros_like(grain)], axis=1).ravel()]
         return floor, [left.ravel() * _SOFT_FLOOR[soft], np.stack([rough, np.zeros_like(rough)], axis=1).ravel()]
@@ -92,9 +99,11 @@ def weigh(
     scale: Scale,
     known: Sequence[Array],
     held: Sequence[Sequence[Robot]],
+    bare: bool = False,
 ) -> Weights:
     """The weights of what was measured (``data``, and where it moved). ``held``: of each part, as they are held there, the model
-    that is believed and as many others that are as good."""
+    that is believed and as many others that are as good. ``bare``: a real robot that touches nothing: where most of its sensors
+    of a kind jump, or repeat readings, neither says what is wrong with it."""
     robot, block, window, count = predictor.base, predictor.block, predictor.window, len(held[0])
     pairs = [(k, m) for k, models in enumerate(held) for m in models]
     found = predictor.digests(pairs)
@@ -115,12 +124,30 @@ def weigh(
             grain = np.mean([np.log(_rough(d, undeclared, tiny) / usual) ** 2 for d in others], axis=0)
         deviation.append(np.sqrt(noise + _held_up(spread)))
         grain_deviation.append(np.sqrt(_by_luck(window) + known[k][1] + _held_up(grain)))
-    settled = tuple(deviation), tuple(grain_deviation), begun, tuple(known), undeclared, repeats
+    rugged: frozenset[str] = frozenset()
+    if bare:
+        each = zip(data, first, moving, recorded, strict=True)
+        texture = [
+            (
+                grain_of(d, _rough(p, undeclared, tiny), tiny) ** 2 / _by_luck(window)
+                + (frozen(d, p, window) * tells) ** 2,
+                own,
+            )
+            for d, p, tells, own in each
+            if p.finite and len(p.rough)
+        ]
+        rugged = most_odd(robot, texture)
+    settled = tuple(deviation), tuple(grain_deviation), begun, tuple(known), undeclared, repeats | rugged, rugged
     return Weights(scale, block, window, *settled, tuple(map(np.flatnonzero, recorded)))
 
 
 def _tiny(scale: Scale) -> Array:
     return (TINY * scale.least) ** 2
+
+
+def grain_of(measured: Digest, rough: Array, tiny: Array) -> Array:
+    """(windows, S) log of how many times rougher was measured than is predicted."""
+    return np.asarray(np.log((measured.rough + tiny) / rough))
 
 
 def _rough(predicted: Digest, undeclared: Array, tiny: Array) -> Array:

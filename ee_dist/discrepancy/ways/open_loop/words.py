@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from ee_dist.basics.names import counted, listed
 from ee_dist.discrepancy.ways.open_loop.stretches import SETTLED_S
@@ -11,13 +11,17 @@ NOTED = 1.2
 """Times that channels count less, from which it is told."""
 
 
-def uncompared(repeating: Iterable[str]) -> list[str]:
-    """A line on each kind of sensor of which it is not compared how often it repeats a reading."""
-    return [
-        f"Most {kind} sensors repeat readings more often than the model's (coarse steps, rows that were filled "
-        "in): how often they do is not compared."
-        for kind in sorted(repeating)
-    ]
+def uncompared(repeating: Iterable[str], rugged: Collection[str] = ()) -> list[str]:
+    """A line on each kind of sensor of which it is not compared how often it repeats a reading, and of the ``rugged`` among them
+    how rough it is."""
+    lines = []
+    for kind in sorted(repeating):
+        jump, rough = ("or jump more ", "and how rough they are ") if kind in rugged else ("", "")
+        lines.append(
+            f"Most {kind} sensors repeat readings more often {jump}than the model's (coarse steps, rows that were filled "
+            f"in): how often they do {rough}is not compared."
+        )
+    return lines
 
 
 def begun_in_motion(trials: Sequence[str]) -> list[str]:
@@ -28,12 +32,13 @@ def begun_in_motion(trials: Sequence[str]) -> list[str]:
     return [f"The first {SETTLED_S:g} s of {begun} is simulated and not compared: {why}."]
 
 
-def counted_less(loosened: float) -> list[str]:
-    """Where channels beside the positions count so many times less."""
+def counted_less(loosened: float, of_lag: bool = False) -> list[str]:
+    """Where channels beside the positions count so many times less; ``of_lag``: for what comes late."""
     if not loosened > NOTED:
         return []
+    off = "what comes late" if of_lag else "the robot as described"
     return [
-        "What joints report beside their positions is to count no more than these do, and the robot as described is off "
+        f"What joints report beside their positions is to count no more than these do, and {off} is off "
         f"by {loosened:.3g} times more in it than in positions: so many times more of it counts as one."
     ]
 
