@@ -145,9 +145,15 @@ def _leaves_less(one: Fitted, other: Fitted, noise: float, share: float = LESS) 
     return one.energy - noise < share * (other.energy - noise)
 
 
+def guesses_at_end(parts: tuple[Candidate, ...], u: Array) -> frozenset[str]:
+    """Names of the parts on what was guessed that are as far from it as they may go."""
+    pairs = zip(parts, Model(parts).places, strict=True)
+    return frozenset(c.name for c, at in pairs if c.guess and _ends(c, u[at]))
+
+
 def with_more_room(search: Search, parts: tuple[Candidate, ...], u: Array) -> Fitted | None:
     """The parts with more room for guesses among them that ended at an end of theirs; None where none did, or nothing is won."""
-    if not any(c.guess and _ends(c, u[at]) for c, at in zip(parts, Model(parts).places, strict=True)):
+    if not guesses_at_end(parts, u):
         return None
     (row,) = search.residuals([Model(parts).hypothesis(u)])
     near = Fitted(parts, u, float(row @ row))

@@ -36,9 +36,11 @@ def finished(
     last: Examined | None,
     twins: list[Twin],
     tried: int,
+    no_farther: frozenset[str] = frozenset(),
 ) -> Improvement:
     """The result of a search that climbed the ``ladder`` from the residual ``base`` (n,) and ``stopped`` with ``current``;
-    ``last``: what was tried on top of it, ``tried``: of how many effects it chose."""
+    ``last``: what was tried on top of it, ``tried``: of how many effects it chose; ``no_farther``:
+    guesses that were given more room in vain."""
     problem = search.problem
     floor, source = problem.noise_floor()
     terms: Hypothesis = search.fixed
@@ -80,6 +82,7 @@ def finished(
         unsure=may_be_noise(problem, residual),
         twins=twins,
         judged_on=ladder[-1].held_out,
+        no_farther=no_farther,
     )
 
 

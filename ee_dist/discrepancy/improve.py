@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ee_dist.discrepancy.asked_for import to_be_added
-from ee_dist.discrepancy.assumed import with_more_room
+from ee_dist.discrepancy.assumed import guesses_at_end, with_more_room
 from ee_dist.discrepancy.base_model import residual_as_it_is
 from ee_dist.discrepancy.everywhere import AT_ONCE, everywhere, looked_for_at_once, stands_out
 from ee_dist.discrepancy.evidence.holdout import (
@@ -69,6 +69,7 @@ REFUSALS = 2
 NO_MORE = "no further effect earns its place: {why}"
 NOR = "; nor does all that may be a little wrong everywhere, fitted at once"
 WORSE = "with all values fitted anew, data held out are foretold no better"
+MORE_ROOM = "with more room for what was guessed"
 NOTHING_LEFT = "nothing is left that counts, above the noise and above the resolution at which channels are compared"
 ONE_MORE = "one more effect"
 """What the search is at, for who waits."""
@@ -102,7 +103,7 @@ def improve(
     if current.parts:
         climb(refitted(search, current))
     last: Examined | None = None
-    own, twins = len(current.parts), list[Twin]()
+    own, twins, no_farther = len(current.parts), list[Twin](), frozenset[str]()
     if wanted is not None:
         new, stopped = to_be_added(problem.robot, current.parts, wanted)
         for c in new:
@@ -111,7 +112,8 @@ def improve(
             climb(_rung(search, judged))
         if (wider := with_more_room(search, current.parts, current.u)) is not None:
             current = Current(wider.parts, wider.u)
-            climb(refitted(search, current, "with more room for what was guessed"))
+            climb(refitted(search, current, MORE_ROOM))
+        no_farther = guesses_at_end(current.parts, current.u)
     else:
         exchanges, spread, anew, refused, nor = 0, 0, 0, 0, ""
         looked: set[str] | None = None
@@ -167,6 +169,12 @@ def improve(
                     current, rung = other
                     climb(rung)
                     continue
+                # Beside all that came since, a guess may be farther off than it could go when it was put right.
+                if (wider := with_more_room(search, current.parts, current.u)) is not None:
+                    current = Current(wider.parts, wider.u)
+                    climb(refitted(search, current, MORE_ROOM))
+                    continue
+                no_farther = guesses_at_end(current.parts, current.u)
                 why_not = WORSE if worse else last.judged[0].why_not if last.judged else LUCK
                 stopped = NO_MORE.format(why=why_not) + ("" if spread else nor)
                 if settled(leftovers(problem, last.base), ladder[-1].error_heldout, problem.noise_floor()[0]):
@@ -205,7 +213,8 @@ def improve(
         current, twins = last_steps(
             search, current, own, pool, climb, spread > 0, [*seen.values()], OFTEN - anew, tried_with
         )
-    return finished(search, current, ladder, as_it_is, stopped, last, twins, 0 if wanted is not None else len(pool))
+    tried = 0 if wanted is not None else len(pool)
+    return finished(search, current, ladder, as_it_is, stopped, last, twins, tried, no_farther)
 
 
 def _with_room(search: Search, fit: Fit) -> Fit:

@@ -63,7 +63,7 @@ class Improvement:
     top of it. ``odd``: of a calibration, the joints whose values stand out from those of like joints (see calibrated_away.py).
     ``unsure``: channels in which what is left may be noise or not; ``twins``: what does as well as an effect
     of the model, if other values follow; ``at_limit``: joints that are often at their torque limits with the final model, where
-    somebody looked."""
+    somebody looked; ``no_farther``: guesses at their bounds, beyond which more room was tried and took off too little."""
 
     verdict: str
     explained: float
@@ -84,6 +84,7 @@ class Improvement:
     judged_on: str = ""
     all_rows: tuple[float, float] | None = None
     at_limit: list[AtLimit] = field(default_factory=list)
+    no_farther: frozenset[str] = frozenset()
 
     @property
     def refused(self) -> list[Judged]:

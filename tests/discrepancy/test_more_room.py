@@ -10,7 +10,7 @@ from way_samples import Sample, measure, problem_by, samples
 
 from ee_dist.discrepancy.improve import improve
 from ee_dist.discrepancy.problem import Problem, error
-from ee_dist.discrepancy.search.candidates import candidate, candidates
+from ee_dist.discrepancy.search.candidates import Candidate, candidate, candidates
 from ee_dist.effects.catalogue import term
 
 
@@ -59,3 +59,27 @@ def test_what_was_asked_for_has_as_much_room() -> None:
     (gain,) = (dict(t.values)["factor"] for t in found.terms if t.effect == "position_gain")
     assert gain > 25.0 > wanted[1].bounds[0][1]
     assert found.ladder[-1].error_heldout < 0.8 * found.ladder[-2].error_heldout
+
+
+def hardly_damped() -> tuple[Problem, list[Candidate]]:
+    """Damping of a sixth, which is a little beyond what a guess may be off at first, and an encoder that is far off."""
+    sample, hidden = samples()["arm"], (term("zero_offset", "elbow", offset_rad=0.3),)
+    drives = tuple(replace(d, kd=d.kd / 6.0) for d in sample.robot.drives)
+    robot = replace(sample.robot, drives=drives, assumed=tuple((d.joint, f) for d in drives for f in ("kp", "kd")))
+    pool = candidates(robot, only=["position_gain", "speed_gain", "zero_offset"])
+    return problem_by("open_loop", measure(sample, hidden), robot), pool
+
+
+def test_beside_what_came_since_a_guess_goes_farther_than_it_did_when_more_was_wrong() -> None:
+    problem, pool = hardly_damped()
+    found = improve(problem, pool)
+    damping = [dict(t.values)["factor"] for r in found.ladder for t in r.terms if t.effect == "speed_gain"]
+    assert damping[0] < 5.5
+    assert damping[-1] == pytest.approx(6.0, rel=0.05) and not found.no_farther
+    assert found.ladder[-1].error_heldout < 1.2 * problem.noise_floor()[0]
+
+
+def test_a_guess_at_its_end_that_more_room_does_no_good_is_kept_in_mind() -> None:
+    problem, pool = hardly_damped()
+    found = improve(problem, pool, wanted=[candidate(problem.robot, "speed_gain", "all_joints")])
+    assert found.no_farther == {"speed_gain@all_joints"}

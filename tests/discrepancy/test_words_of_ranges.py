@@ -52,5 +52,7 @@ def test_a_factor_on_a_guess_that_ended_at_its_bound_says_how_to_go_on() -> None
     )
     (line,) = beyond_a_guess(guessed, stiffer, [at_end], alone=True)
     assert "improve puts it right together" in line and "multiply" not in line
+    (line,) = beyond_a_guess(guessed, stiffer, [at_end], no_farther={"position_gain@all_joints"})
+    assert "with more room it took less than a tenth off" in line and "multiply" not in line
     assert not beyond_a_guess(guessed, stiffer, [within])
     assert not beyond_a_guess(robot, stiffer, [at_end]), "nobody guessed"

@@ -141,7 +141,7 @@ def improve_account(
     lines.append(f"Stopped because {found.stopped}. Noise floor: {found.floor_source}.")
     lines += [ON_ITS_OWN] if len(found.ladder) > 1 else []
     lines += flag_texts(found.terms, found.parameters)
-    lines += beyond_a_guess(robot, found.terms, found.parameters)
+    lines += beyond_a_guess(robot, found.terms, found.parameters, no_farther=found.no_farther)
     lines += load_text(robot, found.terms) + weight_text(robot, found.terms)
     lines += [] if torques_compared(problem) else scale_text(robot, found.terms)
     lines += rest_text(found.terms, found.parameters)

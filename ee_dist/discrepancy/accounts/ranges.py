@@ -3,7 +3,7 @@ have to do with them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -85,20 +85,28 @@ def flag_texts(terms: Hypothesis, parameters: Sequence[ParameterReport]) -> list
 
 
 def beyond_a_guess(
-    robot: Robot, terms: Hypothesis, parameters: Sequence[ParameterReport], alone: bool = False
+    robot: Robot,
+    terms: Hypothesis,
+    parameters: Sequence[ParameterReport],
+    alone: bool = False,
+    no_farther: Collection[str] = (),
 ) -> list[str]:
-    """A line for each factor on something that a description only guessed, which ended where it may not go farther: from a better
-    guess it may. ``alone``: nothing else that was guessed was put right with it, which may be off as far."""
-    return [
-        f"{placed(terms[p.term].name).capitalize()} ended where it may not go farther from a guess: "
-        + (
-            "what else was guessed of these drives may be off with it, and improve puts it right together."
-            if alone
-            else f"multiply what the description assumes by {p.value:.3g}, and begin anew from there."
-        )
-        for p in parameters
-        if p.flag.startswith(BOUND) and p.name == "factor" and _guessed(robot, terms[p.term])
-    ]
+    """A line for each factor on something that a description only guessed, which ended where it may not go farther: from a
+    better guess it may. ``alone``: nothing else that was guessed was put right with it, which may be off as far.
+    ``no_farther``: names of those that were given more room, which took next to nothing off."""
+    found = []
+    for p in parameters:
+        t = terms[p.term]
+        if not (p.flag.startswith(BOUND) and p.name == "factor" and _guessed(robot, t)):
+            continue
+        if alone:
+            how = "what else was guessed of these drives may be off with it, and improve puts it right together."
+        elif t.name in no_farther:
+            how = "with more room it took less than a tenth off what is left, so that these data hardly say how much farther."
+        else:
+            how = f"multiply what the description assumes by {p.value:.3g}, and begin anew from there."
+        found.append(f"{placed(t.name).capitalize()} ended where it may not go farther from a guess: {how}")
+    return found
 
 
 def weight_text(robot: Robot, terms: Hypothesis) -> list[str]:
