@@ -63,7 +63,7 @@ def test_only_what_most_of_a_real_robots_sensors_have_in_common_is_not_compared(
     assert (jumping == 0.0) == said
     # What is not compared has no floor that would make what is compared look small.
     assert (float(p.floor[velocities].sum()) == 0.0) == said
-    assert any("how rough they are" in line for line in p.notes) == said
+    assert any("nor how rough they are" in line for line in p.notes) == said
     names = {c.name for c in pool_of(p)}
     assert ("sensor_noise@velocity_shoulder" in names, "sensor_dropout@velocity_shoulder" in names) == (
         not said,

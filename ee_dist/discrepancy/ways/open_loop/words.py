@@ -16,10 +16,11 @@ def uncompared(repeating: Iterable[str], rugged: Collection[str] = ()) -> list[s
     how rough it is."""
     lines = []
     for kind in sorted(repeating):
-        jump, rough = ("or jump more ", "and how rough they are ") if kind in rugged else ("", "")
+        more, compared = "repeat readings more often", "how often they do is not compared"
+        if kind in rugged:
+            more, compared = f"{more} or jump more", "neither how often they do nor how rough they are is compared"
         lines.append(
-            f"Most {kind} sensors repeat readings more often {jump}than the model's (coarse steps, rows that were filled "
-            f"in): how often they do {rough}is not compared."
+            f"Most {kind} sensors {more} than the model's (coarse steps, rows that were filled in): {compared}."
         )
     return lines
 
