@@ -126,17 +126,12 @@ def weigh(
         grain_deviation.append(np.sqrt(_by_luck(window) + known[k][1] + _held_up(grain)))
     rugged: frozenset[str] = frozenset()
     if bare:
-        each = zip(data, first, moving, recorded, strict=True)
-        texture = [
-            (
-                grain_of(d, _rough(p, undeclared, tiny), tiny) ** 2 / _by_luck(window)
-                + (frozen(d, p, window) * tells) ** 2,
-                own,
-            )
-            for d, p, tells, own in each
-            if p.finite and len(p.rough)
-        ]
-        rugged = most_odd(robot, texture)
+        each = [(d, p, tells, own) for d, p, tells, own in zip(data, first, moving, recorded, strict=True) if p.finite]
+        grains = [grain_of(d, _rough(p, undeclared, tiny), tiny) ** 2 / _by_luck(window) for d, p, _, _ in each]
+        again = [(frozen(d, p, window) * tells) ** 2 for d, p, tells, _ in each]
+        rugged = most_odd(
+            robot, [(g + a, own) for g, a, (_, _, _, own) in zip(grains, again, each, strict=True) if len(g)]
+        )
     settled = tuple(deviation), tuple(grain_deviation), begun, tuple(known), undeclared, repeats | rugged, rugged
     return Weights(scale, block, window, *settled, tuple(map(np.flatnonzero, recorded)))
 
