@@ -107,9 +107,9 @@ class HeldOut:
         return float(self.residual @ self.residual)
 
 
-def in_turn(held_out: str) -> str:
-    """What was held out (the ``name`` of a cut) in words that tell it from trials that were held out from all of it."""
-    return IN_TURN.get(held_out, held_out)
+def in_turn(held_out: str, apart: bool = True) -> str:
+    """What was held out (the ``name`` of a cut); where trials were held ``apart`` from all, in words that tell the two apart."""
+    return IN_TURN.get(held_out, held_out) if apart else held_out
 
 
 def windows(problem: Problem) -> Cut:

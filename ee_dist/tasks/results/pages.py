@@ -100,7 +100,7 @@ def improve_page(
 ) -> Page:
     """The page of improve; ``word`` is on trials that took no part in it."""
     first, last, changed = found.ladder[0], found.ladder[-1], len(found.ladder) > 1
-    held = last.held_out if word is None else in_turn(last.held_out)
+    held = in_turn(last.held_out, word is not None)
     page = _page(problem, measured, "Improve", account, links)
     page.tiles = [
         (problem.told(first.error_heldout), f"{problem.natural_name}, {MODEL}"),
@@ -119,7 +119,7 @@ def improve_page(
             steps,
             [drawn(problem, r.error_fit) for r in found.ladder],
             [drawn(problem, r.error_heldout) for r in found.ladder],
-            [r.held_out if word is None else in_turn(r.held_out) for r in found.ladder],
+            [in_turn(r.held_out, word is not None) for r in found.ladder],
             drawn(problem, found.noise_floor),
             axis_of(problem),
             None if word is None else [drawn(word.problem, s.error) for s in word.steps],

@@ -55,7 +55,7 @@ def improve_scene(
             step_name(r),
             in_unit(problem, r.error_heldout),
             in_unit(problem, r.error_fit),
-            r.held_out if word is None else in_turn(r.held_out),
+            in_turn(r.held_out, word is not None),
             off,
         )
         for r, off in zip(found.ladder, apart, strict=True)
