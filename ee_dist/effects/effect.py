@@ -125,9 +125,10 @@ class Effect:
 
     def shared(self, robot: Robot) -> tuple[str, ...]:
         """Groups of joints or sensors that it can act on with one set of values (see groups.py). What is wrong with a part is
-        so with all of them only where a little of it is in every robot: masses, but not loads or lost parts. Nor do hinges
-        share with slides what has another unit there."""
-        if self.family == "body" and not self.everywhere:
+        so with all of them only where a little of it is in every robot: masses, but not loads or lost parts. What begins at some
+        moment of a trial is the fault of one: sensors that stop at once are a logger that did. Nor do hinges share with slides
+        what has another unit there."""
+        if (self.family == "body" and not self.everywhere) or any(p.of_trial for p in self.parameters):
             return ()
         allowed = self.targets(robot)
         found = shared_targets(robot, allowed)

@@ -196,6 +196,13 @@ def test_hinges_share_with_slides_no_number_that_has_another_unit_there() -> Non
     assert "all_joints" not in rubbing
 
 
+def test_what_begins_at_a_moment_of_a_trial_is_the_fault_of_one_sensor() -> None:
+    """All position sensors of a real arm were told to stick a little from the eighth second of each motion on."""
+    assert "all_touch_sensors" in find("sensor_dropout").shared(QUADRUPED)
+    assert not find("sensor_stuck").shared(QUADRUPED)
+    assert {c.target for c in candidates(QUADRUPED) if c.effect.name == "sensor_stuck"} == {*QUADRUPED.sensor_names}
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, True, "0.5", None])
 def test_a_value_that_is_no_number_is_refused(value: object) -> None:
     with pytest.raises(EffectError, match="torque_nm must be a number"):
