@@ -97,6 +97,8 @@ def test_an_interval_that_a_bound_cuts_is_told_by_its_ends():
     assert within(ParameterReport(0, "x", 218.0, -90.0, 300.0, "")) == "218 (-90 to 300)"
     assert within(ParameterReport(0, "x", 218.0, -90.0, 300.0, "at its bound")) == "218 (-90 to 300; at its bound)"
     assert within(ParameterReport(0, "x", 218.0, 23.0, 413.0, "")) == "218 ± 195"
+    # Rounded it would go below nothing, where there are no delays.
+    assert within(ParameterReport(0, "x", 0.0172, 0.0, 0.0366, "")) == "0.0172 (0 to 0.0366)"
 
 
 def test_a_joint_with_more_or_less_than_all_share_says_how_much_that_is():
@@ -132,7 +134,7 @@ def test_a_doubt_stands_beside_a_value_in_a_word_and_below_in_full():
         ParameterReport(1, "torque_nm", 9.0, 8.0, 10.0, BOUND),
     ]
     assert [within(p) for p in told] == ["0.10 ± 0.30 (hardly told from neutral)", "9.0 ± 1.0 (at its bound)"]
-    assert within(ParameterReport(0, "x", 1.0, 0.0, 2.0, f"{BOUND}; {NOT_DETERMINED}")).endswith(
+    assert within(ParameterReport(0, "x", 1.0, 0.5, 1.5, f"{BOUND}; {NOT_DETERMINED}")).endswith(
         "(at its bound; not determined by these data)"
     )
     joints = ("hip_front_left", "hip_front_right", "hip_rear_left", "hip_rear_right")

@@ -80,7 +80,8 @@ def within(p: ParameterReport) -> str:
         return f"{p.value:.3g} ({flag})" if flag else f"{p.value:.3g}"
     if half <= 0:
         return f"{p.value:.4g}"
-    if abs(p.value - (p.low + p.high) / 2) > UNEVEN * half:
+    # One that a bound cuts at nothing would seem to go below it.
+    if p.low == 0.0 or abs(p.value - (p.low + p.high) / 2) > UNEVEN * half:
         cut = f"{p.value:.3g} ({p.low:.3g} to {p.high:.3g})"
         return f"{cut[:-1]}; {flag})" if flag else cut
     digits = max(1 - math.floor(math.log10(half)), 0)  # two of the interval
